@@ -1,0 +1,38 @@
+//! One deterministic problem: layers, probe, criterion, solver, and one bone.
+
+use crate::elasticity::Elasticity;
+use crate::layers::Layers;
+use crate::probe::Probe;
+use crate::settings::{Picking, SolverSettings};
+
+/// Everything but the bone's material: what all realizations of a job share, and all that a
+/// solver's shared tables may depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Setup {
+    /// The stack of layers.
+    pub layers: Layers,
+    /// Source, receivers, pulse.
+    pub probe: Probe,
+    /// The criterion of the first arriving signal.
+    pub picking: Picking,
+    /// How waves are computed.
+    pub solver: SolverSettings,
+}
+
+/// The bone's material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bone {
+    /// Mass density ρ, kg/m³.
+    pub density: f64,
+    /// Elasticity, Pa.
+    pub elasticity: Elasticity,
+}
+
+/// One case: a velocity's bits are a function of it alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Case {
+    /// What is probed, with what, and how it is computed.
+    pub setup: Setup,
+    /// The bone.
+    pub bone: Bone,
+}

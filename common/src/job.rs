@@ -1,0 +1,195 @@
+//! The specification of a job: everything that its result depends on.
+
+use crate::case::Setup;
+use crate::parameters::{Parameter, Point};
+
+/// What a job does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JobKind {
+    /// Searches the point whose moments match the data's.
+    Identification,
+    /// Evaluates the moments at the fixed/start point; no search.
+    Propagation,
+}
+
+/// What is known of the measured velocities.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Data {
+    /// The velocities themselves, m/s, each finite and above 0, at least two.
+    Velocities(Vec<f64>),
+    /// Their mean, m/s, and coefficient of variation.
+    Moments {
+        /// Mean, m/s.
+        mean: f64,
+        /// Coefficient of variation.
+        coefficient_of_variation: f64,
+    },
+}
+
+/// Range of one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// Held at a value.
+    Fixed(f64),
+    /// Searched between bounds.
+    Free {
+        /// First value; lower ≤ start ≤ upper.
+        start: f64,
+        /// Lower bound.
+        lower: f64,
+        /// Upper bound, above the lower one.
+        upper: f64,
+    },
+}
+
+impl Range {
+    /// The fixed value, or the start.
+    pub fn start(&self) -> f64 {
+        match *self {
+            Self::Fixed(value) => value,
+            Self::Free { start, .. } => start,
+        }
+    }
+}
+
+/// How realizations are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sampling {
+    /// Independent germs, one ChaCha stream per realization.
+    #[default]
+    MonteCarlo,
+}
+
+impl Sampling {
+    /// Every sampling, in the order of a user's file.
+    pub const ALL: [Self; 1] = [Self::MonteCarlo];
+
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MonteCarlo => "monte_carlo",
+        }
+    }
+}
+
+/// The Monte Carlo loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MonteCarlo {
+    /// Realizations of each evaluation, 1 to 10⁷.
+    pub realizations: u64,
+    /// Seed of the germs, 0 to 2⁶³-1.
+    pub seed: u64,
+    /// How germs are drawn.
+    pub sampling: Sampling,
+    /// An evaluation with a larger fraction of failures is infeasible; 0 to 1.
+    pub max_failed_fraction: f64,
+}
+
+impl Default for MonteCarlo {
+    fn default() -> Self {
+        Self {
+            realizations: 2747,
+            seed: 1,
+            sampling: Sampling::MonteCarlo,
+            max_failed_fraction: 0.01,
+        }
+    }
+}
+
+/// What is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Objective {
+    /// The paper's cost: relative squared errors of mean and coefficient of variation.
+    #[default]
+    Moments,
+}
+
+impl Objective {
+    /// Every objective, in the order of a user's file.
+    pub const ALL: [Self; 1] = [Self::Moments];
+
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Moments => "moments",
+        }
+    }
+}
+
+/// How the minimum is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SearchMethod {
+    /// The Nelder-Mead simplex (the paper's).
+    #[default]
+    Simplex,
+}
+
+impl SearchMethod {
+    /// Every method, in the order of a user's file.
+    pub const ALL: [Self; 1] = [Self::Simplex];
+
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Simplex => "simplex",
+        }
+    }
+}
+
+/// The search loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// How.
+    pub method: SearchMethod,
+    /// Most evaluations (points whose realizations are run).
+    pub max_evaluations: u64,
+    /// The search ends when the best cost is at most this.
+    pub cost_tolerance: f64,
+    /// The search ends when the simplex is at most this large, as a fraction of the box.
+    pub size_tolerance: f64,
+    /// Edge of the first simplex, as a fraction of the box.
+    pub initial_step: f64,
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Self {
+            method: SearchMethod::Simplex,
+            max_evaluations: 400,
+            cost_tolerance: 1e-10,
+            size_tolerance: 1e-5,
+            initial_step: 0.15,
+        }
+    }
+}
+
+/// Everything that a job's result depends on, defaults filled in, data inlined.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobSpecification {
+    /// Identification or propagation.
+    pub kind: JobKind,
+    /// Layers, probe, picking, solver.
+    pub setup: Setup,
+    /// The measured velocities; present for an identification, absent for a propagation.
+    pub data: Option<Data>,
+    /// Ranges of [`Parameter::ALL`], in that order.
+    pub parameters: [Range; 7],
+    /// The Monte Carlo loop.
+    pub monte_carlo: MonteCarlo,
+    /// What is minimised.
+    pub objective: Objective,
+    /// How it is searched.
+    pub search: Search,
+}
+
+impl JobSpecification {
+    /// Range of one parameter.
+    pub fn range(&self, parameter: Parameter) -> Range {
+        self.parameters[parameter as usize]
+    }
+
+    /// The point of fixed values and starts.
+    pub fn start(&self) -> Point {
+        Point(self.parameters.map(|range| range.start()))
+    }
+}

@@ -1,0 +1,32 @@
+//! Every bound of the software in one place, unit in the name.
+
+/// Fewest receivers a probe may have: a line needs residuals.
+pub const RECEIVERS_MIN: u32 = 3;
+/// Most receivers a probe may have.
+pub const RECEIVERS_MAX: u32 = 64;
+/// Most realizations of one evaluation.
+pub const REALIZATIONS_MAX: u64 = 10_000_000;
+/// Largest seed: 2⁶³ - 1, so that every tool can hold it in a signed integer.
+pub const SEED_MAX: u64 = (1 << 63) - 1;
+/// Most evaluations of one search.
+pub const EVALUATIONS_MAX: u64 = 1_000_000;
+/// Most measured velocities of one job.
+pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
+/// Smallest refinement of the solver's sampling.
+pub const REFINEMENT_MIN: f64 = 0.5;
+/// Largest refinement of the solver's sampling.
+pub const REFINEMENT_MAX: f64 = 16.0;
+/// Most (frequency, wavenumber) pairs of one realization.
+pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
+/// Longest job or case file, bytes. (A million velocities inlined take 20 MB.)
+pub const FILE_BYTES_MAX: u64 = 64 << 20;
+/// Longest message on the wire, bytes.
+pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
+/// Most realizations in one batch: 9 bytes each on the wire.
+pub const BATCH_REALIZATIONS_MAX: u32 = 1 << 16;
+/// Most threads a worker may announce.
+pub const WORKER_THREADS_MAX: u32 = 4096;
+/// Most jobs that wait or run at a time.
+pub const JOBS_MAX: usize = 10_000;
+/// Longest name or id in a request, bytes.
+pub const NAME_BYTES_MAX: usize = 256;

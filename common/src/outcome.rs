@@ -1,0 +1,150 @@
+//! What became of one realization: a velocity, or a typed failure.
+
+/// Why a realization has no velocity. The discriminant is the code byte of the digest, of the
+/// wire format and of the store; 0 is success. Codes are never reused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum FailureKind {
+    /// At some receiver no extremum qualifies as the first arrival.
+    NoArrival = 1,
+    /// The picked extrema differ in sign, or do not lie on one line.
+    InconsistentArrival = 2,
+    /// The direct wave in the coupling fluid arrives before the wave through the bone.
+    DirectWaveFirst = 3,
+    /// The computation produced a number that is not finite.
+    NotFinite = 4,
+    /// An iteration, or the sampling, did not reach its tolerance within its bounds.
+    NoConvergence = 5,
+}
+
+impl FailureKind {
+    /// Every kind, in the order of its code.
+    pub const ALL: [Self; 5] = [
+        Self::NoArrival,
+        Self::InconsistentArrival,
+        Self::DirectWaveFirst,
+        Self::NotFinite,
+        Self::NoConvergence,
+    ];
+
+    /// Code byte, 1 to 5.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoArrival => "no_arrival",
+            Self::InconsistentArrival => "inconsistent_arrival",
+            Self::DirectWaveFirst => "direct_wave_first",
+            Self::NotFinite => "not_finite",
+            Self::NoConvergence => "no_convergence",
+        }
+    }
+}
+
+/// The outcome of one realization: velocity of the first arriving signal in m/s, or why not.
+///
+/// A velocity is finite and above 0.
+pub type Outcome = Result<f64, FailureKind>;
+
+/// The two numbers that stand for an outcome on the wire, in the store and in the digest:
+/// code byte (0 = success) and velocity (0 on failure).
+pub fn encode(outcome: Outcome) -> (u8, f64) {
+    match outcome {
+        Ok(velocity) => (0, velocity),
+        Err(kind) => (kind.code(), 0.0),
+    }
+}
+
+/// The outcome that [`encode`] wrote; `None` if the pair is not one it can have written
+/// (unknown code, a velocity that is not finite and positive, a failure with a velocity).
+pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
+    if code == 0 {
+        return (velocity.is_finite() && velocity > 0.0).then_some(Ok(velocity));
+    }
+    let kind = FailureKind::ALL.into_iter().find(|kind| kind.code() == code)?;
+    (velocity.to_bits() == 0).then_some(Err(kind))
+}
+
+/// How many realizations failed, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FailureCounts([u64; 5]);
+
+impl FailureCounts {
+    /// Counts the failures among `outcomes`.
+    pub fn of(outcomes: &[Outcome]) -> Self {
+        let mut counts = Self::default();
+        for kind in outcomes.iter().filter_map(|outcome| outcome.err()) {
+            counts.add(kind, 1);
+        }
+        counts
+    }
+
+    /// Adds `count` failures of one kind.
+    pub fn add(&mut self, kind: FailureKind, count: u64) {
+        self.0[usize::from(kind.code()) - 1] += count;
+    }
+
+    /// How many failures of one kind.
+    pub fn get(&self, kind: FailureKind) -> u64 {
+        self.0[usize::from(kind.code()) - 1]
+    }
+
+    /// How many failures of all kinds.
+    pub fn total(&self) -> u64 {
+        self.0.iter().sum()
+    }
+
+    /// The kinds that occurred, with their counts, in the order of their codes.
+    pub fn iter(&self) -> impl Iterator<Item = (FailureKind, u64)> + '_ {
+        FailureKind::ALL
+            .into_iter()
+            .map(|kind| (kind, self.get(kind)))
+            .filter(|&(_, count)| count > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_outcome_survives_encoding() {
+        let outcomes =
+            FailureKind::ALL.into_iter().map(Err).chain([Ok(3908.75), Ok(f64::MIN_POSITIVE)]);
+        for outcome in outcomes {
+            let (code, velocity) = encode(outcome);
+            assert_eq!(decode(code, velocity), Some(outcome));
+        }
+    }
+
+    #[test]
+    fn what_no_outcome_encodes_to_is_refused() {
+        for (code, velocity) in [
+            (0, 0.0),
+            (0, -1.0),
+            (0, f64::NAN),
+            (0, f64::INFINITY),
+            (1, 3900.0),
+            (1, -0.0),
+            (6, 0.0),
+        ] {
+            assert_eq!(decode(code, velocity), None, "code {code}, velocity {velocity}");
+        }
+    }
+
+    #[test]
+    fn failures_are_counted_by_kind() {
+        let counts = FailureCounts::of(&[
+            Ok(3900.0),
+            Err(FailureKind::NotFinite),
+            Err(FailureKind::NoArrival),
+            Err(FailureKind::NotFinite),
+        ]);
+        let listed: Vec<_> = counts.iter().collect();
+        assert_eq!(listed, [(FailureKind::NoArrival, 1), (FailureKind::NotFinite, 2)]);
+        assert_eq!(counts.total(), 3);
+    }
+}

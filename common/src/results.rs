@@ -1,0 +1,109 @@
+//! What a job leaves: the result and the history of its evaluations.
+
+use crate::outcome::{FailureCounts, Outcome};
+use crate::parameters::Point;
+use crate::settings::{Picking, SolverSettings};
+
+/// How a job ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The search met a tolerance, or the propagation is complete.
+    Converged,
+    /// The search used up its evaluations.
+    MaxEvaluations,
+    /// A user cancelled the job.
+    Cancelled,
+    /// No feasible point, or an integrity error.
+    Failed,
+}
+
+impl Status {
+    /// Every status.
+    pub const ALL: [Self; 4] =
+        [Self::Converged, Self::MaxEvaluations, Self::Cancelled, Self::Failed];
+
+    /// Name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::MaxEvaluations => "max_evaluations",
+            Self::Cancelled => "cancelled",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// Mean and coefficient of variation of a set of velocities (the paper's Secs. 2 and 5).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moments {
+    /// v = (1/N) Σ V_k, m/s.
+    pub mean: f64,
+    /// Δ = √((1/N) Σ (V_k - v)²) / v.
+    pub coefficient_of_variation: f64,
+}
+
+/// Moments of a Monte Carlo sample with their standard errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The moments.
+    pub moments: Moments,
+    /// Their standard errors: that of the mean in m/s, that of the coefficient of variation.
+    pub standard_error: Moments,
+}
+
+/// One evaluation of the search, as a row of `history.csv`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evaluation {
+    /// Number of the evaluation, from 0.
+    pub number: u64,
+    /// The point.
+    pub point: Point,
+    /// Moments over the successes, unless there are none.
+    pub moments: Option<Moments>,
+    /// Cost; infinite at an infeasible point; `None` for a propagation.
+    pub cost: Option<f64>,
+    /// Failed realizations by kind.
+    pub failures: FailureCounts,
+}
+
+/// The result of a job. No wall times in it: one job, the same bytes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobResult {
+    /// How it ended.
+    pub status: Status,
+    /// Why, in a sentence, where the status needs one (failed).
+    pub reason: Option<String>,
+    /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
+    pub digest: String,
+    /// The best evaluation (of a propagation: the only one), if any was complete.
+    pub best: Option<BestPoint>,
+    /// The data's moments; `None` for a propagation.
+    pub data: Option<Moments>,
+    /// Points whose realizations were run.
+    pub evaluations: u64,
+    /// Realizations of each evaluation.
+    pub realizations: u64,
+    /// Seed of the germs.
+    pub seed: u64,
+    /// Solver settings that were used.
+    pub solver: SolverSettings,
+    /// Criterion that was used.
+    pub picking: Picking,
+    /// Version of the program that computed it.
+    pub version: String,
+}
+
+/// The best point of a job, with its realizations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BestPoint {
+    /// The point.
+    pub point: Point,
+    /// Its cost; `None` for a propagation.
+    pub cost: Option<f64>,
+    /// Its moments with standard errors, unless every realization failed.
+    pub velocity: Option<Estimate>,
+    /// Failed realizations by kind.
+    pub failures: FailureCounts,
+    /// Outcomes in index order.
+    pub outcomes: Vec<Outcome>,
+}

@@ -1,0 +1,1 @@
+//! Jobs, simplex, dispatch, reduction and the public gRPC API of osteon.

@@ -1,0 +1,20 @@
+//! Compiles `osteon/v1/*.proto` in pure Rust: no `protoc` is needed.
+
+use std::env;
+use std::fs;
+use std::path::PathBuf;
+
+use prost::Message as _;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let files =
+        ["osteon/v1/specification.proto", "osteon/v1/jobs.proto", "osteon/v1/workers.proto"];
+    for file in files {
+        println!("cargo:rerun-if-changed={file}");
+    }
+    let descriptors = protox::compile(files, ["."])?;
+    let out_dir = PathBuf::from(env::var("OUT_DIR")?);
+    fs::write(out_dir.join("osteon.v1.bin"), descriptors.encode_to_vec())?;
+    tonic_prost_build::configure().compile_fds(descriptors)?;
+    Ok(())
+}

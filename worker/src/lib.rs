@@ -1,0 +1,1 @@
+//! Attaches to an osteon coordinator, runs batches of realizations on its cores, answers.
