@@ -16,5 +16,7 @@ pub mod outcome;
 pub mod parameters;
 pub mod probe;
 pub mod results;
+pub mod sampling;
 pub mod settings;
+pub mod version;
 pub mod violations;
