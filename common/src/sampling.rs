@@ -1,8 +1,229 @@
-//! Size of the (frequency, wavenumber) sampling that a setup needs.
+//! How finely frequencies and wavenumbers are sampled: derived from geometry, band and the
+//! fastest wave, never hard-wired to one geometry.
+//!
+//! The method computes p̂(k, s) at s = α + i 2πn/T and k = m Δk. Summing over k repeats the source
+//! along x1 with period L = 2π/Δk; summing over n repeats the signal in time with period T, the
+//! repetition weakened by exp(-α T). Both repetitions are kept away from what is looked at:
+//!
+//! - L: the wave of the nearest repeated source reaches the last receiver, at the speed that the
+//!   sampling is made for, only after the window of interest;
+//! - T: the window of every receiver, from its earliest possible arrival on, fits into one period;
+//! - band: the pulse's spectrum is cut smoothly between [`Sampling::taper_start`] and
+//!   [`Sampling::band`];
+//! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
+
+use std::f64::consts::PI;
 
 use crate::case::Setup;
+use crate::limits::SAMPLING_PAIRS_MAX;
 
-/// Number of (frequency, wavenumber) pairs of one realization at the setup's default rung.
-pub fn pair_count(_setup: &Setup) -> f64 {
-    6000.0
+/// Ratio of neighbouring speeds on the ladder.
+const RUNG_RATIO: f64 = 1.125;
+/// Rungs of the ladder: its last speed is 280 times the first.
+pub const RUNGS: usize = 49;
+/// Speed, m/s, at which a setup's sampling is sized before any bone is known: the usual bound of
+/// speeds in cortical bone.
+const NOMINAL_SPEED: f64 = 4000.0;
+/// Highest frequency over centre frequency at refinement 1.
+const BAND: f64 = 4.0;
+/// Where the taper starts, as a fraction of the band.
+const TAPER_START: f64 = 0.4;
+/// α T at refinement 1: what wraps round is weaker by exp(-this).
+const WRAP_DAMPING: f64 = 14.0;
+/// Exponent at which the sum over wavenumbers ends, at refinement 1.
+const EVANESCENCE: f64 = 20.0;
+/// Share of the period left free after the longest window.
+const PERIOD_MARGIN: f64 = 1.15;
+
+/// Sampling of one setup for waves up to one speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampling {
+    /// No wave along x1 is faster, m/s.
+    pub speed: f64,
+    /// T, s.
+    pub period: f64,
+    /// α, 1/s.
+    pub damping: f64,
+    /// Highest frequency, Hz.
+    pub band: f64,
+    /// Frequency at which the taper starts, Hz.
+    pub taper_start: f64,
+    /// Δk, rad/m.
+    pub wavenumber_step: f64,
+    /// √(k² - (ω/c1)²) at which the sum over wavenumbers ends, rad/m.
+    pub evanescent_limit: f64,
+    /// Whether reflections of the coupling's outer face can arrive inside a window.
+    pub upper_echoes: bool,
+    /// Whether reflections of the marrow's outer face can arrive inside a window.
+    pub lower_echoes: bool,
+    sound_speed: f64,
+}
+
+/// Number of (frequency, wavenumber) pairs of one realization, at the usual speeds of bone.
+pub fn pair_count(setup: &Setup) -> f64 {
+    let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
+    let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
+    Sampling::at_rung(setup, rung).pairs()
+}
+
+/// The lowest rung whose speed is at least `speed` (m/s); `None` above the ladder, or if `speed`
+/// is not finite.
+pub fn rung(setup: &Setup, speed: f64) -> Option<usize> {
+    let mut top = first_rung(setup);
+    for rung in 0..RUNGS {
+        if speed <= top {
+            return Some(rung);
+        }
+        top *= RUNG_RATIO;
+    }
+    None
+}
+
+/// Earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels along the
+/// bone at `speed` (m/s) and through the coupling fluid at its ends.
+///
+/// A lower bound at every distance: within the critical one the reflected wave comes later.
+pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
+    let c1 = setup.layers.coupling.sound_speed;
+    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    if speed <= c1 {
+        return x.mul_add(x, heights * heights).sqrt() / c1;
+    }
+    x / speed + heights * slowness(c1, speed)
+}
+
+/// Arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
+pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
+    let across = setup.probe.receivers.x3 - setup.probe.source.x3;
+    x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
+}
+
+/// Horizontal distances of the receivers from the source, m.
+pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
+    setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
+}
+
+impl Sampling {
+    /// The sampling that picks velocities of bones whose waves are no faster than the rung's speed.
+    pub fn at_rung(setup: &Setup, rung: usize) -> Self {
+        let speed = (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO);
+        let mut longest = 0.0_f64;
+        let mut last = 0.0_f64;
+        for x in distances(setup) {
+            let end = direct_arrival(setup, x);
+            longest = longest.max(end - earliest_arrival(setup, x, speed));
+            last = last.max(end);
+        }
+        // A window can be empty: then any period will do.
+        let period = PERIOD_MARGIN * longest.max(2.0 / setup.probe.center_frequency);
+        Self::new(setup, speed, period, last)
+    }
+
+    /// The sampling for traces from 0 to `duration` (s) of bones whose waves are no faster than
+    /// `speed` (m/s).
+    pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
+        let mut sampling = Self::new(setup, speed, PERIOD_MARGIN * duration, duration);
+        sampling.upper_echoes = true;
+        sampling.lower_echoes = true;
+        sampling
+    }
+
+    fn new(setup: &Setup, speed: f64, period: f64, last: f64) -> Self {
+        let refinement = setup.solver.refinement;
+        let coupling = &setup.layers.coupling;
+        let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+        let farthest = distances(setup).fold(0.0, f64::max);
+        let band = BAND * refinement * setup.probe.center_frequency;
+        // Finer sampling is also less wrapped and less truncated, slowly.
+        let more = 2.0 * libm::log(refinement.max(1.0));
+        let through_fluid = earliest_arrival(setup, 0.0, speed);
+        let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
+        Self {
+            speed,
+            period,
+            damping: (WRAP_DAMPING + more) / period,
+            band,
+            taper_start: TAPER_START * band,
+            wavenumber_step: 2.0 * PI / length,
+            evanescent_limit: (EVANESCENCE + more) / heights,
+            upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
+            lower_echoes: lower_echoes(setup, speed),
+            sound_speed: coupling.sound_speed,
+        }
+    }
+
+    /// Number of frequencies, n = 0 … this - 1.
+    pub fn frequencies(&self) -> usize {
+        // The taper vanishes at the band's end.
+        (self.band * self.period).ceil() as usize
+    }
+
+    /// Angular frequency of sample `n`, rad/s.
+    pub fn angular_frequency(&self, n: usize) -> f64 {
+        2.0 * PI * n as f64 / self.period
+    }
+
+    /// Number of wavenumbers at frequency `n`, m = 0 … this - 1.
+    pub fn wavenumbers(&self, n: usize) -> usize {
+        let propagating = self.angular_frequency(n) / self.sound_speed;
+        let limit =
+            propagating.mul_add(propagating, self.evanescent_limit * self.evanescent_limit).sqrt();
+        (limit / self.wavenumber_step) as usize + 1
+    }
+
+    /// Smooth weight of frequency `n`: 1 up to the taper's start, 0 at the band's end.
+    pub fn taper(&self, n: usize) -> f64 {
+        let frequency = n as f64 / self.period;
+        let x = (frequency - self.taper_start) / (self.band - self.taper_start);
+        if x <= 0.0 {
+            1.0
+        } else if x >= 1.0 {
+            0.0
+        } else {
+            // Infinitely smooth at both ends.
+            let (rising, falling) = (libm::exp(-1.0 / x), libm::exp(-1.0 / (1.0 - x)));
+            falling / (rising + falling)
+        }
+    }
+
+    /// Number of (frequency, wavenumber) pairs, estimated without a loop over frequencies when
+    /// there are very many.
+    pub fn pairs(&self) -> f64 {
+        let frequencies = self.band * self.period;
+        let highest = 2.0 * PI * self.band / self.sound_speed;
+        let per_frequency = (0.5 * highest + self.evanescent_limit) / self.wavenumber_step;
+        if frequencies * per_frequency > 4.0 * SAMPLING_PAIRS_MAX || frequencies.is_nan() {
+            return frequencies * per_frequency;
+        }
+        (0..self.frequencies()).map(|n| self.wavenumbers(n) as f64).sum()
+    }
+}
+
+/// Speed of the lowest rung, m/s: waves no faster than the coupling fluid never come first.
+fn first_rung(setup: &Setup) -> f64 {
+    setup.layers.coupling.sound_speed * RUNG_RATIO
+}
+
+/// √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at `v`.
+fn slowness(c: f64, v: f64) -> f64 {
+    (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
+}
+
+/// Height in fluid 1, m, that the first head wave by way of the outer face crosses.
+fn upper_echo_path(setup: &Setup) -> f64 {
+    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+    2.0 * setup.layers.coupling.thickness - (receivers - source).abs()
+}
+
+/// Whether a head wave that crosses `path` (m) of fluid of sound speed `c` arrives before the
+/// direct wave at some receiver.
+fn echoes(setup: &Setup, speed: f64, path: f64, c: f64) -> bool {
+    distances(setup).any(|x| x / speed + path * slowness(c, speed) <= direct_arrival(setup, x))
+}
+
+/// Whether a head wave by way of the marrow's outer face can arrive before the direct wave.
+fn lower_echoes(setup: &Setup, speed: f64) -> bool {
+    let marrow = &setup.layers.marrow;
+    let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
+    distances(setup).any(|x| earliest_arrival(setup, x, speed) + across <= direct_arrival(setup, x))
 }

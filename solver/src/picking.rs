@@ -1,0 +1,277 @@
+//! The first arriving signal: one extremum, the same at every receiver, and the line through its
+//! times.
+
+use osteon_common::outcome::FailureKind;
+use osteon_common::settings::{self, Picking};
+
+use crate::signal::Extremum;
+use crate::{Arrival, Failure};
+
+/// An extremum below this fraction of the window's largest one is numerical noise.
+const FLOOR: f64 = 1e-3;
+/// A packet's peak is looked for up to this many periods of the centre frequency after an extremum.
+const PACKET_PERIODS: f64 = 1.2;
+/// Largest distance of a pick from the line, in periods of the centre frequency.
+const RESIDUAL_PERIODS_MAX: f64 = 0.05;
+
+/// What is seen at one receiver before the direct wave can arrive.
+#[derive(Debug, Default)]
+pub(crate) struct Window {
+    /// Local extrema in order of time.
+    pub(crate) extrema: Vec<Extremum>,
+    /// |p| at the end of the window, Pa.
+    pub(crate) last: f64,
+}
+
+impl Window {
+    /// Drops what is below the numerical floor.
+    ///
+    /// A wave that still rises when the direct wave arrives has no extremum in the window; then
+    /// all that is left is noise, small against the window's last value, and none of it is kept.
+    pub(crate) fn drop_noise(&mut self) {
+        let largest = self.extrema.iter().fold(0.0, |max: f64, e| max.max(e.pressure.abs()));
+        if largest < FLOOR * self.last {
+            self.extrema.clear();
+        }
+        self.extrema.retain(|e| e.pressure.abs() >= FLOOR * largest);
+    }
+
+    /// |p| of extremum `rank` over its packet's peak.
+    fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
+        let first = self.extrema.get(rank)?;
+        let peak = self.extrema[rank..]
+            .iter()
+            .take_while(|e| e.time <= first.time + packet)
+            .fold(0.0, |max: f64, e| max.max(e.pressure.abs()));
+        Some(first.pressure.abs() / peak)
+    }
+}
+
+/// Picks the first arriving signal.
+///
+/// `windows` and `distances` (m, from the source) have one entry per receiver.
+///
+/// # Errors
+/// `DirectWaveFirst` when a receiver has no extremum before the direct wave, `NoArrival` when one
+/// has too few, `InconsistentArrival` when the picks differ in sign or do not lie on one line.
+pub(crate) fn pick(
+    picking: &Picking,
+    center_frequency: f64,
+    distances: &[f64],
+    windows: &[Window],
+) -> Result<Arrival, Failure> {
+    if let Some(r) = windows.iter().position(|window| window.extrema.is_empty()) {
+        return Err(Failure {
+            kind: FailureKind::DirectWaveFirst,
+            detail: format!(
+                "at receiver {} (x1 = {} m from the source) the direct wave arrives before the first \
+                 extremum of the wave through the bone",
+                r + 1,
+                distances[r]
+            ),
+        });
+    }
+    let first = first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
+    let rank = match picking.extremum {
+        settings::Extremum::First => first,
+        settings::Extremum::Second => first + 1,
+    };
+    let mut picks = Vec::with_capacity(windows.len());
+    for (r, window) in windows.iter().enumerate() {
+        picks.push(*window.extrema.get(rank).ok_or_else(|| no_arrival(r, rank))?);
+    }
+    if let Some(r) = picks.iter().position(|p| p.pressure * picks[0].pressure <= 0.0) {
+        return Err(Failure {
+            kind: FailureKind::InconsistentArrival,
+            detail: format!("the picked extremum has another sign at receiver {} than at receiver 1", r + 1),
+        });
+    }
+    let times: Vec<f64> = picks.iter().map(|p| p.time).collect();
+    let velocity = fit(distances, &times, RESIDUAL_PERIODS_MAX / center_frequency)?;
+    Ok(Arrival { velocity, times })
+}
+
+/// The lowest rank whose ratio, in the median over the receivers, exceeds the threshold.
+fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<usize, Failure> {
+    // The loop ends at the latest when a receiver runs out of extrema.
+    let mut rank = 0;
+    loop {
+        let mut ratios = Vec::with_capacity(windows.len());
+        for (r, window) in windows.iter().enumerate() {
+            ratios.push(window.ratio(rank, packet).ok_or_else(|| no_arrival(r, rank))?);
+        }
+        if median(&mut ratios) > threshold {
+            return Ok(rank);
+        }
+        rank += 1;
+    }
+}
+
+fn no_arrival(receiver: usize, rank: usize) -> Failure {
+    Failure {
+        kind: FailureKind::NoArrival,
+        detail: format!(
+            "receiver {} has {rank} extrema before the direct wave; extremum {} of the array is missing there",
+            receiver + 1,
+            rank + 1
+        ),
+    }
+}
+
+/// Median; of an even count the mean of the middle two.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 {
+        values[middle]
+    } else {
+        0.5 * (values[middle - 1] + values[middle])
+    }
+}
+
+/// Least-squares slope of distance against time, m/s.
+fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<f64, Failure> {
+    let count = times.len() as f64;
+    let mean_time = times.iter().fold(0.0, |sum, t| sum + t) / count;
+    let mean_distance = distances.iter().fold(0.0, |sum, x| sum + x) / count;
+    let (mut cross, mut square) = (0.0, 0.0);
+    for (x, t) in distances.iter().zip(times) {
+        let dt = t - mean_time;
+        cross = dt.mul_add(x - mean_distance, cross);
+        square = dt.mul_add(dt, square);
+    }
+    let slope = cross / square;
+    if !(slope > 0.0 && slope.is_finite()) {
+        return Err(Failure {
+            kind: FailureKind::InconsistentArrival,
+            detail: "the picked extremum does not travel away from the source".to_owned(),
+        });
+    }
+    for (r, (x, t)) in distances.iter().zip(times).enumerate() {
+        let residual = (x - mean_distance - slope * (t - mean_time)).abs() / slope;
+        if residual > residual_max {
+            return Err(Failure {
+                kind: FailureKind::InconsistentArrival,
+                detail: format!(
+                    "the pick at receiver {} is {:.1} ns off the line, allowed are {:.1} ns",
+                    r + 1,
+                    residual * 1e9,
+                    residual_max * 1e9
+                ),
+            });
+        }
+    }
+    Ok(slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FC: f64 = 1e6;
+
+    /// Windows of receivers 1 mm apart; each extremum is (time in µs at the first receiver,
+    /// pressure) and travels at 4 mm/µs.
+    fn windows(extrema: &[(f64, f64)], receivers: usize) -> (Vec<f64>, Vec<Window>) {
+        let distances: Vec<f64> = (0..receivers).map(|r| 0.01 + 1e-3 * r as f64).collect();
+        let windows = (0..receivers)
+            .map(|r| Window {
+                extrema: extrema
+                    .iter()
+                    .map(|&(time, pressure)| Extremum {
+                        time: (time + 0.25 * r as f64) * 1e-6,
+                        pressure,
+                    })
+                    .collect(),
+                last: 0.0,
+            })
+            .collect();
+        (distances, windows)
+    }
+
+    fn check(
+        extrema: &[(f64, f64)],
+        change: impl Fn(&mut Vec<Window>),
+        expected: Result<(f64, f64), FailureKind>,
+    ) {
+        let (distances, mut windows) = windows(extrema, 4);
+        change(&mut windows);
+        windows.iter_mut().for_each(Window::drop_noise);
+        let picked = pick(&Picking::default(), FC, &distances, &windows);
+        match (picked, expected) {
+            (Ok(arrival), Ok((velocity, time))) => {
+                assert!((arrival.velocity - velocity).abs() < 1e-6 * velocity);
+                assert!((arrival.times[0] - time * 1e-6).abs() < 1e-15);
+            }
+            (Err(failure), Err(kind)) => assert_eq!(failure.kind, kind, "{}", failure.detail),
+            (picked, expected) => panic!("{picked:?} against {expected:?}"),
+        }
+    }
+
+    #[test]
+    fn the_first_extremum_above_the_threshold_is_the_same_at_every_receiver() {
+        let packet = [(5.0, 0.04), (5.4, -0.2), (5.8, 1.0)];
+        check(&packet, |_| (), Ok((4000.0, 5.4)));
+        // At two of four receivers the small one is above the threshold: the median decides.
+        check(&packet, |w| w[0].extrema[0].pressure = 0.07, Ok((4000.0, 5.4)));
+        check(
+            &packet,
+            |w| (0..3).for_each(|r| w[r].extrema[0].pressure = 0.07),
+            Ok((4000.0, 5.0)),
+        );
+    }
+
+    #[test]
+    fn a_ratio_equal_to_the_threshold_does_not_open_the_packet() {
+        check(&[(5.0, 0.05), (5.4, -1.0)], |_| (), Ok((4000.0, 5.4)));
+    }
+
+    #[test]
+    fn a_packet_ends_after_its_periods() {
+        // The large extremum 1.3 µs later belongs to another packet.
+        check(&[(5.0, 0.04), (5.4, -0.2), (6.3, 30.0)], |_| (), Ok((4000.0, 5.0)));
+    }
+
+    #[test]
+    fn noise_is_not_counted() {
+        check(&[(4.8, 0.9e-3), (5.4, 1.0)], |_| (), Ok((4000.0, 5.4)));
+        check(&[(4.8, 1.1e-3), (5.4, 1.0)], |_| (), Ok((4000.0, 5.4)));
+    }
+
+    #[test]
+    fn what_is_wrong_with_an_array_is_typed() {
+        let packet = [(5.0, 0.2), (5.4, -1.0)];
+        check(&packet, |w| w[2].extrema.clear(), Err(FailureKind::DirectWaveFirst));
+        check(&packet, |w| w[2].last = 1e4, Err(FailureKind::DirectWaveFirst));
+        check(
+            &[(5.0, 0.04), (5.4, -1.0)],
+            |w| w[2].extrema.truncate(1),
+            Err(FailureKind::NoArrival),
+        );
+        check(
+            &packet,
+            |w| w[1].extrema[0].pressure = -0.2,
+            Err(FailureKind::InconsistentArrival),
+        );
+        check(&packet, |w| w[1].extrema[0].time += 0.1e-6, Err(FailureKind::InconsistentArrival));
+        check(
+            &packet,
+            |w| (0..4).for_each(|r| w[r].extrema[0].time = (9.0 - r as f64) * 1e-6),
+            Err(FailureKind::InconsistentArrival),
+        );
+    }
+
+    #[test]
+    fn the_second_extremum_is_the_packets_next() {
+        let (distances, windows) = windows(&[(5.0, 0.01), (5.4, -0.2), (5.8, 1.0)], 4);
+        let picking = Picking { extremum: settings::Extremum::Second, threshold: 0.05 };
+        let arrival = pick(&picking, FC, &distances, &windows).unwrap();
+        assert!((arrival.times[0] - 5.8e-6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn median_of_an_even_count_is_the_mean_of_the_middle_two() {
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 2.5);
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+    }
+}

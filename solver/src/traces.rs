@@ -1,0 +1,121 @@
+//! Full pressure traces, direct wave included.
+
+use osteon_common::case::Bone;
+use osteon_common::limits::SAMPLING_PAIRS_MAX;
+use osteon_common::sampling::Sampling;
+use thiserror::Error;
+
+use crate::direct;
+use crate::medium::Medium;
+use crate::pulse::Pulse;
+use crate::signal::Signal;
+use crate::solver::{Solver, Workspace};
+use crate::tables::Tables;
+
+/// Most samples of one trace.
+const SAMPLES_MAX: f64 = 1e7;
+
+/// Pressures at the receivers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traces {
+    /// Times, s, from 0 on.
+    pub times: Vec<f64>,
+    /// Pressure, Pa, per receiver and time; direct wave included.
+    pub pressures: Vec<Vec<f64>>,
+}
+
+/// Why there are no traces.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum TraceError {
+    /// Duration or time step is not a positive number, or there are too many samples.
+    #[error(
+        "a trace of {duration} s at steps of {time_step} s is not possible; both must be above 0 and give at most \
+         1e7 samples"
+    )]
+    Samples {
+        /// s.
+        duration: f64,
+        /// s.
+        time_step: f64,
+    },
+    /// The sampling is too large.
+    #[error(
+        "a trace of {duration} s needs {pairs:.1e} (frequency, wavenumber) pairs; at most 1e7 are computed: \
+         shorten --duration or lower the refinement"
+    )]
+    TooLong {
+        /// s.
+        duration: f64,
+        /// Pairs that would be needed.
+        pairs: f64,
+    },
+    /// A pressure came out as NaN or infinite.
+    #[error("a pressure came out as NaN or infinite; density or elasticity is out of scale")]
+    NotFinite,
+}
+
+impl Solver {
+    /// Pressure traces of one bone from 0 to `duration` (s), every `time_step` (s).
+    ///
+    /// All reflections of the outer faces are in them. The direct wave and its image in the
+    /// coupling's outer face are computed in closed form, the rest by the exact-layer method with a
+    /// sampling of its own: velocities are not touched by asking for traces.
+    ///
+    /// # Errors
+    /// When the trace would be empty or too large.
+    pub fn traces(
+        &self,
+        bone: &Bone,
+        duration: f64,
+        time_step: f64,
+    ) -> Result<Traces, TraceError> {
+        let samples = duration / time_step;
+        if !(duration > 0.0 && time_step > 0.0 && samples >= 1.0 && samples <= SAMPLES_MAX) {
+            return Err(TraceError::Samples { duration, time_step });
+        }
+        let medium = Medium::new(bone);
+        let fluids =
+            self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
+        let sampling = Sampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
+        let pairs = sampling.pairs();
+        if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
+            return Err(TraceError::TooLong { duration, pairs });
+        }
+        let tables = Tables::new(self.setup(), sampling);
+        let mut workspace = Workspace::default();
+        workspace.plate.fill(&medium, self.setup().layers.bone_thickness);
+        workspace.spectra.fill(self.isa(), &tables, &medium, &mut workspace.plate);
+        let times: Vec<f64> =
+            (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
+        let pressures: Vec<Vec<f64>> = (0..tables.receivers())
+            .map(|r| {
+                let signal =
+                    Signal { sampling: &tables.sampling, spectrum: workspace.spectra.receiver(r) };
+                let fluid = self.fluid_waves(r);
+                times.iter().map(|&t| signal.at(t) + fluid(t)).collect()
+            })
+            .collect();
+        if pressures.iter().flatten().any(|p| !p.is_finite()) {
+            return Err(TraceError::NotFinite);
+        }
+        Ok(Traces { times, pressures })
+    }
+
+    /// The direct wave and its image in the coupling's outer face at receiver `r`.
+    fn fluid_waves(&self, r: usize) -> impl Fn(f64) -> f64 {
+        let setup = self.setup();
+        let coupling = setup.layers.coupling;
+        let (source, receivers) = (setup.probe.source, setup.probe.receivers);
+        let pulse = Pulse::new(setup.probe.amplitude, setup.probe.center_frequency);
+        let x = receivers.x1(r as u32) - source.x1;
+        let travel = move |height: f64| {
+            x.mul_add(x, height * height).sqrt() / coupling.sound_speed
+        };
+        let direct = travel(receivers.x3 - source.x3);
+        let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
+        move |t| {
+            direct::pressure(&pulse, coupling.density, direct, t)
+                - direct::pressure(&pulse, coupling.density, image, t)
+        }
+    }
+}
