@@ -7,16 +7,33 @@
 //!
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 
+mod accepted;
 pub mod case;
+pub mod case_file;
+pub mod check;
+pub mod digest;
+pub mod document;
 pub mod elasticity;
+pub mod ensemble;
+pub mod file_error;
 pub mod job;
+pub mod job_file;
 pub mod layers;
 pub mod limits;
 pub mod outcome;
 pub mod parameters;
 pub mod probe;
+mod reader;
+pub mod realization;
 pub mod results;
+pub mod results_csv;
+pub mod results_json;
 pub mod sampling;
 pub mod settings;
+mod setup_section;
+pub mod special;
+pub mod statistics;
+mod toml_text;
+mod velocities;
 pub mod version;
 pub mod violations;

@@ -26,6 +26,8 @@ pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
 pub const BATCH_REALIZATIONS_MAX: u32 = 1 << 16;
 /// Most threads a worker may announce.
 pub const WORKER_THREADS_MAX: u32 = 4096;
+/// Most workers attached to a coordinator at a time.
+pub const WORKERS_MAX: usize = 4096;
 /// Most jobs that wait or run at a time.
 pub const JOBS_MAX: usize = 10_000;
 /// Longest name or id in a request, bytes.

@@ -7,7 +7,9 @@
 //!
 //! - L: the wave of the nearest repeated source reaches the last receiver, at the speed that the
 //!   sampling is made for, only after the window of interest;
-//! - T: the window of every receiver, from its earliest possible arrival on, fits into one period;
+//! - T: from a receiver's earliest possible arrival on, one period takes in the window of interest
+//!   and the large wave that the bone's face reflects: were that to wrap round, it would come down
+//!   on the first arrival, a thousand times smaller;
 //! - band: the pulse's spectrum is cut smoothly between [`Sampling::taper_start`] and
 //!   [`Sampling::band`];
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
@@ -28,12 +30,19 @@ const NOMINAL_SPEED: f64 = 4000.0;
 const BAND: f64 = 4.0;
 /// Where the taper starts, as a fraction of the band.
 const TAPER_START: f64 = 0.4;
-/// α T at refinement 1: what wraps round is weaker by exp(-this).
-const WRAP_DAMPING: f64 = 14.0;
+/// Band of traces over that of velocities: a trace is right to 1e-3 of its largest value.
+const TRACE_BAND: f64 = 3.0;
+/// α T: what wraps round is weaker by exp(-this). More amplifies rounding and truncation, which
+/// grow as e^(αt), beyond what it gains.
+const WRAP_DAMPING: f64 = 12.0;
 /// Exponent at which the sum over wavenumbers ends, at refinement 1.
 const EVANESCENCE: f64 = 20.0;
-/// Share of the period left free after the longest window.
-const PERIOD_MARGIN: f64 = 1.15;
+/// Length of the reflected wave, in periods of the centre frequency.
+const REFLECTED_PERIODS: f64 = 4.0;
+/// Share of the period left free after what it has to take in.
+const PERIOD_MARGIN: f64 = 1.05;
+/// The same for traces.
+const TRACE_MARGIN: f64 = 1.15;
 
 /// Sampling of one setup for waves up to one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +51,8 @@ pub struct Sampling {
     pub speed: f64,
     /// T, s.
     pub period: f64,
+    /// 2π/T, rad/s.
+    pub frequency_step: f64,
     /// α, 1/s.
     pub damping: f64,
     /// Highest frequency, Hz.
@@ -87,7 +98,7 @@ pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
     let c1 = setup.layers.coupling.sound_speed;
     let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
     if speed <= c1 {
-        return x.mul_add(x, heights * heights).sqrt() / c1;
+        return reflected_arrival(setup, x);
     }
     x / speed + heights * slowness(c1, speed)
 }
@@ -96,6 +107,12 @@ pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
 pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
     let across = setup.probe.receivers.x3 - setup.probe.source.x3;
     x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
+}
+
+/// Arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper face.
+fn reflected_arrival(setup: &Setup, x: f64) -> f64 {
+    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
 }
 
 /// Horizontal distances of the receivers from the source, m.
@@ -107,22 +124,22 @@ impl Sampling {
     /// The sampling that picks velocities of bones whose waves are no faster than the rung's speed.
     pub fn at_rung(setup: &Setup, rung: usize) -> Self {
         let speed = (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO);
-        let mut longest = 0.0_f64;
-        let mut last = 0.0_f64;
+        let tail = REFLECTED_PERIODS / setup.probe.center_frequency;
+        let (mut longest, mut last) = (0.0_f64, 0.0_f64);
         for x in distances(setup) {
-            let end = direct_arrival(setup, x);
-            longest = longest.max(end - earliest_arrival(setup, x, speed));
-            last = last.max(end);
+            let reflected = reflected_arrival(setup, x) + tail;
+            longest = longest.max(reflected - earliest_arrival(setup, x, speed));
+            last = last.max(direct_arrival(setup, x));
         }
-        // A window can be empty: then any period will do.
-        let period = PERIOD_MARGIN * longest.max(2.0 / setup.probe.center_frequency);
-        Self::new(setup, speed, period, last)
+        Self::new(setup, speed, PERIOD_MARGIN * longest, last)
     }
 
     /// The sampling for traces from 0 to `duration` (s) of bones whose waves are no faster than
     /// `speed` (m/s).
     pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
-        let mut sampling = Self::new(setup, speed, PERIOD_MARGIN * duration, duration);
+        let mut sampling = Self::new(setup, speed, TRACE_MARGIN * duration, duration);
+        sampling.band *= TRACE_BAND;
+        sampling.taper_start *= TRACE_BAND;
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
         sampling
@@ -134,14 +151,15 @@ impl Sampling {
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let band = BAND * refinement * setup.probe.center_frequency;
-        // Finer sampling is also less wrapped and less truncated, slowly.
+        // Finer sampling is also less truncated, slowly.
         let more = 2.0 * libm::log(refinement.max(1.0));
         let through_fluid = earliest_arrival(setup, 0.0, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
             speed,
             period,
-            damping: (WRAP_DAMPING + more) / period,
+            frequency_step: 2.0 * PI / period,
+            damping: WRAP_DAMPING / period,
             band,
             taper_start: TAPER_START * band,
             wavenumber_step: 2.0 * PI / length,
@@ -160,7 +178,7 @@ impl Sampling {
 
     /// Angular frequency of sample `n`, rad/s.
     pub fn angular_frequency(&self, n: usize) -> f64 {
-        2.0 * PI * n as f64 / self.period
+        n as f64 * self.frequency_step
     }
 
     /// Number of wavenumbers at frequency `n`, m = 0 … this - 1.

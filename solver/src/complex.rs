@@ -41,16 +41,19 @@ impl Complex {
     }
 
     /// self · factor.
+    #[inline(always)]
     pub fn scale(self, factor: f64) -> Self {
         Self::new(self.re * factor, self.im * factor)
     }
 
     /// Squared modulus.
+    #[inline(always)]
     pub fn norm_sqr(self) -> f64 {
         self.re.mul_add(self.re, self.im * self.im)
     }
 
     /// Modulus.
+    #[inline(always)]
     pub fn abs(self) -> f64 {
         self.norm_sqr().sqrt()
     }
@@ -63,6 +66,7 @@ impl Complex {
 
 impl Add for Complex {
     type Output = Self;
+    #[inline(always)]
     fn add(self, other: Self) -> Self {
         Self::new(self.re + other.re, self.im + other.im)
     }
@@ -70,6 +74,7 @@ impl Add for Complex {
 
 impl Sub for Complex {
     type Output = Self;
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self::new(self.re - other.re, self.im - other.im)
     }
@@ -77,6 +82,7 @@ impl Sub for Complex {
 
 impl Mul for Complex {
     type Output = Self;
+    #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self::new(
             self.re.mul_add(other.re, -(self.im * other.im)),
@@ -94,6 +100,7 @@ impl Div for Complex {
 
 impl Neg for Complex {
     type Output = Self;
+    #[inline(always)]
     fn neg(self) -> Self {
         Self::new(-self.re, -self.im)
     }

@@ -1,15 +1,9 @@
 //! The instruction set that computes: chosen at run time, with the same bits from each.
 //!
-//! The kernel is one piece of code in eight lanes; it is compiled once for every instruction set.
+//! A kernel is one piece of code in eight lanes; it is compiled once for every instruction set.
 //! Its operations are IEEE additions, multiplications, divisions and explicit fused
 //! multiply-adds, whose results do not depend on how many lanes fit into a register. Without
 //! hardware support a fused multiply-add is a slow but exact function call.
-
-use crate::lanes::ComplexLanes;
-use crate::medium::Medium;
-use crate::plate::Plate;
-use crate::response::sum_wavenumbers;
-use crate::tables::{Frequency, Tables};
 
 /// An instruction set of this machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +23,10 @@ enum Kind {
 impl Isa {
     /// The instruction sets that this machine offers, slowest first.
     pub fn available() -> Vec<Self> {
-        #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "only x86-64 has more"))]
+        #[cfg_attr(
+            not(target_arch = "x86_64"),
+            expect(unused_mut, reason = "only x86-64 has more")
+        )]
         let mut sets = vec![Self(Kind::Baseline)];
         #[cfg(target_arch = "x86_64")]
         {
@@ -64,62 +61,47 @@ impl Isa {
         }
     }
 
-    /// See [`crate::response::sum_wavenumbers`].
-    pub(crate) fn sum_wavenumbers(
-        self,
-        tables: &Tables,
-        frequency: &Frequency,
-        medium: &Medium,
-        plate: &mut Plate,
-        sums: &mut [ComplexLanes],
-    ) {
+    /// Runs `kernel` compiled for this instruction set.
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            Kind::Baseline => sum_wavenumbers(tables, frequency, medium, plate, sums),
+            Kind::Baseline => kernel.run(),
             // SAFETY: a value of this type exists only for an instruction set that was detected.
             #[cfg(target_arch = "x86_64")]
-            Kind::ScalarFma => unsafe { scalar_fma(tables, frequency, medium, plate, sums) },
+            Kind::ScalarFma => unsafe { scalar_fma(kernel) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 => unsafe { avx2(tables, frequency, medium, plate, sums) },
+            Kind::Avx2 => unsafe { avx2(kernel) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => unsafe { avx512(tables, frequency, medium, plate, sums) },
+            Kind::Avx512 => unsafe { avx512(kernel) },
         }
     }
 }
 
+/// A computation that is compiled once for every instruction set.
+///
+/// `run`, and whatever it calls in its hot part, must be `#[inline(always)]`: only what is inlined
+/// into the functions below is compiled for their instruction set. What is not inlined is still
+/// right, but pays a function call for every fused multiply-add.
+pub(crate) trait Kernel {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "fma")]
-fn scalar_fma(
-    tables: &Tables,
-    frequency: &Frequency,
-    medium: &Medium,
-    plate: &mut Plate,
-    sums: &mut [ComplexLanes],
-) {
-    sum_wavenumbers(tables, frequency, medium, plate, sums);
+fn scalar_fma<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(
-    tables: &Tables,
-    frequency: &Frequency,
-    medium: &Medium,
-    plate: &mut Plate,
-    sums: &mut [ComplexLanes],
-) {
-    sum_wavenumbers(tables, frequency, medium, plate, sums);
+fn avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
-fn avx512(
-    tables: &Tables,
-    frequency: &Frequency,
-    medium: &Medium,
-    plate: &mut Plate,
-    sums: &mut [ComplexLanes],
-) {
-    sum_wavenumbers(tables, frequency, medium, plate, sums);
+fn avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }

@@ -23,15 +23,6 @@ impl Lanes {
         Self([value; LANES])
     }
 
-    #[inline(always)]
-    fn zip(self, other: Self, op: impl Fn(f64, f64) -> f64) -> Self {
-        let mut out = self;
-        for (value, with) in out.0.iter_mut().zip(other.0) {
-            *value = op(*value, with);
-        }
-        out
-    }
-
     /// self · factor + addend, rounded once.
     #[inline(always)]
     pub(crate) fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -45,7 +36,11 @@ impl Lanes {
     /// 1 / self.
     #[inline(always)]
     pub(crate) fn recip(self) -> Self {
-        Self::splat(1.0).zip(self, |one, value| one / value)
+        let mut out = self;
+        for value in &mut out.0 {
+            *value = 1.0 / *value;
+        }
+        out
     }
 
     /// The sum of the lanes, in one fixed order.
@@ -60,7 +55,11 @@ impl Add for Lanes {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+        let mut out = self;
+        for i in 0..LANES {
+            out.0[i] = self.0[i] + other.0[i];
+        }
+        out
     }
 }
 
@@ -68,7 +67,11 @@ impl Sub for Lanes {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+        let mut out = self;
+        for i in 0..LANES {
+            out.0[i] = self.0[i] - other.0[i];
+        }
+        out
     }
 }
 
@@ -76,7 +79,11 @@ impl Mul for Lanes {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
+        let mut out = self;
+        for i in 0..LANES {
+            out.0[i] = self.0[i] * other.0[i];
+        }
+        out
     }
 }
 

@@ -11,6 +11,8 @@
 //!
 //! [`Case`]: osteon_common::case::Case
 
+#![expect(clippy::needless_range_loop, reason = "matrix indices read as in the formulas")]
+
 mod complex;
 mod direct;
 mod isa;

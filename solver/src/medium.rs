@@ -74,6 +74,7 @@ impl Medium {
     /// Estimate from above of |λ|, rad/m, of the system at wavenumber `k` (rad/m) and complex
     /// frequency of modulus `s_modulus` (1/s). Exact up to the bounds in it for a solid with
     /// λ² = k² + s²/c².
+    #[inline(always)]
     pub(crate) fn growth(&self, k: f64, s_modulus: f64) -> f64 {
         let dynamic = self.density * s_modulus * s_modulus / self.stiffness * self.dynamic_growth;
         let across = self.static_growth * k;
@@ -86,12 +87,15 @@ fn block(c: &Elasticity, j: usize, l: usize, stiffness: f64) -> Matrix3 {
     std::array::from_fn(|i| std::array::from_fn(|m| c.component(i, j, m, l) / stiffness))
 }
 
+#[inline(always)]
 pub(crate) fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0] * b[0][j]))
-        })
-    })
+    let mut c = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            c[i][j] = a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0] * b[0][j]));
+        }
+    }
+    c
 }
 
 fn symmetrize(a: &mut Matrix3) {

@@ -83,7 +83,10 @@ pub(crate) fn pick(
     if let Some(r) = picks.iter().position(|p| p.pressure * picks[0].pressure <= 0.0) {
         return Err(Failure {
             kind: FailureKind::InconsistentArrival,
-            detail: format!("the picked extremum has another sign at receiver {} than at receiver 1", r + 1),
+            detail: format!(
+                "the picked extremum has another sign at receiver {} than at receiver 1",
+                r + 1
+            ),
         });
     }
     let times: Vec<f64> = picks.iter().map(|p| p.time).collect();
@@ -122,11 +125,7 @@ fn no_arrival(receiver: usize, rank: usize) -> Failure {
 fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        0.5 * (values[middle - 1] + values[middle])
-    }
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
 /// Least-squares slope of distance against time, m/s.
@@ -214,11 +213,7 @@ mod tests {
         check(&packet, |_| (), Ok((4000.0, 5.4)));
         // At two of four receivers the small one is above the threshold: the median decides.
         check(&packet, |w| w[0].extrema[0].pressure = 0.07, Ok((4000.0, 5.4)));
-        check(
-            &packet,
-            |w| (0..3).for_each(|r| w[r].extrema[0].pressure = 0.07),
-            Ok((4000.0, 5.0)),
-        );
+        check(&packet, |w| (0..3).for_each(|r| w[r].extrema[0].pressure = 0.07), Ok((4000.0, 5.0)));
     }
 
     #[test]
@@ -248,11 +243,7 @@ mod tests {
             |w| w[2].extrema.truncate(1),
             Err(FailureKind::NoArrival),
         );
-        check(
-            &packet,
-            |w| w[1].extrema[0].pressure = -0.2,
-            Err(FailureKind::InconsistentArrival),
-        );
+        check(&packet, |w| w[1].extrema[0].pressure = -0.2, Err(FailureKind::InconsistentArrival));
         check(&packet, |w| w[1].extrema[0].time += 0.1e-6, Err(FailureKind::InconsistentArrival));
         check(
             &packet,

@@ -12,6 +12,9 @@
 //! S is complex symmetric and, s having a positive real part, its factorization needs no pivoting.
 //! The last doubling closes the lower face on the marrow and eliminates straight to the scalar
 //! 1/Y, Y = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
+//!
+//! Loops rather than `array::from_fn` and `map`: a closure that the compiler does not inline is not
+//! compiled for the instruction set of its caller (see [`crate::isa`]).
 
 use crate::complex::Complex;
 use crate::lanes::{ComplexLanes, Lanes};
@@ -57,6 +60,7 @@ struct Stiffness {
 
 impl Plate {
     /// Makes this the plate of `medium`, `thickness` in m.
+    #[inline(always)]
     pub(crate) fn fill(&mut self, medium: &Medium, thickness: f64) {
         self.series.fill(medium);
         self.thickness = thickness;
@@ -64,6 +68,7 @@ impl Plate {
     }
 
     /// Prepares for complex frequency `s` (1/s) and wavenumbers up to `k_max` (rad/m).
+    #[inline(always)]
     pub(crate) fn prepare(&mut self, medium: &Medium, s: Complex, k_max: f64) {
         let growth = medium.growth(k_max, s.abs());
         let mut doublings = 1;
@@ -107,8 +112,12 @@ impl Plate {
     fn sublayer(&self, k: Lanes) -> Stiffness {
         let traction = self.polynomials.traction(k);
         let displacement = self.polynomials.displacement(k);
-        let plus = inverse(&std::array::from_fn(|i| traction.even[i] + traction.odd[i]));
-        let minus = inverse(&std::array::from_fn(|i| traction.even[i] - traction.odd[i]));
+        let (mut plus, mut minus) = ([ComplexLanes::ZERO; 6], [ComplexLanes::ZERO; 6]);
+        for i in 0..6 {
+            plus[i] = traction.even[i] + traction.odd[i];
+            minus[i] = traction.even[i] - traction.odd[i];
+        }
+        let (plus, minus) = (inverse(&plus), inverse(&minus));
         let mut top = [ComplexLanes::ZERO; 9];
         for i in 0..3 {
             for j in 0..3 {
@@ -117,7 +126,12 @@ impl Plate {
                 top[3 * i + j] = plus[AT[j][2]].mul_add(displacement[6 + i], sum);
             }
         }
-        Stiffness { top, down: minus.map(|entry| -entry), up: plus.map(|entry| -entry) }
+        let (mut down, mut up) = (minus, plus);
+        for i in 0..6 {
+            down[i] = -minus[i];
+            up[i] = -plus[i];
+        }
+        Stiffness { top, down, up }
     }
 }
 
@@ -171,7 +185,12 @@ impl Stiffness {
     fn closed(&self, load: ComplexLanes) -> ComplexLanes {
         let (down, up) = (full(&self.down), full(&self.up));
         // Lower face: (K_bb + load e3 e3ᵀ) u_bottom = -K_bt u_middle.
-        let mut bottom: [ComplexLanes; 9] = std::array::from_fn(|i| self.top[3 * (i % 3) + i / 3]);
+        let mut bottom = self.top;
+        for i in 0..3 {
+            for j in 0..3 {
+                bottom[3 * i + j] = self.top[3 * j + i];
+            }
+        }
         bottom[8] = bottom[8] + load;
         let mut middle = full(&self.joint());
         subtract_schur(&mut middle, &down, &bottom, &up);
@@ -204,7 +223,8 @@ fn subtract_schur(
 /// All nine entries of a symmetric matrix.
 #[inline(always)]
 fn full(entries: &[ComplexLanes; 6]) -> [ComplexLanes; 9] {
-    std::array::from_fn(|i| entries[AT[i / 3][i % 3]])
+    let [a, b, c, d, e, f] = *entries;
+    [a, b, c, b, d, e, c, e, f]
 }
 
 /// L D Lᵀ of a complex symmetric 3×3 matrix.
@@ -243,7 +263,11 @@ impl Factor {
     /// D⁻¹ b.
     #[inline(always)]
     fn scaled(&self, b: &[ComplexLanes; 9]) -> [ComplexLanes; 9] {
-        std::array::from_fn(|i| b[i] * self.inverse[i / 3])
+        let mut x = *b;
+        for i in 0..9 {
+            x[i] = b[i] * self.inverse[i / 3];
+        }
+        x
     }
 }
 

@@ -32,9 +32,7 @@ impl Pulse {
         }
         let periods = self.center_frequency * t;
         let from_center = periods - 1.0;
-        self.amplitude
-            * libm::sin(2.0 * PI * periods)
-            * libm::exp(-4.0 * from_center * from_center)
+        self.amplitude * libm::sin(2.0 * PI * periods) * libm::exp(-4.0 * from_center * from_center)
     }
 
     /// The Laplace transforms ∫ F(t) exp(-s t) dt at s = `damping` + i 2π n / `period` for

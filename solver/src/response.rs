@@ -1,8 +1,7 @@
 //! The sum over wavenumbers: spectrum of the pressure at every receiver.
 
 use crate::complex::Complex;
-use crate::isa::Isa;
-use crate::lanes::ComplexLanes;
+use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::medium::Medium;
 use crate::plate::Plate;
 use crate::tables::{Frequency, Tables};
@@ -27,7 +26,8 @@ impl Spectra {
     }
 
     /// Computes the spectra of one plate.
-    pub(crate) fn fill(&mut self, isa: Isa, tables: &Tables, medium: &Medium, plate: &mut Plate) {
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, tables: &Tables, medium: &Medium, plate: &mut Plate) {
         let receivers = tables.receivers();
         self.frequencies = tables.frequencies.len();
         self.values.clear();
@@ -35,7 +35,7 @@ impl Spectra {
         for (n, frequency) in tables.frequencies.iter().enumerate() {
             self.sums.clear();
             self.sums.resize(receivers, ComplexLanes::ZERO);
-            isa.sum_wavenumbers(tables, frequency, medium, plate, &mut self.sums);
+            sum_wavenumbers(tables, frequency, medium, plate, &mut self.sums);
             for (r, sum) in self.sums.iter().enumerate() {
                 self.values[r * self.frequencies + n] = Complex::new(sum.re.sum(), sum.im.sum());
             }
@@ -45,7 +45,7 @@ impl Spectra {
 
 /// Adds the wavenumbers of one frequency to the sums of every receiver, lane by lane.
 #[inline(always)]
-pub(crate) fn sum_wavenumbers(
+fn sum_wavenumbers(
     tables: &Tables,
     frequency: &Frequency,
     medium: &Medium,
@@ -53,11 +53,11 @@ pub(crate) fn sum_wavenumbers(
     sums: &mut [ComplexLanes],
 ) {
     let inertia = ComplexLanes {
-        re: crate::lanes::Lanes::splat(frequency.inertia.re),
-        im: crate::lanes::Lanes::splat(frequency.inertia.im),
+        re: Lanes::splat(frequency.inertia.re),
+        im: Lanes::splat(frequency.inertia.im),
     };
     for (b, block) in frequency.blocks.iter().enumerate() {
-        plate.prepare(medium, frequency.s, block.k.0[crate::lanes::LANES - 1]);
+        plate.prepare(medium, frequency.s, block.k.0[LANES - 1]);
         let impedance = plate.impedance(block.k, block.load);
         // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division.
         let gd = block.g * impedance;

@@ -41,9 +41,14 @@ impl Default for Series {
 
 impl Series {
     /// Computes the coefficients for one solid.
+    #[inline(always)]
     pub(crate) fn fill(&mut self, medium: &Medium) {
-        let transposed: Matrix3 =
-            std::array::from_fn(|i| std::array::from_fn(|j| medium.coupling[j][i]));
+        let mut transposed = medium.coupling;
+        for i in 0..3 {
+            for j in 0..3 {
+                transposed[i][j] = medium.coupling[j][i];
+            }
+        }
         // x[j], y[j]: the blocks of M^n/n! at σ^j.
         let mut x = [[[0.0; 3]; 3]; TERMS + 1];
         let mut y = [[[0.0; 3]; 3]; TERMS + 1];
@@ -78,6 +83,7 @@ impl Series {
     }
 
     /// Sums over σ for one frequency: `sigma` is ρ s² d² / stiffness.
+    #[inline(always)]
     pub(crate) fn at_frequency(&self, sigma: Complex, polynomials: &mut Polynomials) {
         let mut powers = [Complex::new(1.0, 0.0); TERMS];
         for j in 1..TERMS {
@@ -125,7 +131,11 @@ impl Polynomials {
     #[inline(always)]
     pub(crate) fn displacement(&self, k: Lanes) -> [ComplexLanes; 9] {
         let parts = evaluate(&self.displacement, k);
-        std::array::from_fn(|i| parts.even[i] + parts.odd[i])
+        let mut sum = parts.even;
+        for (sum, odd) in sum.iter_mut().zip(parts.odd) {
+            *sum = *sum + odd;
+        }
+        sum
     }
 
     /// Block (u, τ), entries [`SYMMETRIC`], in even and odd parts.
@@ -153,6 +163,7 @@ fn evaluate<const N: usize>(coefficients: &[[Complex; N]], k: Lanes) -> Parts<N>
     parts
 }
 
+#[inline(always)]
 fn sum_over_sigma(
     terms: &[Matrix3],
     powers: &[Complex; TERMS],

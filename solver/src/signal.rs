@@ -1,15 +1,24 @@
 //! From a spectrum to a signal: values, slopes, extrema.
+//!
+//! The pressure at one receiver is a damped trigonometric polynomial,
+//! p(t) = e^{αt}/T (c_0 + 2 Re Σ c_n e^{iω_n t}); its slope is one with coefficients
+//! (α + iω_n) c_n.
 
 use std::f64::consts::PI;
 
-use osteon_common::sampling::Sampling;
+use osteon_common::case::Setup;
+use osteon_common::sampling::{Sampling, direct_arrival, distances};
 
 use crate::complex::Complex;
+use crate::lanes::{LANES, Lanes};
 
 /// Grid points per period of the centre frequency on which extrema are bracketed.
 const POINTS_PER_CYCLE: f64 = 40.0;
 /// Most steps of the refinement of one extremum; bisection alone needs 40 to reach rounding.
 const REFINEMENTS_MAX: usize = 60;
+/// A step that moves an extremum by less than this fraction of a grid step, squared by the next
+/// one, is the last.
+const STEP_MIN: f64 = 1e-7;
 
 /// A local extremum of the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,79 +29,104 @@ pub(crate) struct Extremum {
     pub(crate) pressure: f64,
 }
 
-/// exp(2πi j/M), j = 0 … M - 1: with a grid of M steps per period every e^{iωt} is one of these.
+/// Weighted e^{iω_n t_j} on a grid of times, eight at a time.
 #[derive(Debug)]
 pub(crate) struct Grid {
     step: f64,
-    roots: Vec<Complex>,
+    blocks: usize,
+    /// 2 cos and -2 sin (1 and 0 for n = 0) of frequency n at block b: `[b * frequencies + n]`.
+    waves: Vec<[Lanes; 2]>,
+    frequencies: usize,
 }
 
 impl Grid {
-    pub(crate) fn new(sampling: &Sampling, center_frequency: f64) -> Self {
-        let steps = (POINTS_PER_CYCLE * center_frequency * sampling.period).ceil() as usize;
-        let roots = (0..steps)
-            .map(|j| Complex::new(0.0, 2.0 * PI * j as f64 / steps as f64).exp())
+    /// A grid that covers every window of the setup.
+    pub(crate) fn new(setup: &Setup, sampling: &Sampling, frequencies: usize) -> Self {
+        let step = 1.0 / (POINTS_PER_CYCLE * setup.probe.center_frequency);
+        let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
+        let blocks = (last / step) as usize / LANES + 2;
+        let waves = (0..blocks)
+            .flat_map(|b| (0..frequencies).map(move |n| (b, n)))
+            .map(|(b, n)| {
+                let wave = |lane: usize| {
+                    let t = (b * LANES + lane) as f64 * step;
+                    libm::sincos(sampling.angular_frequency(n) * t)
+                };
+                [
+                    Lanes(std::array::from_fn(|lane| weight(n) * wave(lane).1)),
+                    Lanes(std::array::from_fn(|lane| -weight(n) * wave(lane).0)),
+                ]
+            })
             .collect();
-        Self { step: sampling.period / steps as f64, roots }
+        Self { step, blocks, waves, frequencies }
+    }
+
+    /// Σ of the waves of block `b` with coefficients `c`.
+    #[inline(always)]
+    fn sum(&self, b: usize, c: &[Complex]) -> Lanes {
+        let waves = &self.waves[b * self.frequencies..(b + 1) * self.frequencies];
+        let mut sum = Lanes::ZERO;
+        for ([re, im], c) in waves.iter().zip(c) {
+            sum = im.mul_add(Lanes::splat(c.im), re.mul_add(Lanes::splat(c.re), sum));
+        }
+        sum
     }
 }
 
-/// The pressure at one receiver as a damped trigonometric polynomial
-/// p(t) = e^{αt}/T (c_0 + 2 Re Σ c_n e^{iω_n t}).
+/// The pressure at one receiver.
 pub(crate) struct Signal<'a> {
     pub(crate) sampling: &'a Sampling,
+    /// c_n.
     pub(crate) spectrum: &'a [Complex],
 }
 
 impl Signal<'_> {
     /// p(t), Pa.
+    #[inline(always)]
     pub(crate) fn at(&self, t: f64) -> f64 {
         let [sum] = self.sums::<1>(t);
         sum * libm::exp(self.sampling.damping * t) / self.sampling.period
     }
 
     /// All local extrema in `from` ≤ t < `to` (s), in order of time, into `extrema`.
-    pub(crate) fn extrema(&self, grid: &Grid, from: f64, to: f64, extrema: &mut Vec<Extremum>) {
+    ///
+    /// `slopes` is scratch memory.
+    #[inline(always)]
+    pub(crate) fn extrema(
+        &self,
+        grid: &Grid,
+        from: f64,
+        to: f64,
+        slopes: &mut Vec<Complex>,
+        extrema: &mut Vec<Extremum>,
+    ) {
         extrema.clear();
-        if from >= to {
-            return;
-        }
-        let first = (from / grid.step).floor().max(0.0) as usize;
-        let last = (to / grid.step).ceil() as usize;
-        let mut before = self.slope_on_grid(grid, first);
-        for j in first + 1..=last {
-            let slope = self.slope_on_grid(grid, j);
-            if (before < 0.0) != (slope < 0.0) {
-                let bracket = ((j - 1) as f64 * grid.step, j as f64 * grid.step);
-                let time = self.refine(bracket, (before, slope));
-                if time >= from && time < to {
-                    extrema.push(Extremum { time, pressure: self.at(time) });
-                }
-            }
-            before = slope;
-        }
-    }
-
-    /// e^{-αt} T dp/dt at grid point `j`.
-    fn slope_on_grid(&self, grid: &Grid, j: usize) -> f64 {
-        let mut sum = 0.0;
-        let mut at = 0;
-        let step = j % grid.roots.len();
+        slopes.clear();
         for (n, &c) in self.spectrum.iter().enumerate() {
-            let root = grid.roots[at];
-            let slope = self.differentiated(n, c);
-            let term = slope.re.mul_add(root.re, -(slope.im * root.im));
-            sum = self.weight(n).mul_add(term, sum);
-            at += step;
-            if at >= grid.roots.len() {
-                at -= grid.roots.len();
+            slopes.push(self.differentiated(n, c));
+        }
+        let first = (from / grid.step) as usize / LANES;
+        let last = ((to / grid.step) as usize / LANES + 1).min(grid.blocks - 1);
+        let mut before = None;
+        for b in first..=last {
+            for (lane, &slope) in grid.sum(b, slopes).0.iter().enumerate() {
+                let t = (b * LANES + lane) as f64 * grid.step;
+                if let Some((start, old)) = before
+                    && ((old < 0.0) != (slope < 0.0))
+                {
+                    let time = self.refine((start, t), (old, slope), STEP_MIN * grid.step);
+                    if time >= from && time < to {
+                        extrema.push(Extremum { time, pressure: self.at(time) });
+                    }
+                }
+                before = Some((t, slope));
             }
         }
-        sum
     }
 
     /// The zero of the slope inside `bracket`: Newton's method, kept inside by bisection.
-    fn refine(&self, bracket: (f64, f64), slopes: (f64, f64)) -> f64 {
+    #[inline(always)]
+    fn refine(&self, bracket: (f64, f64), slopes: (f64, f64), step_min: f64) -> f64 {
         let (mut low, mut high) = bracket;
         let rising = slopes.1 > slopes.0;
         let mut t = low + (high - low) * (slopes.0 / (slopes.0 - slopes.1));
@@ -103,12 +137,12 @@ impl Signal<'_> {
             } else {
                 low = t;
             }
-            // The exponential's slope is in the sums: their derivative is curvature - α slope.
+            // The factor e^{αt} has no share in the zero: the slope's own derivative is this.
             let mut next = t - slope / self.sampling.damping.mul_add(-slope, curvature);
             if !(next > low && next < high) {
                 next = 0.5 * (low + high);
             }
-            let done = (next - t).abs() <= 1e-15 * high || high - low <= 1e-16 * high;
+            let done = (next - t).abs() <= step_min;
             t = next;
             if done {
                 break;
@@ -118,6 +152,7 @@ impl Signal<'_> {
     }
 
     /// e^{-αt} T times p and its first derivatives at any t.
+    #[inline(always)]
     fn sums<const N: usize>(&self, t: f64) -> [f64; N] {
         let (sin, cos) = libm::sincos(2.0 * PI * t / self.sampling.period);
         let turn = Complex::new(cos, sin);
@@ -126,7 +161,7 @@ impl Signal<'_> {
         for (n, &c) in self.spectrum.iter().enumerate() {
             let mut term = c * phase;
             for sum in &mut sums {
-                *sum = self.weight(n).mul_add(term.re, *sum);
+                *sum = weight(n).mul_add(term.re, *sum);
                 term = self.differentiated(n, term);
             }
             phase = phase * turn;
@@ -135,12 +170,14 @@ impl Signal<'_> {
     }
 
     /// (α + iω_n) c.
+    #[inline(always)]
     fn differentiated(&self, n: usize, c: Complex) -> Complex {
-        c * Complex::new(self.sampling.damping, self.sampling.angular_frequency(n))
+        c * Complex::new(self.sampling.damping, n as f64 * self.sampling.frequency_step)
     }
+}
 
-    /// Both signs of a frequency count, zero once.
-    fn weight(&self, n: usize) -> f64 {
-        if n == 0 { 1.0 } else { 2.0 }
-    }
+/// Both signs of a frequency count, zero once.
+#[inline(always)]
+fn weight(n: usize) -> f64 {
+    if n == 0 { 1.0 } else { 2.0 }
 }

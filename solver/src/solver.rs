@@ -8,7 +8,7 @@ use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::sampling::{self, RUNGS, Sampling};
 
 use crate::complex::Complex;
-use crate::isa::Isa;
+use crate::isa::{Isa, Kernel};
 use crate::lanes::{ComplexLanes, Lanes};
 use crate::medium::Medium;
 use crate::picking::{Window, pick};
@@ -43,6 +43,7 @@ pub struct Workspace {
     pub(crate) plate: Plate,
     pub(crate) spectra: Spectra,
     windows: Vec<Window>,
+    slopes: Vec<Complex>,
 }
 
 /// A picked first arrival.
@@ -100,22 +101,10 @@ impl Solver {
         }
         self.check_direct_wave(speed)?;
         let rung = self.rung(speed)?;
-        workspace.plate.fill(&medium, self.setup.layers.bone_thickness);
-        workspace.spectra.fill(self.isa, &rung.tables, &medium, &mut workspace.plate);
-        if !workspace.spectra.is_finite() {
+        let observed =
+            self.isa.run(Observe { solver: self, rung, medium: &medium, speed, workspace });
+        if !observed {
             return Err(not_finite("the pressure"));
-        }
-        workspace.windows.resize_with(self.distances.len(), Window::default);
-        for (r, (window, &x)) in workspace.windows.iter_mut().zip(&self.distances).enumerate() {
-            let signal = Signal {
-                sampling: &rung.tables.sampling,
-                spectrum: workspace.spectra.receiver(r),
-            };
-            let from = sampling::earliest_arrival(&self.setup, x, speed);
-            let to = sampling::direct_arrival(&self.setup, x);
-            signal.extrema(&rung.grid, from, to, &mut window.extrema);
-            window.last = signal.at(to).abs();
-            window.drop_noise();
         }
         let probe = &self.setup.probe;
         pick(&self.setup.picking, probe.center_frequency, &self.distances, &workspace.windows)
@@ -163,10 +152,44 @@ impl Solver {
             if sampling.pairs() > PAIRS_MARGIN * SAMPLING_PAIRS_MAX {
                 return None;
             }
-            let grid = Grid::new(&sampling, self.setup.probe.center_frequency);
-            Some(Box::new(Rung { tables: Tables::new(&self.setup, sampling), grid }))
+            let tables = Tables::new(&self.setup, sampling);
+            let grid = Grid::new(&self.setup, &sampling, tables.frequencies.len());
+            Some(Box::new(Rung { tables, grid }))
         });
         rung.as_deref().ok_or_else(too_large)
+    }
+}
+
+/// Computes the pressure of one bone and lists its extrema at every receiver; whether every number
+/// was finite.
+struct Observe<'a> {
+    solver: &'a Solver,
+    rung: &'a Rung,
+    medium: &'a Medium,
+    /// Bound of every wave's speed, m/s.
+    speed: f64,
+    workspace: &'a mut Workspace,
+}
+
+impl Kernel for Observe<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Workspace { plate, spectra, windows, slopes } = self.workspace;
+        let (setup, tables) = (&self.solver.setup, &self.rung.tables);
+        plate.fill(self.medium, setup.layers.bone_thickness);
+        spectra.fill(tables, self.medium, plate);
+        windows.resize_with(self.solver.distances.len(), Window::default);
+        for (r, (window, &x)) in windows.iter_mut().zip(&self.solver.distances).enumerate() {
+            let signal = Signal { sampling: &tables.sampling, spectrum: spectra.receiver(r) };
+            let from = sampling::earliest_arrival(setup, x, self.speed);
+            let to = sampling::direct_arrival(setup, x);
+            signal.extrema(&self.rung.grid, from, to, slopes, &mut window.extrema);
+            window.last = signal.at(to).abs();
+            window.drop_noise();
+        }
+        spectra.is_finite()
     }
 }
 
@@ -187,6 +210,8 @@ pub fn admittance(setup: &Setup, bone: &Bone, k: f64, s: Complex) -> Complex {
 fn not_finite(what: &str) -> Failure {
     Failure {
         kind: FailureKind::NotFinite,
-        detail: format!("{what} came out as NaN or infinite; density or elasticity is out of scale"),
+        detail: format!(
+            "{what} came out as NaN or infinite; density or elasticity is out of scale"
+        ),
     }
 }

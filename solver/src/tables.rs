@@ -53,9 +53,8 @@ impl Tables {
     pub(crate) fn new(setup: &Setup, sampling: Sampling) -> Self {
         let probe = &setup.probe;
         let pulse = Pulse::new(probe.amplitude, probe.center_frequency);
-        let count = (0..sampling.frequencies())
-            .take_while(|&n| sampling.taper(n) > TAPER_MIN)
-            .count();
+        let count =
+            (0..sampling.frequencies()).take_while(|&n| sampling.taper(n) > TAPER_MIN).count();
         let spectrum = pulse.spectrum(sampling.damping, sampling.period, count);
         let frequencies: Vec<_> = spectrum
             .iter()

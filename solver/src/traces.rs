@@ -6,6 +6,7 @@ use osteon_common::sampling::Sampling;
 use thiserror::Error;
 
 use crate::direct;
+use crate::isa::Kernel;
 use crate::medium::Medium;
 use crate::pulse::Pulse;
 use crate::signal::Signal;
@@ -54,6 +55,22 @@ pub enum TraceError {
     NotFinite,
 }
 
+/// Computes the spectra of a filled plate.
+struct FillSpectra<'a> {
+    tables: &'a Tables,
+    medium: &'a Medium,
+    workspace: &'a mut Workspace,
+}
+
+impl Kernel for FillSpectra<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.workspace.spectra.fill(self.tables, self.medium, &mut self.workspace.plate);
+    }
+}
+
 impl Solver {
     /// Pressure traces of one bone from 0 to `duration` (s), every `time_step` (s).
     ///
@@ -63,14 +80,9 @@ impl Solver {
     ///
     /// # Errors
     /// When the trace would be empty or too large.
-    pub fn traces(
-        &self,
-        bone: &Bone,
-        duration: f64,
-        time_step: f64,
-    ) -> Result<Traces, TraceError> {
+    pub fn traces(&self, bone: &Bone, duration: f64, time_step: f64) -> Result<Traces, TraceError> {
         let samples = duration / time_step;
-        if !(duration > 0.0 && time_step > 0.0 && samples >= 1.0 && samples <= SAMPLES_MAX) {
+        if !(duration > 0.0 && time_step > 0.0 && (1.0..=SAMPLES_MAX).contains(&samples)) {
             return Err(TraceError::Samples { duration, time_step });
         }
         let medium = Medium::new(bone);
@@ -84,7 +96,7 @@ impl Solver {
         let tables = Tables::new(self.setup(), sampling);
         let mut workspace = Workspace::default();
         workspace.plate.fill(&medium, self.setup().layers.bone_thickness);
-        workspace.spectra.fill(self.isa(), &tables, &medium, &mut workspace.plate);
+        self.isa().run(FillSpectra { tables: &tables, medium: &medium, workspace: &mut workspace });
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
         let pressures: Vec<Vec<f64>> = (0..tables.receivers())
@@ -108,9 +120,7 @@ impl Solver {
         let (source, receivers) = (setup.probe.source, setup.probe.receivers);
         let pulse = Pulse::new(setup.probe.amplitude, setup.probe.center_frequency);
         let x = receivers.x1(r as u32) - source.x1;
-        let travel = move |height: f64| {
-            x.mul_add(x, height * height).sqrt() / coupling.sound_speed
-        };
+        let travel = move |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
         move |t| {

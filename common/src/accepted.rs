@@ -1,0 +1,199 @@
+//! What a field accepts: ranges of numbers, and how a message says them.
+
+use std::fmt;
+
+use crate::ensemble::DISPERSION_MAX;
+use crate::parameters::Parameter;
+
+/// An interval of finite numbers with its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Interval {
+    lower: Edge,
+    upper: Edge,
+    unit: &'static str,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Edge {
+    None,
+    Open(f64),
+    Closed(f64),
+}
+
+/// A range of whole numbers, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct WholeRange {
+    /// Smallest.
+    pub(crate) min: u64,
+    /// Largest.
+    pub(crate) max: u64,
+}
+
+impl Interval {
+    /// Every finite number.
+    pub(crate) const fn finite(unit: &'static str) -> Self {
+        Self { lower: Edge::None, upper: Edge::None, unit }
+    }
+
+    /// Above `lower`.
+    pub(crate) const fn above(lower: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Open(lower), upper: Edge::None, unit }
+    }
+
+    /// Above `lower` and below `upper`.
+    pub(crate) const fn between(lower: f64, upper: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Open(lower), upper: Edge::Open(upper), unit }
+    }
+
+    /// Above `lower`, at most `upper`.
+    pub(crate) const fn above_to(lower: f64, upper: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Open(lower), upper: Edge::Closed(upper), unit }
+    }
+
+    /// At least `lower`, below `upper`.
+    pub(crate) const fn from_below(lower: f64, upper: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Closed(lower), upper: Edge::Open(upper), unit }
+    }
+
+    /// At least `lower`.
+    pub(crate) const fn from(lower: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Closed(lower), upper: Edge::None, unit }
+    }
+
+    /// From `lower` to `upper`.
+    pub(crate) const fn from_to(lower: f64, upper: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Closed(lower), upper: Edge::Closed(upper), unit }
+    }
+
+    /// What a parameter of the mean model, or the dispersion, accepts by itself.
+    pub(crate) fn of(parameter: Parameter) -> Self {
+        match parameter {
+            Parameter::Density
+            | Parameter::LongitudinalYoungModulus
+            | Parameter::LongitudinalShearModulus
+            | Parameter::TransverseYoungModulus => Self::above(0.0, parameter.unit()),
+            Parameter::LongitudinalPoissonRatio => Self::finite(""),
+            Parameter::TransversePoissonRatio => Self::between(-1.0, 1.0, ""),
+            Parameter::Dispersion => Self::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
+        }
+    }
+
+    /// Whether `value` is finite and inside.
+    pub(crate) fn contains(&self, value: f64) -> bool {
+        let above = match self.lower {
+            Edge::None => true,
+            Edge::Open(lower) => value > lower,
+            Edge::Closed(lower) => value >= lower,
+        };
+        let below = match self.upper {
+            Edge::None => true,
+            Edge::Open(upper) => value < upper,
+            Edge::Closed(upper) => value <= upper,
+        };
+        value.is_finite() && above && below
+    }
+
+    /// The message that refuses `value`.
+    pub(crate) fn refusal(&self, value: f64) -> String {
+        let finite = if value.is_finite() { "" } else { "finite and " };
+        match (self.lower, self.upper) {
+            (Edge::None, Edge::None) => format!("is {value:?}; it must be {self}"),
+            _ => format!("is {value:?}; it must be {finite}{self}"),
+        }
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.lower, self.upper) {
+            (Edge::None, Edge::None) => f.write_str("a finite number")?,
+            (Edge::Closed(lower), Edge::Closed(upper)) => write!(f, "from {lower} to {upper}")?,
+            (lower, upper) => {
+                match lower {
+                    Edge::None => {}
+                    Edge::Open(lower) => write!(f, "above {lower}")?,
+                    Edge::Closed(lower) => write!(f, "at least {lower}")?,
+                }
+                if lower != Edge::None && upper != Edge::None {
+                    f.write_str(" and ")?;
+                }
+                match upper {
+                    Edge::None => {}
+                    Edge::Open(upper) => write!(f, "below {upper}")?,
+                    Edge::Closed(upper) => write!(f, "at most {upper}")?,
+                }
+            }
+        }
+        if self.unit.is_empty() { Ok(()) } else { write!(f, " ({})", self.unit) }
+    }
+}
+
+impl WholeRange {
+    /// From `min` to `max`.
+    pub(crate) const fn new(min: u64, max: u64) -> Self {
+        Self { min, max }
+    }
+
+    /// Whether `value` is inside.
+    pub(crate) fn contains(&self, value: u64) -> bool {
+        (self.min..=self.max).contains(&value)
+    }
+
+    /// The message that refuses `value`.
+    pub(crate) fn refusal(&self, value: &impl fmt::Display) -> String {
+        format!("is {value}; it must be {self}")
+    }
+}
+
+impl fmt::Display for WholeRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a whole number from {} to {}", self.min, self.max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_of_the_dispersion_is_the_square_root() {
+        assert_eq!(DISPERSION_MAX.to_bits(), (7.0_f64 / 11.0).sqrt().to_bits());
+    }
+
+    #[test]
+    fn edges_are_open_or_closed_as_they_say() {
+        let below_one = 1.0_f64.next_down();
+        for (interval, inside, outside, said) in [
+            (
+                Interval::finite("m"),
+                [-1e300, 0.0],
+                [f64::NAN, f64::INFINITY],
+                "a finite number (m)",
+            ),
+            (Interval::above(0.0, "Pa"), [5e-324, 1e300], [0.0, f64::NAN], "above 0 (Pa)"),
+            (
+                Interval::between(0.0, 1.0, ""),
+                [5e-324, below_one],
+                [0.0, 1.0],
+                "above 0 and below 1",
+            ),
+            (Interval::above_to(0.0, 1.0, ""), [0.5, 1.0], [0.0, 1.1], "above 0 and at most 1"),
+            (Interval::from_below(0.0, 1.0, ""), [0.0, 0.5], [-0.1, 1.0], "at least 0 and below 1"),
+            (Interval::from_to(0.5, 16.0, ""), [0.5, 16.0], [0.49, 16.1], "from 0.5 to 16"),
+            (Interval::from(0.0, ""), [0.0, 1.0], [-1.0, f64::INFINITY], "at least 0"),
+        ] {
+            assert!(inside.iter().all(|&value| interval.contains(value)), "{said}");
+            assert!(outside.iter().all(|&value| !interval.contains(value)), "{said}");
+            assert_eq!(interval.to_string(), said);
+        }
+    }
+
+    #[test]
+    fn every_parameter_refuses_what_is_not_finite() {
+        for parameter in Parameter::ALL {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(!Interval::of(parameter).contains(value), "{}", parameter.name());
+            }
+        }
+    }
+}

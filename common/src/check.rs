@@ -1,0 +1,48 @@
+//! The rules that a specification must keep: one set for files and for the wire.
+//!
+//! Fields are named as in a job file, e.g. `layers.coupling.density`. A field that is already
+//! known to be wrong is not looked at again, nor is a relation between fields of which one is.
+
+mod job;
+mod setup;
+
+use crate::accepted::{Interval, WholeRange};
+use crate::job::JobSpecification;
+use crate::violations::Violations;
+
+pub(crate) use self::job::{
+    DATA_FORMS, EVALUATIONS, REALIZATIONS, SEED, VELOCITIES_MIN, VELOCITY, no_data,
+};
+pub use self::job::{data, job};
+pub(crate) use self::setup::RECEIVERS;
+pub use self::setup::setup;
+
+impl JobSpecification {
+    /// Everything that is wrong with the specification, each field named as in a job file.
+    pub fn check(&self) -> Violations {
+        let mut violations = Violations::new();
+        job(self, &mut violations);
+        violations
+    }
+}
+
+/// Records a number outside `accepted`, unless `field` is known to be wrong.
+pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
+    if !known_wrong(field, violations) && !accepted.contains(value) {
+        violations.add(field, accepted.refusal(value));
+    }
+}
+
+/// Records a whole number outside `accepted`, unless `field` is known to be wrong.
+pub(crate) fn whole(field: &str, value: u64, accepted: WholeRange, violations: &mut Violations) {
+    if !known_wrong(field, violations) && !accepted.contains(value) {
+        violations.add(field, accepted.refusal(&value));
+    }
+}
+
+/// Whether `field`, something inside it, or a table around it is known to be wrong.
+fn known_wrong(field: &str, violations: &Violations) -> bool {
+    let around =
+        |table: &str| field.strip_prefix(table).is_some_and(|rest| rest.starts_with(['.', '[']));
+    violations.touches(field) || violations.iter().any(|violation| around(&violation.field))
+}

@@ -1,0 +1,210 @@
+//! Rules on data, parameters, the Monte Carlo loop and the search.
+
+use crate::accepted::{Interval, WholeRange};
+use crate::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Search};
+use crate::limits;
+use crate::parameters::Parameter;
+use crate::statistics;
+use crate::violations::Violations;
+
+use super::{known_wrong, number, setup, whole};
+
+/// Range of `monte_carlo.realizations`.
+pub(crate) const REALIZATIONS: WholeRange = WholeRange::new(1, limits::REALIZATIONS_MAX);
+/// Range of `monte_carlo.seed`.
+pub(crate) const SEED: WholeRange = WholeRange::new(0, limits::SEED_MAX);
+/// Range of `search.max_evaluations`.
+pub(crate) const EVALUATIONS: WholeRange = WholeRange::new(1, limits::EVALUATIONS_MAX);
+/// What a measured velocity accepts.
+pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");
+/// What the data's coefficient of variation accepts.
+const VARIATION: Interval = Interval::above(0.0, "");
+const MOMENTS_NEED: &str = "a coefficient of variation above 0 needs";
+/// Fewest velocities that have a coefficient of variation.
+pub(crate) const VELOCITIES_MIN: usize = 2;
+/// How `[data]` may be given.
+pub(crate) const DATA_FORMS: &str = "give either velocities, or mean and coefficient_of_variation";
+
+/// Most velocities that are refused one by one.
+const REFUSED_MAX: usize = 10;
+
+/// Records everything that is wrong with `specification`.
+///
+/// What `violations` already holds about a field is not said again, so that a front end can
+/// first record what it could not read at all.
+pub fn job(specification: &JobSpecification, violations: &mut Violations) {
+    setup(&specification.setup, violations);
+    match (specification.kind, &specification.data) {
+        (JobKind::Identification, Some(given)) => data(given, violations),
+        (JobKind::Identification, None) if !violations.touches("data") => {
+            violations.add("data", no_data());
+        }
+        (JobKind::Propagation, Some(_)) if !violations.touches("data") => {
+            violations.add("data", "a propagation has no data; leave it out");
+        }
+        _ => {}
+    }
+    for parameter in Parameter::ALL {
+        range(parameter, specification.range(parameter), violations);
+    }
+    admissible_start(specification, violations);
+    something_to_search(specification, violations);
+    monte_carlo(&specification.monte_carlo, violations);
+    search(&specification.search, violations);
+}
+
+/// The message for an identification without data.
+pub(crate) fn no_data() -> String {
+    format!("is missing; an identification needs it: {DATA_FORMS}")
+}
+
+/// Records everything that is wrong with measured `data`.
+pub fn data(data: &Data, violations: &mut Violations) {
+    match data {
+        Data::Velocities(measured) if !known_wrong("data.velocities", violations) => {
+            velocities(measured, violations);
+        }
+        Data::Velocities(_) => {}
+        Data::Moments { mean, coefficient_of_variation } => {
+            number("data.mean", *mean, VELOCITY, violations);
+            number(
+                "data.coefficient_of_variation",
+                *coefficient_of_variation,
+                VARIATION,
+                violations,
+            );
+        }
+    }
+}
+
+fn velocities(measured: &[f64], violations: &mut Violations) {
+    let count = measured.len();
+    if count > limits::DATA_VELOCITIES_MAX {
+        let max = limits::DATA_VELOCITIES_MAX;
+        violations.add("data.velocities", format!("has {count} velocities; at most {max}"));
+        return;
+    }
+    let refused =
+        measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
+    for (refusals, (index, &velocity)) in refused.enumerate() {
+        if refusals == REFUSED_MAX {
+            violations.add("data.velocities", "has more velocities to refuse, not listed here");
+            return;
+        }
+        violations.add(format!("data.velocities[{index}]"), VELOCITY.refusal(velocity));
+    }
+    if violations.touches("data.velocities") {
+        return;
+    }
+    if count < VELOCITIES_MIN {
+        violations.add(
+            "data.velocities",
+            format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"),
+        );
+    } else if measured.iter().all(|velocity| velocity == &measured[0]) {
+        let velocity = measured[0];
+        violations.add(
+            "data.velocities",
+            format!("all {count} are {velocity:?} m/s; {MOMENTS_NEED} different velocities"),
+        );
+    } else if let Some(moments) = statistics::moments(measured) {
+        // Extreme numbers overflow or vanish when they are squared.
+        let variation = moments.coefficient_of_variation;
+        if !VARIATION.contains(variation) {
+            let message =
+                format!("their coefficient of variation {}", VARIATION.refusal(variation));
+            violations.add("data.velocities", message);
+        }
+    }
+}
+
+fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
+    let path = format!("parameters.{}", parameter.name());
+    let accepted = Interval::of(parameter);
+    match range {
+        Range::Fixed(value) => number(&format!("{path}.fixed"), value, accepted, violations),
+        Range::Free { start, lower, upper } => {
+            let (start_path, bounds_path) = (format!("{path}.start"), format!("{path}.bounds"));
+            number(&start_path, start, accepted, violations);
+            bounds(&bounds_path, lower, upper, accepted, violations);
+            if !known_wrong(&bounds_path, violations) {
+                let within = Interval::from_to(lower, upper, "the bounds");
+                number(&start_path, start, within, violations);
+            }
+        }
+    }
+}
+
+fn bounds(path: &str, lower: f64, upper: f64, accepted: Interval, violations: &mut Violations) {
+    if known_wrong(path, violations) {
+        return;
+    }
+    for (name, value) in [("lower", lower), ("upper", upper)] {
+        if !accepted.contains(value) {
+            violations.add(path, format!("the {name} bound {}", accepted.refusal(value)));
+        }
+    }
+    if !violations.touches(path) && lower >= upper {
+        let message = format!("the lower bound {lower:?} must be below the upper {upper:?}");
+        violations.add(path, message);
+    }
+}
+
+/// The mean model of the first point is admissible, when each of its constants is by itself.
+fn admissible_start(specification: &JobSpecification, violations: &mut Violations) {
+    let wrong = |&parameter: &Parameter| {
+        let key = match specification.range(parameter) {
+            Range::Fixed(_) => "fixed",
+            Range::Free { .. } => "start",
+        };
+        known_wrong(&format!("parameters.{}.{key}", parameter.name()), violations)
+    };
+    let independent = [Parameter::Density, Parameter::Dispersion];
+    let mut constants = Parameter::ALL.iter().filter(|name| !independent.contains(name));
+    if constants.any(wrong) {
+        return;
+    }
+    if let Err(inadmissible) = specification.start().constants().elasticity() {
+        violations.add(
+            "parameters",
+            format!("the point of starts and fixed values is not admissible: {inadmissible}"),
+        );
+    }
+}
+
+fn something_to_search(specification: &JobSpecification, violations: &mut Violations) {
+    let fixed = |range: &Range| matches!(range, Range::Fixed(_));
+    if specification.kind == JobKind::Identification
+        && specification.parameters.iter().all(fixed)
+        && !violations.touches("parameters")
+    {
+        violations.add(
+            "parameters",
+            "all seven are fixed; an identification searches at least one: give it start and bounds \
+             (a run at fixed parameters is a propagation)",
+        );
+    }
+}
+
+fn monte_carlo(monte_carlo: &MonteCarlo, violations: &mut Violations) {
+    whole("monte_carlo.realizations", monte_carlo.realizations, REALIZATIONS, violations);
+    whole("monte_carlo.seed", monte_carlo.seed, SEED, violations);
+    number(
+        "monte_carlo.max_failed_fraction",
+        monte_carlo.max_failed_fraction,
+        Interval::from_to(0.0, 1.0, ""),
+        violations,
+    );
+}
+
+fn search(search: &Search, violations: &mut Violations) {
+    whole("search.max_evaluations", search.max_evaluations, EVALUATIONS, violations);
+    // A step of at most half the box fits in from any start, up or down.
+    for (key, value, accepted) in [
+        ("cost_tolerance", search.cost_tolerance, Interval::from(0.0, "")),
+        ("size_tolerance", search.size_tolerance, Interval::from_below(0.0, 1.0, "of the box")),
+        ("initial_step", search.initial_step, Interval::above_to(0.0, 0.5, "of the box")),
+    ] {
+        number(&format!("search.{key}"), value, accepted, violations);
+    }
+}

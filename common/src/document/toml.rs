@@ -1,0 +1,82 @@
+//! TOML text to a tree, with the line of every key and element.
+
+use toml::Spanned;
+use toml::de::{DeInteger, DeTable, DeValue};
+
+use super::{Format, Malformed, Node, Value, position};
+
+/// The tree of a TOML text.
+pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
+    let table = DeTable::parse(text).map_err(|error| malformed(text, &error))?;
+    let lines = Lines::new(text);
+    Ok(Node { line: None, value: lines.table(table.get_ref()) })
+}
+
+fn malformed(text: &str, error: &toml::de::Error) -> Malformed {
+    let (line, column) = position(text, error.span().map_or(0, |span| span.start));
+    Malformed {
+        format: Format::Toml,
+        line,
+        column,
+        message: error.message().trim_end().replace('\n', "; "),
+    }
+}
+
+/// Byte offsets at which the lines of a text begin.
+struct Lines(Vec<usize>);
+
+impl Lines {
+    fn new(text: &str) -> Self {
+        let after_newline =
+            text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
+        Self(std::iter::once(0).chain(after_newline).collect())
+    }
+
+    fn at(&self, offset: usize) -> usize {
+        self.0.partition_point(|&start| start <= offset)
+    }
+
+    fn table(&self, table: &DeTable<'_>) -> Value {
+        let mut entries: Vec<_> = table.iter().collect();
+        // The parser sorts by name; a reader wants the order of the file.
+        entries.sort_by_key(|(key, _)| key.span().start);
+        Value::Table(
+            entries
+                .into_iter()
+                .map(|(key, value)| {
+                    let line = Some(self.at(key.span().start));
+                    (key.get_ref().to_string(), Node { line, value: self.value(value.get_ref()) })
+                })
+                .collect(),
+        )
+    }
+
+    fn value(&self, value: &DeValue<'_>) -> Value {
+        match value {
+            DeValue::String(text) => Value::Text(text.to_string()),
+            DeValue::Integer(digits) => integer(digits),
+            DeValue::Float(digits) => Value::Number(digits.as_str().parse().unwrap_or(f64::NAN)),
+            DeValue::Boolean(value) => Value::Boolean(*value),
+            DeValue::Datetime(_) => Value::Date,
+            DeValue::Array(elements) => {
+                Value::List(elements.iter().map(|element| self.element(element)).collect())
+            }
+            DeValue::Table(table) => self.table(table),
+        }
+    }
+
+    fn element(&self, element: &Spanned<DeValue<'_>>) -> Node {
+        Node { line: Some(self.at(element.span().start)), value: self.value(element.get_ref()) }
+    }
+}
+
+/// An integer of any size: one beyond 128 bits can only be meant as a number.
+fn integer(digits: &DeInteger<'_>) -> Value {
+    match i128::from_str_radix(digits.as_str(), digits.radix()) {
+        Ok(value) => Value::Integer(value),
+        Err(_) if digits.radix() == 10 => {
+            Value::Number(digits.as_str().parse().unwrap_or(f64::NAN))
+        }
+        Err(_) => Value::Number(f64::INFINITY),
+    }
+}

@@ -1,0 +1,139 @@
+//! Reading a file within bounds, and what can be wrong with it.
+
+use std::fmt;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::document::{Format, Malformed, Node};
+use crate::limits;
+use crate::violations::Violation;
+
+/// Why a job or case file gives nothing.
+///
+/// A message is complete: it contains that of its cause.
+#[derive(Debug, Error)]
+pub enum FileError {
+    /// The operating system does not give its bytes.
+    #[error("cannot read {}: {error}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// The name does not say what it is.
+    #[error("{}: the name of a job or case file must end in .toml or .json", .path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Longer than [`limits::FILE_BYTES_MAX`].
+    #[error("{} is longer than {max_bytes} bytes", .path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Most bytes that are read.
+        max_bytes: u64,
+    },
+    /// Its text is refused.
+    #[error("{}{}{content}", .path.display(), if matches!(content, ContentError::Malformed(_)) { ", " } else { ": " })]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        content: ContentError,
+    },
+}
+
+/// Why a text is no job or case.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ContentError {
+    /// It is no TOML or JSON.
+    #[error(transparent)]
+    Malformed(#[from] Malformed),
+    /// It breaks rules.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+}
+
+/// Everything that is wrong with a text that is well-formed, in the order of its lines.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub struct Invalid {
+    found: Vec<(Option<usize>, Violation)>,
+}
+
+impl Invalid {
+    /// The violations, each with the line of the field, or of the table where it should be;
+    /// without line where the format tells none, or no such table exists.
+    pub fn iter(&self) -> impl Iterator<Item = (Option<usize>, &Violation)> {
+        self.found.iter().map(|(line, violation)| (*line, violation))
+    }
+
+    /// `violations` with the lines of `root`.
+    pub(crate) fn locate<'v>(violations: impl Iterator<Item = &'v Violation>, root: &Node) -> Self {
+        let locate = |violation: &Violation| (root.line_of(&violation.field), violation.clone());
+        let mut found: Vec<_> = violations.map(locate).collect();
+        // Stable: those of one line stay in the order they were found. Those without come last.
+        found.sort_by_key(|(line, _)| line.unwrap_or(usize::MAX));
+        Self { found }
+    }
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.found.len() {
+            1 => f.write_str("one thing is wrong")?,
+            count => write!(f, "{count} things are wrong")?,
+        }
+        for (line, violation) in &self.found {
+            match line {
+                Some(line) => write!(f, "\n  line {line}: {violation}")?,
+                None => write!(f, "\n  {violation}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The text of the file at `path` and its format.
+pub(crate) fn read(path: &Path) -> Result<(String, Format), FileError> {
+    let Some(format) = Format::of(path) else {
+        return Err(FileError::UnknownFormat { path: path.to_owned() });
+    };
+    match read_bytes(path) {
+        Ok(Some(bytes)) => match String::from_utf8(bytes) {
+            Ok(text) => Ok((text, format)),
+            Err(error) => Err(FileError::Content {
+                path: path.to_owned(),
+                content: ContentError::Malformed(not_utf8(error, format)),
+            }),
+        },
+        Ok(None) => {
+            Err(FileError::TooLarge { path: path.to_owned(), max_bytes: limits::FILE_BYTES_MAX })
+        }
+        Err(error) => Err(FileError::Unreadable { path: path.to_owned(), error }),
+    }
+}
+
+/// The bytes of a file; `None` if there are more than [`limits::FILE_BYTES_MAX`].
+pub(crate) fn read_bytes(path: &Path) -> std::io::Result<Option<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(limits::FILE_BYTES_MAX + 1).read_to_end(&mut bytes)?;
+    let fits = u64::try_from(bytes.len()).is_ok_and(|count| count <= limits::FILE_BYTES_MAX);
+    Ok(fits.then_some(bytes))
+}
+
+fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> Malformed {
+    let valid = error.utf8_error().valid_up_to();
+    let before = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
+    let (line, column) = crate::document::position(&before, valid);
+    let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
+    Malformed { format, line, column, message: format!("the byte 0x{byte:02x} is no UTF-8") }
+}
+
+/// What an optional byte order mark leaves of a text.
+pub(crate) fn without_byte_order_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}

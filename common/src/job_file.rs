@@ -1,0 +1,140 @@
+//! Job files: the specification of a job, in TOML or JSON.
+
+mod data_section;
+mod run_sections;
+
+use std::path::Path;
+use std::slice;
+
+use crate::check;
+use crate::document::{self, Format};
+use crate::file_error::{self, ContentError, FileError};
+use crate::job::{JobKind, JobSpecification, Range};
+use crate::parameters::Parameter;
+use crate::reader::{Reader, Table};
+use crate::setup_section;
+
+pub use crate::toml_text::job as to_toml;
+
+/// Reads and validates the job file at `path`; its extension tells the format. The file of
+/// measured velocities that it names is read too, relative to the job file, and inlined.
+///
+/// For a propagation, `[data]` may be left out and is not kept; no file of velocities is read.
+///
+/// # Errors
+/// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
+pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
+    let (text, format) = file_error::read(path)?;
+    let directory = path.parent().unwrap_or(Path::new(""));
+    parse(&text, format, directory, kind)
+        .map_err(|content| FileError::Content { path: path.to_owned(), content })
+}
+
+/// Reads and validates the text of a job file that lies in `directory`; as [`read`].
+///
+/// # Errors
+/// When the text is malformed or breaks a rule; then all violations at once.
+pub fn parse(
+    text: &str,
+    format: Format,
+    directory: &Path,
+    kind: JobKind,
+) -> Result<JobSpecification, ContentError> {
+    let root = document::parse(file_error::without_byte_order_mark(text), format)?;
+    let mut reader = Reader::default();
+    let keys = [
+        "layers",
+        "probe",
+        "picking",
+        "solver",
+        "data",
+        "parameters",
+        "monte_carlo",
+        "objective",
+        "search",
+    ];
+    let table = reader.root(&root, &keys);
+    if !table.is_table() {
+        return Err(reader.refuse(&root).into());
+    }
+    let specification = JobSpecification {
+        kind,
+        setup: setup_section::read(&mut reader, &table),
+        data: data_section::read(&mut reader, &table, directory, kind),
+        parameters: parameters(&mut reader, &table),
+        monte_carlo: run_sections::monte_carlo(&mut reader, &table),
+        objective: run_sections::objective(&mut reader, &table),
+        search: run_sections::search(&mut reader, &table),
+    };
+    check::job(&specification, &mut reader.violations);
+    if reader.violations.is_empty() { Ok(specification) } else { Err(reader.refuse(&root).into()) }
+}
+
+/// The seven ranges; where one is missing or wrong, that is recorded and it has no meaning.
+fn parameters(reader: &mut Reader, root: &Table<'_>) -> [Range; 7] {
+    let table = reader.table(root, "parameters", &Parameter::ALL.map(Parameter::name));
+    if !table.is_table() {
+        if !root.has("parameters") {
+            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            let message = format!("is missing; it must have the seven tables {names}");
+            reader.lacks("parameters", &["parameters".to_owned()], message);
+        }
+        return [UNKNOWN; 7];
+    }
+    Parameter::ALL.map(|parameter| range(reader, &table, parameter))
+}
+
+/// Stands for a range that could not be read; a violation always goes with it.
+const UNKNOWN: Range = Range::Fixed(f64::NAN);
+
+/// A range; numbers that could not be read are NaN, and recorded.
+fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter) -> Range {
+    let key = parameter.name();
+    let table = reader.table(parameters, key, &["start", "bounds", "fixed"]);
+    let path = parameters.path(key);
+    if !table.is_table() {
+        if !parameters.has(key) {
+            reader.lacks(&path, slice::from_ref(&path), format!("is missing; {RANGE_FORMS}"));
+        }
+        return UNKNOWN;
+    }
+    match (table.has("fixed"), table.has("start") || table.has("bounds")) {
+        (true, false) => Range::Fixed(reader.number(&table, "fixed").unwrap_or(f64::NAN)),
+        (false, true) => {
+            if !table.has("start") {
+                reader.missing(&table, "start", format_args!("within the bounds; {RANGE_FORMS}"));
+            }
+            if !table.has("bounds") {
+                reader.missing(&table, "bounds", format_args!("[lower, upper]; {RANGE_FORMS}"));
+            }
+            let start = reader.number(&table, "start").unwrap_or(f64::NAN);
+            let [lower, upper] = bounds(reader, &table).unwrap_or([f64::NAN; 2]);
+            Range::Free { start, lower, upper }
+        }
+        (true, true) => {
+            let message = format!("has fixed together with start or bounds; {RANGE_FORMS}");
+            reader.violations.add(path, message);
+            UNKNOWN
+        }
+        (false, false) => {
+            let cures = ["fixed", "start", "bounds"].map(|key| table.path(key));
+            reader.lacks(&path, &cures, format!("has no value; {RANGE_FORMS}"));
+            UNKNOWN
+        }
+    }
+}
+
+const RANGE_FORMS: &str = "give either fixed, or start and bounds";
+
+fn bounds(reader: &mut Reader, table: &Table<'_>) -> Option<[f64; 2]> {
+    let expected = "[lower, upper]";
+    let elements = reader.list(table, "bounds", expected)?;
+    let path = table.path("bounds");
+    let numbers = reader.numbers(&path, elements)?;
+    let bounds = <[f64; 2]>::try_from(numbers).ok();
+    if bounds.is_none() {
+        let count = elements.len();
+        reader.violations.add(path, format!("is a list of {count}; it must be {expected}"));
+    }
+    bounds
+}

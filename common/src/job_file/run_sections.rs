@@ -1,0 +1,54 @@
+//! `[monte_carlo]`, `[objective]` and `[search]`.
+
+use crate::check::{EVALUATIONS, REALIZATIONS, SEED};
+use crate::job::{MonteCarlo, Objective, Sampling, Search, SearchMethod};
+use crate::reader::{Choice, Reader, Table};
+
+/// The Monte Carlo loop, with defaults where `root` is silent or wrong.
+pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
+    let default = MonteCarlo::default();
+    let keys = ["realizations", "seed", "sampling", "scrambles", "max_failed_fraction"];
+    let table = reader.table(root, "monte_carlo", &keys);
+    if table.has("scrambles") {
+        reader.violations.add(
+            table.path("scrambles"),
+            "belongs to the sampling \"sobol\", which this version does not offer; leave it out",
+        );
+    }
+    let sampling = Choice { all: &Sampling::ALL, name: Sampling::name, reserved: &["sobol"] };
+    MonteCarlo {
+        realizations: reader
+            .whole(&table, "realizations", REALIZATIONS)
+            .unwrap_or(default.realizations),
+        seed: reader.whole(&table, "seed", SEED).unwrap_or(default.seed),
+        sampling: reader.choice(&table, "sampling", &sampling).unwrap_or(default.sampling),
+        max_failed_fraction: reader
+            .number(&table, "max_failed_fraction")
+            .unwrap_or(default.max_failed_fraction),
+    }
+}
+
+/// The objective, with its default where `root` is silent or wrong.
+pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
+    let table = reader.table(root, "objective", &["kind"]);
+    let kind = Choice { all: &Objective::ALL, name: Objective::name, reserved: &["likelihood"] };
+    reader.choice(&table, "kind", &kind).unwrap_or_default()
+}
+
+/// The search loop, with defaults where `root` is silent or wrong.
+pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
+    let default = Search::default();
+    let keys = ["method", "max_evaluations", "cost_tolerance", "size_tolerance", "initial_step"];
+    let table = reader.table(root, "search", &keys);
+    let method =
+        Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &["newton"] };
+    Search {
+        method: reader.choice(&table, "method", &method).unwrap_or(default.method),
+        max_evaluations: reader
+            .whole(&table, "max_evaluations", EVALUATIONS)
+            .unwrap_or(default.max_evaluations),
+        cost_tolerance: reader.number(&table, "cost_tolerance").unwrap_or(default.cost_tolerance),
+        size_tolerance: reader.number(&table, "size_tolerance").unwrap_or(default.size_tolerance),
+        initial_step: reader.number(&table, "initial_step").unwrap_or(default.initial_step),
+    }
+}

@@ -1,0 +1,255 @@
+//! Walks the tree of a file: names what is unknown, missing or of the wrong type.
+//!
+//! Ranges of numbers are not its business, they are [`crate::check`]'s, which also serves
+//! specifications that never were a file.
+
+use std::fmt;
+use std::slice;
+
+use crate::accepted::WholeRange;
+use crate::document::{Node, Value, element_path, entry_path, quoted};
+use crate::file_error::Invalid;
+use crate::violations::{Violation, Violations};
+
+/// Most violations reported of one list, and most unknown keys of one table.
+const REPORTED_MAX: usize = 10;
+
+/// Collects what is wrong with a file while it is read.
+#[derive(Debug, Default)]
+pub(crate) struct Reader {
+    /// What is wrong so far.
+    pub(crate) violations: Violations,
+    /// Paths that an unknown key was taken for.
+    suggested: Vec<String>,
+    /// Violations that only repeat that a key is misspelt.
+    repeated: Vec<Violation>,
+}
+
+/// A table of a file; one that is absent is empty.
+#[derive(Debug, Clone)]
+pub(crate) struct Table<'a> {
+    path: String,
+    entries: &'a [(String, Node)],
+    is_table: bool,
+}
+
+/// A closed set of names that a key may take.
+#[derive(Debug)]
+pub(crate) struct Choice<'c, T> {
+    /// What there is.
+    pub(crate) all: &'c [T],
+    /// Its name in a file.
+    pub(crate) name: fn(T) -> &'static str,
+    /// Names that the file format defines, and this version does not offer.
+    pub(crate) reserved: &'c [&'static str],
+}
+
+impl<'a> Table<'a> {
+    /// Path of an entry.
+    pub(crate) fn path(&self, key: &str) -> String {
+        entry_path(&self.path, key)
+    }
+
+    /// Whether it is there, and a table.
+    pub(crate) fn is_table(&self) -> bool {
+        self.is_table
+    }
+
+    /// The entry with this key.
+    pub(crate) fn get(&self, key: &str) -> Option<&'a Node> {
+        self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+    }
+
+    /// Whether there is an entry with this key.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.get(key).is_some()
+    }
+}
+
+impl Reader {
+    /// The outermost table, which may have `keys` and no others.
+    pub(crate) fn root<'a>(&mut self, root: &'a Node, keys: &[&'static str]) -> Table<'a> {
+        self.open(root, String::new(), keys)
+    }
+
+    /// The table `key` of `parent`, which may have `keys` and no others.
+    pub(crate) fn table<'a>(
+        &mut self,
+        parent: &Table<'a>,
+        key: &str,
+        keys: &[&'static str],
+    ) -> Table<'a> {
+        let path = parent.path(key);
+        match parent.get(key) {
+            Some(node) => self.open(node, path, keys),
+            None => Table { path, entries: &[], is_table: false },
+        }
+    }
+
+    fn open<'a>(&mut self, node: &'a Node, path: String, keys: &[&'static str]) -> Table<'a> {
+        let Value::Table(entries) = &node.value else {
+            let keys = keys.join(", ");
+            self.violations
+                .add(&path, format!("is {}; it must be a table (its keys: {keys})", node.value));
+            return Table { path, entries: &[], is_table: false };
+        };
+        let unknown =
+            entries.iter().map(|(key, _)| key).filter(|key| !keys.contains(&key.as_str()));
+        for (count, key) in unknown.enumerate() {
+            if count == REPORTED_MAX {
+                self.violations.add(&path, "has more unknown keys, not listed here");
+                break;
+            }
+            let nearest = nearest_key(key, keys);
+            let message = match nearest {
+                Some(name) => format!("unknown key; did you mean `{name}`?"),
+                None => format!("unknown key; known here: {}", keys.join(", ")),
+            };
+            self.violations.add(entry_path(&path, key), message);
+            self.suggested.extend(nearest.map(|name| entry_path(&path, name)));
+        }
+        Table { path, entries, is_table: true }
+    }
+
+    /// Records that `field` lacks something, which each of `cures` (paths) would supply.
+    ///
+    /// A user who has misspelt one of them reads only of that.
+    pub(crate) fn lacks(&mut self, field: &str, cures: &[String], message: impl Into<String>) {
+        let violation = Violation { field: field.to_owned(), message: message.into() };
+        self.violations.add(&violation.field, &violation.message);
+        if cures.iter().any(|cure| self.suggested.contains(cure)) {
+            self.repeated.push(violation);
+        }
+    }
+
+    /// Records that `key` of `table` is absent, though it is needed.
+    pub(crate) fn missing(&mut self, table: &Table<'_>, key: &str, expected: impl fmt::Display) {
+        let path = table.path(key);
+        self.lacks(&path, slice::from_ref(&path), format!("is missing; it must be {expected}"));
+    }
+
+    /// Everything that is wrong, each mistake once, with its line in `root`.
+    pub(crate) fn refuse(&self, root: &Node) -> Invalid {
+        let once = |violation: &&Violation| !self.repeated.contains(violation);
+        Invalid::locate(self.violations.iter().filter(once), root)
+    }
+
+    /// The number `key`; an integer will do.
+    pub(crate) fn number(&mut self, table: &Table<'_>, key: &str) -> Option<f64> {
+        let node = table.get(key)?;
+        let number = as_number(&node.value);
+        if number.is_none() {
+            self.wrong_type(table.path(key), "a number", &node.value);
+        }
+        number
+    }
+
+    /// The whole number `key` within `accepted`.
+    pub(crate) fn whole(
+        &mut self,
+        table: &Table<'_>,
+        key: &str,
+        accepted: WholeRange,
+    ) -> Option<u64> {
+        let node = table.get(key)?;
+        let Value::Integer(value) = node.value else {
+            self.wrong_type(table.path(key), &accepted.to_string(), &node.value);
+            return None;
+        };
+        let whole = u64::try_from(value).ok().filter(|&whole| accepted.contains(whole));
+        if whole.is_none() {
+            self.violations.add(table.path(key), accepted.refusal(&value));
+        }
+        whole
+    }
+
+    /// The choice that the string `key` names.
+    pub(crate) fn choice<T: Copy>(
+        &mut self,
+        table: &Table<'_>,
+        key: &str,
+        choice: &Choice<'_, T>,
+    ) -> Option<T> {
+        let names: Vec<_> =
+            choice.all.iter().map(|&item| format!("\"{}\"", (choice.name)(item))).collect();
+        let names = names.join(" or ");
+        let node = table.get(key)?;
+        let Value::Text(text) = &node.value else {
+            self.wrong_type(table.path(key), &names, &node.value);
+            return None;
+        };
+        let chosen = choice.all.iter().copied().find(|&item| (choice.name)(item) == text);
+        if chosen.is_none() {
+            let reserved = choice.reserved.contains(&text.as_str());
+            let why = if reserved { ", which this version does not offer" } else { "" };
+            let message = format!("is {}{why}; it must be {names}", quoted(text));
+            self.violations.add(table.path(key), message);
+        }
+        chosen
+    }
+
+    /// The elements of the list `key`.
+    pub(crate) fn list<'a>(
+        &mut self,
+        table: &Table<'a>,
+        key: &str,
+        expected: &str,
+    ) -> Option<&'a [Node]> {
+        let node = table.get(key)?;
+        if let Value::List(elements) = &node.value {
+            return Some(elements);
+        }
+        self.wrong_type(table.path(key), expected, &node.value);
+        None
+    }
+
+    /// The numbers among `elements` of the list at `path`; `None` if one is no number.
+    pub(crate) fn numbers(&mut self, path: &str, elements: &[Node]) -> Option<Vec<f64>> {
+        let numbers: Vec<f64> =
+            elements.iter().filter_map(|element| as_number(&element.value)).collect();
+        if numbers.len() == elements.len() {
+            return Some(numbers);
+        }
+        let wrong =
+            elements.iter().enumerate().filter(|(_, node)| as_number(&node.value).is_none());
+        for (count, (index, node)) in wrong.enumerate() {
+            if count == REPORTED_MAX {
+                self.violations.add(path, "has more elements that are no numbers, not listed here");
+                break;
+            }
+            self.wrong_type(element_path(path, index), "a number", &node.value);
+        }
+        None
+    }
+
+    /// Records that a value has the wrong type.
+    pub(crate) fn wrong_type(&mut self, path: String, expected: &str, found: &Value) {
+        self.violations.add(path, format!("is {found}; it must be {expected}"));
+    }
+}
+
+fn as_number(value: &Value) -> Option<f64> {
+    match *value {
+        Value::Number(number) => Some(number),
+        // Correctly rounded, as the same digits with a decimal point would be.
+        #[expect(clippy::cast_precision_loss, reason = "rounding is what is wanted")]
+        Value::Integer(integer) => Some(integer as f64),
+        _ => None,
+    }
+}
+
+/// How alike two keys must be for one to be taken for the other misspelt (Jaro-Winkler).
+const LIKENESS_MIN: f64 = 0.7;
+/// Longer keys are nobody's misspelling.
+const MISSPELT_BYTES_MAX: usize = 64;
+
+/// The known key that `key` is most likely meant to be.
+fn nearest_key(key: &str, known: &[&'static str]) -> Option<&'static str> {
+    if key.len() > MISSPELT_BYTES_MAX {
+        return None;
+    }
+    let lower = key.to_lowercase();
+    let likeness = known.iter().map(|&name| (strsim::jaro_winkler(&lower, name), name));
+    let nearest = likeness.max_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.filter(|&(likeness, _)| likeness >= LIKENESS_MIN).map(|(_, name)| name)
+}

@@ -1,0 +1,131 @@
+//! Results as JSON: the object of `result.json` and of `--json`.
+//!
+//! Keys stand in a fixed order; a number that is not finite, or that there is none of, is null;
+//! every other one is the shortest decimal that reads back to the same bits.
+
+use serde_json::{Map, Value, json};
+use thiserror::Error;
+
+use crate::outcome::FailureCounts;
+use crate::parameters::{Parameter, Point};
+use crate::results::{Estimate, JobResult, Moments};
+
+/// Why a text is no `result.json` with a best point.
+#[derive(Debug, Error)]
+pub enum ResultError {
+    /// It is no JSON.
+    #[error("not valid JSON: {0}")]
+    Malformed(serde_json::Error),
+    /// A number of the point is not there: another kind of file, or the job found no point.
+    #[error(
+        "`{key}` is {found}; it must be a number (the result of an identification that found a point)"
+    )]
+    NoNumber {
+        /// The key.
+        key: String,
+        /// What is there instead.
+        found: &'static str,
+    },
+}
+
+/// The object of an identification, with a final newline.
+pub fn identification(result: &JobResult) -> String {
+    let best = result.best.as_ref();
+    let point = best.map(|best| best.point);
+    let of_point = |parameter| json!(point.map(|point| point.get(parameter)));
+    let mut object = Map::new();
+    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    put("status", json!(result.status.name()));
+    if let Some(reason) = &result.reason {
+        put("reason", json!(reason));
+    }
+    put("digest", json!(result.digest));
+    put("cost", json!(best.and_then(|best| best.cost)));
+    let mean_model = Parameter::ALL.into_iter().filter(|&name| name != Parameter::Dispersion);
+    let parameters = mean_model.map(|name| (name.name().to_owned(), of_point(name)));
+    put("parameters", Value::Object(parameters.collect()));
+    put("dispersion", of_point(Parameter::Dispersion));
+    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("data", moments(result.data));
+    put("evaluations", json!(result.evaluations));
+    put("realizations", json!(result.realizations));
+    put("failures", failures(best.map(|best| best.failures)));
+    put("seed", json!(result.seed));
+    let (solver, picking) = (&result.solver, &result.picking);
+    put("solver", json!({"method": solver.method.name(), "refinement": solver.refinement}));
+    put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
+    put("version", json!(result.version));
+    text(object)
+}
+
+/// The object of a propagation, with a final newline.
+pub fn propagation(result: &JobResult) -> String {
+    let best = result.best.as_ref();
+    let mut object = Map::new();
+    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    put("realizations", json!(result.realizations));
+    put("failures", failures(best.map(|best| best.failures)));
+    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("digest", json!(result.digest));
+    text(object)
+}
+
+/// The best point in the text of an identification's `result.json`.
+///
+/// # Errors
+/// When the text is no JSON, or holds no point.
+pub fn best_point(text: &str) -> Result<Point, ResultError> {
+    let result: Value = serde_json::from_str(text).map_err(ResultError::Malformed)?;
+    let mut point = Point([0.0; 7]);
+    for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
+        let name = parameter.name();
+        let (key, found) = match parameter {
+            Parameter::Dispersion => (name.to_owned(), result.get(name)),
+            _ => {
+                let parameters = result.get("parameters");
+                (format!("parameters.{name}"), parameters.and_then(|table| table.get(name)))
+            }
+        };
+        *slot = match found.and_then(Value::as_f64) {
+            Some(number) => number,
+            None => return Err(ResultError::NoNumber { key, found: kind(found) }),
+        };
+    }
+    Ok(point)
+}
+
+fn kind(found: Option<&Value>) -> &'static str {
+    match found {
+        None => "missing",
+        Some(Value::Null) => "null",
+        Some(Value::Bool(_)) => "a boolean",
+        Some(Value::Number(_)) => "a number out of range",
+        Some(Value::String(_)) => "a string",
+        Some(Value::Array(_)) => "a list",
+        Some(Value::Object(_)) => "an object",
+    }
+}
+
+fn moments(moments: Option<Moments>) -> Value {
+    json!({
+        "mean": moments.map(|moments| moments.mean),
+        "coefficient_of_variation": moments.map(|moments| moments.coefficient_of_variation),
+    })
+}
+
+fn estimate(estimate: Option<Estimate>) -> Value {
+    let mut value = moments(estimate.map(|estimate| estimate.moments));
+    value["standard_error"] = moments(estimate.map(|estimate| estimate.standard_error));
+    value
+}
+
+fn failures(failures: Option<FailureCounts>) -> Value {
+    let failures = failures.unwrap_or_default();
+    Value::Object(
+        failures.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count))).collect(),
+    )
+}
+
+fn text(object: Map<String, Value>) -> String {
+    format!("{:#}\n", Value::Object(object))
+}

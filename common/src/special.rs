@@ -1,0 +1,11 @@
+//! Quantile functions of the standard normal and of the gamma law, on `libm` alone: the same bits
+//! on every platform.
+//!
+//! They turn uniform germs into the entries of the random matrix by the inverse distribution
+//! function, so that a realization is a continuous function of the parameters of its law.
+
+mod gamma;
+mod normal;
+
+pub use gamma::GammaQuantile;
+pub use normal::standard_normal_quantile;

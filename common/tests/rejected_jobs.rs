@@ -1,0 +1,257 @@
+//! Job files that are refused, each with all that a user reads.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use osteon_common::document::Format;
+use osteon_common::job::JobKind;
+use osteon_common::job_file;
+
+const JOB: &str = include_str!("files/job.toml");
+
+/// `JOB` with the one occurrence of `from` replaced by `to`; an empty `from` appends.
+fn edited(from: &str, to: &str) -> String {
+    if from.is_empty() {
+        return format!("{JOB}{to}");
+    }
+    assert_eq!(JOB.matches(from).count(), 1, "{from} must occur once");
+    JOB.replace(from, to)
+}
+
+fn refusal(text: &str, kind: JobKind) -> String {
+    match job_file::parse(text, Format::Toml, Path::new("tests/files"), kind) {
+        Ok(_) => "ACCEPTED".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn check(name: &str, kind: JobKind, edits: &[(&str, &str)]) {
+    let refusals = edits.iter().map(|(from, to)| {
+        let to_shown = if to.is_empty() { "(removed)" } else { to.trim() };
+        (to_shown, refusal(&edited(from, to), kind))
+    });
+    pin(name, refusals);
+}
+
+/// Pins what a user reads of each input.
+fn pin<'a>(name: &str, refusals: impl IntoIterator<Item = (&'a str, String)>) {
+    let mut page = String::new();
+    for (input, message) in refusals {
+        writeln!(page, "{input}\n=> {message}\n").unwrap();
+    }
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!(name, page);
+    });
+    assert!(!page.contains("ACCEPTED"), "{page}");
+}
+
+#[test]
+fn setup() {
+    check(
+        "rejected_setup",
+        JobKind::Identification,
+        &[
+            ("thickness = 11e-3", "thickness = 0.0"),
+            ("density = 1010.0", "density = -1010.0"),
+            ("density = 950.0", "density = nan"),
+            ("sound_speed = 1450.0", "sound_speed = inf"),
+            ("sound_speed = 1510.0", "sound_speed = \"1510\""),
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = -3e-3 }"),
+            ("bone     = { thickness = 3e-3 }", "bone = 3e-3"),
+            ("center_frequency = 0.9e6", "center_frequency = 0"),
+            ("center_frequency = 0.9e6", "center_frequency = 1e12"),
+            ("amplitude        = 99.0", "amplitude = 1e400"),
+            ("x1 = 1e-3, x3 = 3e-3", "x1 = nan, x3 = 0.0"),
+            ("x3 = 3e-3", "x3 = 11e-3"),
+            ("x3 = 2.5e-3", "x3 = -2.5e-3"),
+            ("first_x1 = 13e-3", "first_x1 = -5e-3"),
+            ("first_x1 = 13e-3", "first_x1 = 1e-3"),
+            ("pitch = 0.9e-3", "pitch = 0"),
+            ("pitch = 0.9e-3", "pitch = 1e-30"),
+            ("count = 12", "count = 2"),
+            ("count = 12", "count = 65"),
+            ("count = 12", "count = 12.0"),
+            ("count = 12", "count = -1"),
+            ("count = 12", "count = 99999999999999999999"),
+            ("extremum = \"second\"", "extremum = \"third\""),
+            ("threshold = 0.06", "threshold = 0"),
+            ("threshold = 0.06", "threshold = 1.0"),
+            ("method = \"exact\"", "method = \"hybrid\""),
+            ("method = \"exact\"", "method = 1"),
+            ("refinement = 1.5", "refinement = 0.4"),
+            ("refinement = 1.5", "refinement = 17"),
+        ],
+    );
+}
+
+#[test]
+fn parameters() {
+    check(
+        "rejected_parameters",
+        JobKind::Identification,
+        &[
+            ("[parameters.dispersion]\nstart = 0.1\nbounds = [0.02, 0.3]", ""),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 0.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0\nstart = 1700.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0\nbounds = [1.0, 2.0]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1700.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "bounds = [1500.0, 2000.0]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", ""),
+            ("start = 1700.0", "start = 1400.0"),
+            ("start = 1700.0", "start = -1700.0"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [2000.0, 1500.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1700.0, 1700.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [0.0, 2000.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1500.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1500.0, \"2000\"]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = 1500.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = -1\nbounds = [\"1500\", 2e3]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = \"a\"\nbounds = [-1, 2e3]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1\nbounds = [2, 3]\nunit = 1"),
+            ("fixed = 4.795e9", "fixed = -4.795e9"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 1.2"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "start = 1.2\nbounds = [0.2, 1.5]"),
+            ("start = 0.35\nbounds = [0.2, 0.45]", "fixed = 0.9"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0.797724035217466"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0"),
+            ("bounds = [0.02, 0.3]", "bounds = [0.0, 0.8]"),
+            (
+                "[parameters.density]\nstart = 1700.0\nbounds = [1500.0, 2000.0]",
+                "parameters.density = 1700.0",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn run() {
+    check(
+        "rejected_run",
+        JobKind::Identification,
+        &[
+            ("realizations = 500", "realizations = 0"),
+            ("realizations = 500", "realizations = 10000001"),
+            ("realizations = 500", "realizations = 1e3"),
+            ("seed = 7", "seed = -1"),
+            ("sampling = \"monte_carlo\"", "sampling = \"sobol\"\nscrambles = 4"),
+            ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
+            ("kind = \"moments\"", "kind = \"likelihood\""),
+            ("method = \"simplex\"", "method = \"newton\""),
+            ("method = \"simplex\"", "method = \"annealing\""),
+            ("max_evaluations = 300", "max_evaluations = 0"),
+            ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
+            ("size_tolerance = 1e-4", "size_tolerance = 1"),
+            ("initial_step = 0.1", "initial_step = 0.6"),
+        ],
+    );
+}
+
+#[test]
+fn data() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_data",
+        JobKind::Identification,
+        &[
+            ("[data]\nvelocities = [3900.5, 4000, 3950.25]", ""),
+            (given, ""),
+            (given, "velocities = []"),
+            (given, "velocities = [3900.0]"),
+            (given, "velocities = [3900.0, 3900.0]"),
+            (given, "velocities = [3900.0, -1.0, nan, 4000.0]"),
+            (given, "velocities = [3900.0, \"4000\"]"),
+            (given, "velocities = 3900.0"),
+            (given, "velocities = \"missing.csv\""),
+            (given, "mean = 3900.0"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.0"),
+            (given, "mean = 0\ncoefficient_of_variation = 0.03"),
+            (given, "velocities = [3900.0, 4000.0]\nmean = 3900.0"),
+        ],
+    );
+}
+
+#[test]
+fn unknown_keys() {
+    check(
+        "rejected_unknown_keys",
+        JobKind::Identification,
+        &[
+            ("", "[serach]\nmax_evaluations = 3\n"),
+            ("", "tolerance = 1e-3\n"),
+            ("", "[bone]\ndensity = 1600.0\n"),
+            ("thickness = 11e-3", "thicknes = 11e-3"),
+            ("amplitude        = 99.0", "Amplitude = 99.0"),
+            ("count = 12", "number = 12"),
+            ("threshold = 0.06", "treshold = 0.06"),
+            ("refinement = 1.5", "refinment = 1.5"),
+            ("realizations = 500", "realisations = 500"),
+            ("start = 0.1", "strat = 0.1"),
+            ("[parameters.dispersion]", "[parameters.dispersoin]"),
+            ("kind = \"moments\"", "\"sur prise\" = 1"),
+        ],
+    );
+}
+
+#[test]
+fn a_propagation_checks_its_data_without_reading_files() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_propagation_data",
+        JobKind::Propagation,
+        &[
+            (given, "velocities = [3900.0, -1.0]"),
+            (given, "velocity = \"data.csv\""),
+            (given, "velocities = 1"),
+            (given, "mean = 1.0"),
+        ],
+    );
+    let text = edited(given, "velocities = \"missing.csv\"");
+    let job = job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Propagation).unwrap();
+    assert_eq!(job.data, None);
+}
+
+#[test]
+fn all_seven_fixed_leaves_nothing_to_search() {
+    let mut text = JOB.to_owned();
+    for (free, fixed) in [
+        ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0"),
+        ("start = 18e9\nbounds = [12e9, 25e9]", "fixed = 18e9"),
+        ("start = 0.35\nbounds = [0.2, 0.45]", "fixed = 0.35"),
+        ("start = 10e9\nbounds = [8e9, 16e9]", "fixed = 10e9"),
+        ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 0.4"),
+        ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0.1"),
+    ] {
+        assert!(text.contains(free));
+        text = text.replace(free, fixed);
+    }
+    assert_eq!(
+        refusal(&text, JobKind::Identification),
+        "one thing is wrong\n  parameters: all seven are fixed; an identification searches at least \
+         one: give it start and bounds (a run at fixed parameters is a propagation)"
+    );
+    assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");
+}
+
+#[test]
+fn everything_wrong_is_said_at_once_in_the_order_of_the_lines() {
+    let text = JOB
+        .replace("density = 1010.0", "density = 0, colour = 3")
+        .replace("count = 12", "count = 0")
+        .replace("start = 0.4\n", "start = 1.2\n")
+        .replace("realizations = 500", "realizations = 0")
+        .replace("[parameters.density]\nstart = 1700.0\nbounds = [1500.0, 2000.0]\n", "");
+    pin("rejected_all_at_once", [("six mistakes", refusal(&text, JobKind::Identification))]);
+}
+
+#[test]
+fn an_empty_file_names_the_tables_that_it_lacks() {
+    pin(
+        "rejected_empty_job",
+        [
+            ("identification", refusal("", JobKind::Identification)),
+            ("propagation", refusal("", JobKind::Propagation)),
+        ],
+    );
+}

@@ -1,0 +1,149 @@
+//! The text of results: exact keys, columns and digits.
+
+use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
+use osteon_common::parameters::Point;
+use osteon_common::results::{BestPoint, Estimate, Evaluation, JobResult, Moments, Status};
+use osteon_common::settings::{Picking, SolverSettings};
+use osteon_common::{results_csv, results_json};
+
+const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+
+fn moments(mean: f64, coefficient_of_variation: f64) -> Moments {
+    Moments { mean, coefficient_of_variation }
+}
+
+fn outcomes() -> Vec<Outcome> {
+    vec![Ok(3908.25), Err(FailureKind::DirectWaveFirst), Ok(1e4 / 3.0), Err(FailureKind::NoArrival)]
+}
+
+fn result() -> JobResult {
+    JobResult {
+        status: Status::Converged,
+        reason: None,
+        digest: "0123abcd".to_owned(),
+        best: Some(BestPoint {
+            point: POINT,
+            cost: Some(4.5e-11),
+            velocity: Some(Estimate {
+                moments: moments(3906.27, 0.027083),
+                standard_error: moments(2.0, 3.6e-4),
+            }),
+            failures: FailureCounts::of(&outcomes()),
+            outcomes: outcomes(),
+        }),
+        data: Some(moments(3906.3, 0.02709)),
+        evaluations: 123,
+        realizations: 4,
+        seed: 9_223_372_036_854_775_807,
+        solver: SolverSettings::default(),
+        picking: Picking::default(),
+        version: "0.1.0".to_owned(),
+    }
+}
+
+/// Neither a point nor anything finite, and a reason.
+fn failed() -> JobResult {
+    JobResult {
+        status: Status::Failed,
+        reason: Some("no feasible point".to_owned()),
+        best: None,
+        ..result()
+    }
+}
+
+fn check(name: &str, text: &str) {
+    assert!(text.ends_with("}\n"));
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!(name, text);
+    });
+}
+
+#[test]
+fn identification() {
+    check("result_identification", &results_json::identification(&result()));
+    check("result_identification_failed", &results_json::identification(&failed()));
+}
+
+#[test]
+fn propagation() {
+    check("result_propagation", &results_json::propagation(&result()));
+    check("result_propagation_failed", &results_json::propagation(&failed()));
+}
+
+#[test]
+fn what_is_not_finite_is_null() {
+    let mut result = result();
+    let best = result.best.as_mut().unwrap();
+    best.cost = Some(f64::INFINITY);
+    best.velocity = Some(Estimate {
+        moments: moments(f64::NAN, f64::NEG_INFINITY),
+        standard_error: moments(f64::NAN, f64::NAN),
+    });
+    let value: serde_json::Value =
+        serde_json::from_str(&results_json::identification(&result)).unwrap();
+    assert!(value["cost"].is_null());
+    assert!(value["velocity"]["mean"].is_null());
+    assert!(value["velocity"]["coefficient_of_variation"].is_null());
+    assert!(value["velocity"]["standard_error"]["mean"].is_null());
+}
+
+#[test]
+fn the_best_point_is_read_back_to_the_bit() {
+    let mut result = result();
+    let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
+    for point in [POINT, odd] {
+        result.best.as_mut().unwrap().point = point;
+        let read = results_json::best_point(&results_json::identification(&result)).unwrap();
+        assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
+    }
+}
+
+#[test]
+fn a_result_without_a_point_gives_none() {
+    let check = |text: &str, expected: &str| {
+        let message = results_json::best_point(text).unwrap_err().to_string();
+        assert!(message.starts_with(expected), "{message}");
+    };
+    check("", "not valid JSON: EOF");
+    check("[]", "`parameters.density` is missing; it must be a number");
+    check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
+    check(&results_json::identification(&failed()), "`parameters.density` is null;");
+    check(&results_json::propagation(&result()), "`parameters.density` is missing;");
+    let text = results_json::identification(&result());
+    check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
+}
+
+#[test]
+fn history() {
+    let row = |number, moments, cost, failures| Evaluation {
+        number,
+        point: POINT,
+        moments,
+        cost,
+        failures,
+    };
+    let none = FailureCounts::default();
+    let text = results_csv::history(&[
+        row(0, Some(moments(3906.5, 0.0271)), Some(1e-3), none),
+        row(1, Some(moments(3906.5, 0.0271)), Some(f64::INFINITY), FailureCounts::of(&outcomes())),
+        row(2, None, None, none),
+    ]);
+    assert_eq!(
+        text,
+        "evaluation,density,longitudinal_young_modulus,longitudinal_poisson_ratio,\
+         longitudinal_shear_modulus,transverse_young_modulus,transverse_poisson_ratio,dispersion,\
+         mean,coefficient_of_variation,cost,failures\n\
+         0,1598.8,17717000000.0,0.3816,4795000000.0,9825400000.0,0.4495,0.1029,3906.5,0.0271,0.001,0\n\
+         1,1598.8,17717000000.0,0.3816,4795000000.0,9825400000.0,0.4495,0.1029,3906.5,0.0271,inf,2\n\
+         2,1598.8,17717000000.0,0.3816,4795000000.0,9825400000.0,0.4495,0.1029,,,,0\n"
+    );
+}
+
+#[test]
+fn realizations() {
+    assert_eq!(
+        results_csv::realizations(&outcomes()),
+        "index,velocity,failure\n0,3908.25,\n1,,direct_wave_first\n2,3333.3333333333335,\n3,,no_arrival\n"
+    );
+    assert_eq!(results_csv::realizations(&[]), "index,velocity,failure\n");
+}

@@ -1,0 +1,314 @@
+//! What is written reads back to the same bits; what is read never panics; a specification is
+//! judged alike whether it comes as a file or not.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use osteon_common::case::{Bone, Case, Setup};
+use osteon_common::document::Format;
+use osteon_common::elasticity::Elasticity;
+use osteon_common::file_error::ContentError;
+use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Search};
+use osteon_common::layers::{Fluid, Layers};
+use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::settings::{Extremum, Picking, SolverSettings};
+use osteon_common::{case_file, job_file};
+use proptest::prelude::*;
+
+const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
+const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
+
+/// Any positive normal or subnormal number.
+fn positive() -> impl Strategy<Value = f64> {
+    use proptest::num::f64::{NORMAL, POSITIVE, SUBNORMAL};
+    POSITIVE | NORMAL | SUBNORMAL
+}
+
+fn fluid() -> impl Strategy<Value = Fluid> {
+    (4e-3..30e-3, positive(), 1200.0..1800.0).prop_map(|(thickness, density, sound_speed)| Fluid {
+        thickness,
+        density,
+        sound_speed,
+    })
+}
+
+fn setup() -> impl Strategy<Value = Setup> {
+    let layers = (fluid(), 0.5e-3..8e-3, fluid());
+    let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
+    let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
+    let pulse = (0.5e6..1.5e6, positive());
+    let settings = (any::<bool>(), 1e-300..1.0, 0.5..1.5);
+    (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
+        |((coupling, bone_thickness, marrow), x1, (x3, receivers_x3), row, pulse, settings)| {
+            let (distance, pitch, count, left) = row;
+            let span = f64::from(count) * pitch;
+            let first_x1 = if left { x1 - distance - span } else { x1 + distance };
+            let (second, threshold, refinement) = settings;
+            let extremum = if second { Extremum::Second } else { Extremum::First };
+            Setup {
+                layers: Layers { coupling, bone_thickness, marrow },
+                probe: Probe {
+                    center_frequency: pulse.0,
+                    amplitude: pulse.1,
+                    source: Source { x1, x3 },
+                    receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
+                },
+                picking: Picking { extremum, threshold },
+                solver: SolverSettings { refinement, ..SolverSettings::default() },
+            }
+        },
+    )
+}
+
+/// Positive definite, of any size between 1 Pa and 1e12 Pa, with all 36 entries.
+fn elasticity() -> impl Strategy<Value = Elasticity> {
+    let entries = prop::array::uniform32(-1.0..1.0);
+    (entries, 1.0..1e12).prop_filter_map("not positive definite", |(entries, scale)| {
+        let mut rows = [[0.0; 6]; 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                let product: f64 = (0..5).map(|m| entries[5 * i + m] * entries[5 * j + m]).sum();
+                rows[i][j] = scale * (product + if i == j { 1.0 } else { 0.0 });
+            }
+        }
+        Elasticity::new(rows).ok()
+    })
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    (setup(), positive(), elasticity())
+        .prop_map(|(setup, density, elasticity)| Case { setup, bone: Bone { density, elasticity } })
+}
+
+fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
+    let width = upper - lower;
+    (any::<bool>(), lower..upper, 0.01..1.0, 0.01..1.0).prop_map(move |(fixed, start, down, up)| {
+        if fixed {
+            Range::Fixed(start)
+        } else {
+            let free = (start - lower, upper - start + 0.01 * width);
+            Range::Free { start, lower: start - down * free.0, upper: start + up * free.1 }
+        }
+    })
+}
+
+fn data() -> impl Strategy<Value = Data> {
+    prop_oneof![
+        prop::collection::vec(1e-3..1e6, 2..40).prop_map(Data::Velocities),
+        (positive(), positive()).prop_map(|(mean, coefficient_of_variation)| Data::Moments {
+            mean,
+            coefficient_of_variation
+        }),
+    ]
+}
+
+fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
+    (1_u64..=10_000_000, 0_u64..1 << 63, 0.0..1.0).prop_map(
+        |(realizations, seed, max_failed_fraction)| MonteCarlo {
+            realizations,
+            seed,
+            max_failed_fraction,
+            ..MonteCarlo::default()
+        },
+    )
+}
+
+fn search() -> impl Strategy<Value = Search> {
+    (1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
+        |(max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+            max_evaluations,
+            cost_tolerance,
+            size_tolerance,
+            initial_step,
+            ..Search::default()
+        },
+    )
+}
+
+/// Almost always valid.
+fn job() -> impl Strategy<Value = JobSpecification> {
+    let parameters = (
+        range(1500.0, 2000.0),
+        range(12e9, 25e9),
+        range(0.2, 0.45),
+        range(3e9, 6.5e9),
+        range(8e9, 12e9),
+        range(0.2, 0.5),
+        range(0.02, 0.3),
+    );
+    (any::<bool>(), setup(), data(), parameters, monte_carlo(), search()).prop_map(
+        |(identification, setup, data, parameters, monte_carlo, search)| {
+            let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
+            JobSpecification {
+                kind: KINDS[usize::from(!identification)],
+                setup,
+                data: identification.then_some(data),
+                parameters: [rho, e_l, nu_l, g_l, e_t, nu_t, delta],
+                monte_carlo,
+                objective: Default::default(),
+                search,
+            }
+        },
+    )
+}
+
+/// A number of a specification, replaced by another.
+type Edit = fn(&mut JobSpecification, f64);
+
+const EDITS: [Edit; 14] = [
+    |job, x| job.setup.layers.coupling.thickness = x,
+    |job, x| job.setup.layers.bone_thickness = x,
+    |job, x| job.setup.layers.marrow.sound_speed = x,
+    |job, x| job.setup.probe.center_frequency = x,
+    |job, x| job.setup.probe.source.x1 = x,
+    |job, x| job.setup.probe.source.x3 = x,
+    |job, x| job.setup.probe.receivers.first_x1 = x,
+    |job, x| job.setup.probe.receivers.pitch = x,
+    |job, x| job.setup.picking.threshold = x,
+    |job, x| job.setup.solver.refinement = x,
+    |job, x| job.parameters[5] = Range::Fixed(x),
+    |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
+    |job, x| job.search.initial_step = x,
+    |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
+];
+
+fn text_of_a_file() -> impl Strategy<Value = String> {
+    let token = prop::sample::select(vec![
+        "nan",
+        "-inf",
+        "-1",
+        "0",
+        "1e308",
+        "5e-324",
+        "1e999",
+        "99999999999999999999",
+        "\"x\"",
+        "''",
+        "[]",
+        "[[]]",
+        "{}",
+        "{ a = 1 }",
+        "true",
+        "1979-05-27",
+        "[1, 2]",
+        "null",
+        "\"\u{fffd}\\u0000\"",
+        "}",
+        "=",
+    ]);
+    let base = prop::sample::select(vec![
+        include_str!("files/job.toml"),
+        include_str!("files/case.toml"),
+        include_str!("files/mandel.toml"),
+    ]);
+    (base, prop::collection::vec((any::<prop::sample::Index>(), token), 1..6)).prop_map(
+        |(base, edits)| {
+            let mut words: Vec<_> = base.split(' ').map(str::to_owned).collect();
+            for (index, token) in edits {
+                let at = index.index(words.len());
+                // What follows the word on its line and beyond stays.
+                let rest = words[at].find('\n').map_or("", |end| &words[at][end..]).to_owned();
+                words[at] = format!("{token}{rest}");
+            }
+            words.join(" ")
+        },
+    )
+}
+
+fn no_panic(text: &str) {
+    for format in FORMATS {
+        let _ = case_file::parse(text, format);
+        for kind in KINDS {
+            let _ = job_file::parse(text, format, Path::new("/nowhere"), kind);
+        }
+    }
+}
+
+fn as_json(toml: &str) -> Result<String, TestCaseError> {
+    let table: toml::Table =
+        toml::from_str(toml).map_err(|error| TestCaseError::fail(error.to_string()))?;
+    serde_json::to_string(&table).map_err(|error| TestCaseError::fail(error.to_string()))
+}
+
+proptest! {
+    #[test]
+    fn a_case_reads_back_to_the_bit(case in case()) {
+        let text = case_file::to_toml(&case);
+        let read = case_file::parse(&text, Format::Toml).unwrap();
+        // The text tells all bits, a zero's sign among them.
+        prop_assert_eq!(case_file::to_toml(&read), text.clone());
+        prop_assert_eq!(read, case);
+        prop_assert_eq!(case_file::parse(&as_json(&text)?, Format::Json).unwrap(), case);
+    }
+
+    #[test]
+    fn a_job_reads_back_to_the_bit(job in job()) {
+        prop_assume!(job.check().is_empty());
+        let text = job_file::to_toml(&job);
+        let read = job_file::parse(&text, Format::Toml, Path::new(""), job.kind).unwrap();
+        prop_assert_eq!(job_file::to_toml(&read), text.clone());
+        prop_assert_eq!(&read, &job);
+        let json = as_json(&text)?;
+        prop_assert_eq!(job_file::parse(&json, Format::Json, Path::new(""), job.kind).unwrap(), job);
+    }
+
+    #[test]
+    fn a_file_is_judged_as_the_specification_it_stands_for(
+        mut job in job(),
+        edits in prop::collection::vec(
+            (prop::sample::select(EDITS.to_vec()), prop_oneof![
+                Just(0.0), Just(-0.0), Just(-1.0), Just(1.0), Just(1e-3), Just(1e300), Just(5e-324),
+                Just(f64::INFINITY), Just(f64::NEG_INFINITY), proptest::num::f64::NORMAL,
+            ]),
+            0..4,
+        ),
+    ) {
+        job.kind = JobKind::Identification;
+        job.data.get_or_insert(Data::Moments { mean: 1.0, coefficient_of_variation: 1.0 });
+        for (edit, value) in edits {
+            edit(&mut job, value);
+        }
+        let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();
+        let text = job_file::to_toml(&job);
+        let found = match job_file::parse(&text, Format::Toml, Path::new(""), job.kind) {
+            Ok(_) => BTreeSet::new(),
+            Err(ContentError::Invalid(invalid)) => {
+                invalid.iter().map(|(_, violation)| violation.to_string()).collect()
+            }
+            Err(malformed) => panic!("{malformed}\n{text}"),
+        };
+        prop_assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn arbitrary_text_does_not_panic(text in "\\PC*|[\\[\\]{}=.,:\"' \n0-9a-e_-]*") {
+        no_panic(&text);
+    }
+
+    #[test]
+    fn damaged_files_do_not_panic(text in text_of_a_file()) {
+        no_panic(&text);
+        if let Ok(table) = toml::from_str::<toml::Table>(&text) {
+            no_panic(&serde_json::to_string(&table).unwrap());
+        }
+    }
+}
+
+#[test]
+fn the_canonical_text_of_a_job() {
+    let text = include_str!("files/job.toml");
+    let job = job_file::parse(text, Format::Toml, Path::new(""), JobKind::Identification).unwrap();
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("canonical_job", job_file::to_toml(&job));
+    });
+    let job = JobSpecification { kind: JobKind::Propagation, data: None, ..job };
+    assert!(!job_file::to_toml(&job).contains("[data]"));
+}
+
+#[test]
+fn the_canonical_text_of_a_case() {
+    let case = case_file::parse(include_str!("files/mandel.toml"), Format::Toml).unwrap();
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("canonical_case", case_file::to_toml(&case));
+    });
+}
