@@ -28,6 +28,11 @@ pub const RUNGS: usize = 49;
 const NOMINAL_SPEED: f64 = 4000.0;
 /// Highest frequency over centre frequency at refinement 1.
 const BAND: f64 = 4.0;
+/// Plates thinner than this many millimetres at 1 MHz (m·Hz) need a wider band: the first extremum
+/// lies closer to the wave of the pulse's kink at t = 0, whose spectrum falls slowly.
+const THIN_PLATE: f64 = 3000.0;
+/// Most widening of the band for a thin plate.
+const THIN_PLATE_MAX: f64 = 3.0;
 /// Where the taper starts, as a fraction of the band.
 const TAPER_START: f64 = 0.4;
 /// Band of traces over that of velocities: a trace is right to 1e-3 of its largest value.
@@ -150,7 +155,9 @@ impl Sampling {
         let coupling = &setup.layers.coupling;
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
-        let band = BAND * refinement * setup.probe.center_frequency;
+        let fc = setup.probe.center_frequency;
+        let thin = (THIN_PLATE / (setup.layers.bone_thickness * fc)).clamp(1.0, THIN_PLATE_MAX);
+        let band = BAND * refinement * thin * fc;
         // Finer sampling is also less truncated, slowly.
         let more = 2.0 * libm::log(refinement.max(1.0));
         let through_fluid = earliest_arrival(setup, 0.0, speed);
