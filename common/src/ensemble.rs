@@ -1,7 +1,7 @@
-//! The random elasticity of the paper's Sec. 4: [C] = [L]ᵀ [G] [L] with [G] = [L_G]ᵀ [L_G],
-//! E[G] = I and E‖G - I‖² / 6 = δ².
+//! The random elasticity of the paper's Sec. 4: `[C] = [L]ᵀ [G] [L]` with `[G] = [L_G]ᵀ [L_G]`,
+//! `E[G] = I` and `E‖G - I‖² / 6 = δ²`.
 //!
-//! [L_G] is upper triangular with independent entries: σ U off the diagonal, U standard normal,
+//! `[L_G]` is upper triangular with independent entries: σ U off the diagonal, U standard normal,
 //! σ = δ/√7; σ √(2 V_j) on it, V_j gamma of shape α_j = 7/(2δ²) + (1-j)/2, j = 1…6, scale 1. All
 //! are quantiles of uniform germs, so that a realization is a continuous function of the mean and
 //! of the dispersion, and one set of germs serves every point of a search.
@@ -13,8 +13,8 @@ use thiserror::Error;
 use crate::elasticity::{Elasticity, NotElastic};
 use crate::special::{GammaQuantile, standard_normal_quantile};
 
-/// The dispersion must be below √(7/11), where the law ceases to have the second moments that
-/// make a wave problem well posed (the paper, Sec. 4).
+/// The dispersion must be below this, √((n+1)/(n+5)) = √(7/11) for n = 6: then the inverse of the
+/// random matrix has a finite mean square norm (C. Soize, J. Acoust. Soc. Am. 109 (2001)).
 pub const DISPERSION_MAX: f64 = 0.797_724_035_217_465_6;
 
 /// Number of germs of one realization: the entries of a triangular 6×6 matrix.
@@ -31,7 +31,7 @@ pub struct Germs([f64; GERMS]);
 /// The law of the random elasticity at one point: everything that the realizations share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElasticityLaw {
-    /// [L], √Pa.
+    /// `[L]`, √Pa.
     factor: [[f64; 6]; 6],
     /// σ = δ/√7.
     sigma: f64,
@@ -109,7 +109,7 @@ impl ElasticityLaw {
         })
     }
 
-    /// The realization [C] that belongs to these germs, Pa; symmetric to the bit.
+    /// The realization `[C]` that belongs to these germs, Pa; symmetric to the bit.
     ///
     /// # Errors
     /// When rounding spoils positive definiteness: for germs at the very edge of (0, 1) at a
@@ -131,7 +131,7 @@ impl ElasticityLaw {
         Elasticity::new(c)
     }
 
-    /// [L_G].
+    /// `[L_G]`.
     fn triangle(&self, germs: &Germs) -> [[f64; 6]; 6] {
         let mut triangle = [[0.0; 6]; 6];
         let mut germs = germs.0.iter();
@@ -161,4 +161,216 @@ fn multiply_triangular(a: &[[f64; 6]; 6], b: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
         }
     }
     product
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elasticity::EngineeringConstants;
+
+    fn optimum() -> Elasticity {
+        EngineeringConstants {
+            longitudinal_young_modulus: 17.717e9,
+            longitudinal_poisson_ratio: 0.3816,
+            longitudinal_shear_modulus: 4.795e9,
+            transverse_young_modulus: 9.8254e9,
+            transverse_poisson_ratio: 0.4495,
+        }
+        .elasticity()
+        .unwrap()
+    }
+
+    /// Expected values from a ChaCha20 written for this purpose in Python (64-bit counter and
+    /// 64-bit stream, checked against the first block of the published all-zero vector).
+    #[test]
+    fn germs_are_those_of_an_independent_chacha20() {
+        let check = |seed, index, expected: [f64; GERMS]| {
+            assert_eq!(Germs::draw(seed, index).values(), &expected, "({seed}, {index})");
+        };
+        check(
+            0,
+            0,
+            [
+                0.5634451882632474,
+                0.15914191768880798,
+                0.1051872746830676,
+                0.7775492397603869,
+                0.551885087388972,
+                0.2159858178928294,
+                0.11183310066255198,
+                0.5249928651407689,
+                0.47742184012795624,
+                0.050906029410355325,
+                0.41171093485914784,
+                0.9276570198692999,
+                0.26292268104419386,
+                0.8329139027484425,
+                0.2733618209969106,
+                0.4347759064103616,
+                0.8805564874552376,
+                0.4594788609618429,
+                0.7749454666860005,
+                0.3660221493812755,
+                0.060020156066653174,
+            ],
+        );
+        check(
+            1,
+            2746,
+            [
+                0.07937437617117588,
+                0.9255446963372209,
+                0.7562714785190661,
+                0.5718036126137751,
+                0.7790555496006737,
+                0.20573790882897464,
+                0.5222901014747203,
+                0.6008663502210216,
+                0.5418841478098133,
+                0.3077564070877015,
+                0.46482176933229075,
+                0.5926249284571914,
+                0.47589025210639596,
+                0.39804204767072354,
+                0.7249670778292439,
+                0.3518064035541066,
+                0.7992753258144896,
+                0.730808776059757,
+                0.3179173187922955,
+                0.05397360116911237,
+                0.943284848860747,
+            ],
+        );
+        check(
+            (1 << 63) - 1,
+            (1 << 40) + 7,
+            [
+                0.43135465896499653,
+                0.2739039013501862,
+                0.909419097282937,
+                0.8109432854144503,
+                0.06834990056246754,
+                0.21898270611433351,
+                0.7232379190159126,
+                0.38706138557805886,
+                0.9511909867300654,
+                0.9753611111313458,
+                0.6619384475106669,
+                0.2527549534458448,
+                0.5390836376323269,
+                0.0990549865268921,
+                0.3798545925808566,
+                0.24891071055363717,
+                0.4270159269908205,
+                0.8553133392866408,
+                0.6490787987726276,
+                0.33016336474624236,
+                0.9390131258356691,
+            ],
+        );
+    }
+
+    #[test]
+    fn every_germ_lies_inside_the_unit_interval() {
+        for (bits, expected) in [
+            (0, 1.0 / (1u64 << 54) as f64),
+            ((1 << 11) - 1, 1.0 / (1u64 << 54) as f64),
+            (1 << 63, 0.5),
+            (u64::MAX, BELOW_ONE),
+            (u64::MAX - (1 << 11), 1.0 - f64::EPSILON),
+        ] {
+            assert_eq!(uniform(bits), expected, "{bits:#x}");
+        }
+        let mut germs = [0.5; GERMS];
+        assert!(Germs::new(germs).is_some());
+        for outside in [0.0, 1.0, -0.1, 1.1, f64::NAN] {
+            germs[20] = outside;
+            assert_eq!(Germs::new(germs), None, "{outside}");
+        }
+    }
+
+    #[test]
+    fn germs_go_by_rows_of_the_triangle() {
+        let law = ElasticityLaw::new(&optimum(), 0.3).unwrap();
+        let middle = law.triangle(&Germs([0.5; GERMS]));
+        let entries = (0..6).flat_map(|j| (j..6).map(move |k| (j, k)));
+        for (germ, entry) in entries.enumerate() {
+            let mut germs = [0.5; GERMS];
+            germs[germ] = 0.9;
+            let triangle = law.triangle(&Germs(germs));
+            for j in 0..6 {
+                for k in 0..6 {
+                    let moved = triangle[j][k] > middle[j][k];
+                    assert_eq!(moved, (j, k) == entry, "germ {germ}, entry ({j},{k})");
+                    assert!(moved || triangle[j][k] == middle[j][k]);
+                }
+            }
+        }
+    }
+
+    /// σ U off the diagonal; on it σ √(2 V_j), V_j by the quantile of the shape itself.
+    #[test]
+    fn entries_are_the_quantiles_of_the_papers_laws() {
+        for dispersion in [0.02, 0.1029, 0.5, 0.79] {
+            let germs = Germs::draw(9, 9);
+            let triangle = ElasticityLaw::new(&optimum(), dispersion).unwrap().triangle(&germs);
+            let sigma = dispersion / 7.0_f64.sqrt();
+            let mut germs = germs.values().iter();
+            for (j, row) in triangle.iter().enumerate() {
+                for (k, entry) in row.iter().enumerate().skip(j) {
+                    let u = *germs.next().unwrap();
+                    let expected = if j == k {
+                        let shape = 7.0 / (2.0 * dispersion * dispersion) - 0.5 * j as f64;
+                        sigma * (2.0 * GammaQuantile::new(shape).quantile(u)).sqrt()
+                    } else {
+                        sigma * standard_normal_quantile(u)
+                    };
+                    let error = (entry - expected).abs();
+                    assert!(error < 1e-14 * expected.abs(), "δ {dispersion}, ({j},{k})");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_dispersion_the_realization_is_the_mean() {
+        let mean = optimum();
+        for dispersion in [f64::MIN_POSITIVE, 1e-200, 1e-17] {
+            let law = ElasticityLaw::new(&mean, dispersion).unwrap();
+            let drawn = law.realize(&Germs::draw(1, 0)).unwrap();
+            for i in 0..6 {
+                for j in 0..6 {
+                    let error = (drawn.rows()[i][j] - mean.rows()[i][j]).abs();
+                    assert!(error < 1e-15 * mean.rows()[0][0], "δ {dispersion:e} ({i},{j})");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn extreme_germs_give_an_elasticity_or_say_that_it_is_none() {
+        let ends = [1.0 / (1u64 << 54) as f64, BELOW_ONE];
+        for dispersion in [0.1, 0.79] {
+            let law = ElasticityLaw::new(&optimum(), dispersion).unwrap();
+            for pattern in 0..1u32 << 12 {
+                let end = |germ: usize| ends[(pattern.rotate_left(germ as u32) & 1) as usize];
+                match law.realize(&Germs(std::array::from_fn(end))) {
+                    Ok(drawn) => assert!(drawn.rows()[0][0] > 0.0),
+                    Err(error) => {
+                        assert!(matches!(error, NotElastic::NotPositiveDefinite { .. }), "{error}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_dispersion_outside_its_range_is_refused() {
+        assert_eq!(DISPERSION_MAX, (7.0_f64 / 11.0).sqrt());
+        for value in [0.0, -0.1, DISPERSION_MAX, 1.0, f64::NAN, f64::INFINITY] {
+            let message = ElasticityLaw::new(&optimum(), value).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("dispersion is {value};")), "{message}");
+        }
+        assert!(ElasticityLaw::new(&optimum(), DISPERSION_MAX.next_down()).is_ok());
+    }
 }

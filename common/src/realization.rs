@@ -53,3 +53,37 @@ impl Ensemble {
         Ok(Bone { density: self.density, elasticity })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+
+    #[test]
+    fn a_bone_is_a_function_of_point_seed_and_index() {
+        let ensemble = Ensemble::new(&OPTIMUM, 7).unwrap();
+        let bone = ensemble.bone(3).unwrap();
+        assert_eq!(bone.density, 1598.8);
+        assert_eq!(Ensemble::new(&OPTIMUM, 7).unwrap().bone(3).unwrap(), bone);
+        assert_ne!(ensemble.bone(4).unwrap(), bone);
+        assert_ne!(Ensemble::new(&OPTIMUM, 8).unwrap().bone(3).unwrap(), bone);
+    }
+
+    #[test]
+    fn a_bad_point_is_named() {
+        let check = |parameter: usize, value: f64, expected: &str| {
+            let mut point = OPTIMUM;
+            point.0[parameter] = value;
+            let message = Ensemble::new(&point, 1).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        };
+        check(0, 0.0, "density is 0; it must be above 0");
+        check(0, f64::NAN, "density is NaN");
+        check(0, f64::INFINITY, "density is inf");
+        check(1, -1.0, "longitudinal_young_modulus is -1");
+        check(2, 0.9, "e_L (1 - ν_T) - 2 e_T ν_L² is");
+        check(5, 1.2, "transverse_poisson_ratio is 1.2");
+        check(6, 0.8, "dispersion is 0.8; it must be above 0 and below √(7/11)");
+    }
+}

@@ -150,3 +150,139 @@ impl Sum {
         self.sum + self.lost
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ensemble::Germs;
+    use crate::outcome::FailureKind;
+
+    fn close(value: f64, expected: f64) {
+        assert!((value - expected).abs() <= 1e-15 * expected.abs(), "{value}, expected {expected}");
+    }
+
+    #[test]
+    fn moments_of_small_sets() {
+        let check = |velocities: &[f64], mean: f64, coefficient_of_variation: f64| {
+            let moments = moments(velocities).unwrap();
+            close(moments.mean, mean);
+            close(moments.coefficient_of_variation, coefficient_of_variation);
+        };
+        check(&[3900.0], 3900.0, 0.0);
+        check(&[3900.0, 3900.0, 3900.0], 3900.0, 0.0);
+        check(&[3.0, 5.0], 4.0, 0.25);
+        check(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0], 5.0, 0.4);
+        assert_eq!(moments(&[]), None);
+    }
+
+    /// √(mean of squares / square of mean - 1) would lose every digit here.
+    #[test]
+    fn nothing_cancels_when_the_variation_is_small() {
+        let velocities: Vec<f64> =
+            (0..1000).map(|k| 4096.0 + f64::from(k % 2) / 1048576.0).collect();
+        let moments = moments(&velocities).unwrap();
+        let half = 0.5 / 1048576.0;
+        close(moments.mean, 4096.0 + half);
+        close(moments.coefficient_of_variation, half / (4096.0 + half));
+    }
+
+    #[test]
+    fn the_sum_does_not_lose_what_is_small() {
+        let mut sum = Sum::default();
+        for value in [1.0, 1e100, 1.0, -1e100] {
+            sum.add(value);
+        }
+        assert_eq!(sum.total(), 2.0);
+    }
+
+    #[test]
+    fn failures_do_not_enter_an_estimate() {
+        let with = [Ok(3.0), Err(FailureKind::NoArrival), Ok(5.0), Err(FailureKind::NotFinite)];
+        let estimate = estimate(&with).unwrap();
+        close(estimate.moments.mean, 4.0);
+        close(estimate.moments.coefficient_of_variation, 0.25);
+        // s = √2; of a symmetric two-point law m₄ = m₂² and m₃ = 0: Δ/√N · Δ.
+        close(estimate.standard_error.mean, 1.0);
+        close(estimate.standard_error.coefficient_of_variation, 0.25 * 0.25 / 2.0_f64.sqrt());
+        assert_eq!(super::estimate(&[Err(FailureKind::NoArrival)]), None);
+        assert_eq!(super::estimate(&[]), None);
+    }
+
+    #[test]
+    fn one_velocity_has_no_error_and_equal_ones_have_none() {
+        let one = estimate(&[Ok(3900.0)]).unwrap();
+        assert_eq!(one.moments, Moments { mean: 3900.0, coefficient_of_variation: 0.0 });
+        assert!(one.standard_error.mean.is_nan());
+        assert!(one.standard_error.coefficient_of_variation.is_nan());
+        let equal = estimate(&[Ok(3900.0); 5]).unwrap();
+        let zero = Moments { mean: 0.0, coefficient_of_variation: 0.0 };
+        assert_eq!(equal.standard_error, zero);
+    }
+
+    /// The scatter of many samples of the exponential law (skewness 2, kurtosis 9) against the
+    /// standard errors of each. The formula for a normal law would be 22 % off.
+    #[test]
+    fn standard_errors_are_those_of_a_skewed_law() {
+        let seed = 6;
+        let (samples, size) = (600_u32, 2100);
+        let mut moments = [Vec::new(), Vec::new()];
+        let mut errors = [0.0; 2];
+        for sample in 0..samples {
+            let indices = (0..size / 21).map(|k| u64::from(sample) * 100 + k);
+            let outcomes: Vec<Outcome> = indices
+                .flat_map(|index| *Germs::draw(seed, index).values())
+                .map(|u| Ok(-libm::log(u)))
+                .collect();
+            let estimate = estimate(&outcomes).unwrap();
+            moments[0].push(estimate.moments.mean);
+            moments[1].push(estimate.moments.coefficient_of_variation);
+            errors[0] += estimate.standard_error.mean / f64::from(samples);
+            errors[1] += estimate.standard_error.coefficient_of_variation / f64::from(samples);
+        }
+        for (values, error) in moments.iter().zip(errors) {
+            let moments = super::moments(values).unwrap();
+            let scatter = moments.mean * moments.coefficient_of_variation;
+            assert!((error / scatter - 1.0).abs() < 0.1, "seed {seed}: {error}, scatter {scatter}");
+        }
+    }
+
+    #[test]
+    fn the_cost_is_the_papers() {
+        let of = |mean, coefficient_of_variation| Moments { mean, coefficient_of_variation };
+        assert_eq!(cost(of(4000.0, 0.02), of(4000.0, 0.02)), 0.0);
+        close(cost(of(4000.0, 0.02), of(3000.0, 0.02)), 0.0625);
+        close(cost(of(4000.0, 0.02), of(4000.0, 0.03)), 0.25);
+        close(cost(of(4000.0, 0.02), of(3000.0, 0.03)), 0.3125);
+    }
+
+    #[test]
+    fn too_many_failures_make_a_point_infeasible() {
+        let data = Moments { mean: 8.0, coefficient_of_variation: 0.25 };
+        let check = |failed: usize, total: usize, fraction: f64, feasible: bool| {
+            let outcomes: Vec<Outcome> = (0..total)
+                .map(|k| {
+                    if k < failed { Err(FailureKind::NoArrival) } else { Ok(3.0 + (k % 2) as f64) }
+                })
+                .collect();
+            let verdict = Verdict::of(&outcomes, fraction);
+            assert_eq!(verdict.feasible, feasible, "{failed} of {total}, {fraction}");
+            assert_eq!(verdict.cost(data).is_finite(), feasible);
+            assert!(!verdict.cost(data).is_nan());
+            assert_eq!(verdict.moments.is_some(), failed < total);
+        };
+        check(0, 100, 0.0, true);
+        check(1, 100, 0.0, false);
+        check(1, 100, 0.01, true);
+        check(2, 100, 0.01, false);
+        check(27, 2700, 0.01, true);
+        check(99, 100, 1.0, true);
+        check(100, 100, 1.0, false);
+        check(0, 0, 1.0, false);
+    }
+
+    #[test]
+    fn a_cost_is_never_nan() {
+        let data = Moments { mean: 4.0, coefficient_of_variation: 0.0 };
+        assert_eq!(Verdict::of(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
+    }
+}

@@ -27,6 +27,7 @@ fn normal_quantiles_agree_with_50_digits() {
 }
 
 /// Rows of comma-separated numbers; lines that start with # are comments.
+#[expect(clippy::unwrap_used, reason = "a table that cannot be read is a failed test")]
 fn table<const N: usize>(text: &str) -> Vec<[f64; N]> {
     let parse = |line: &str| {
         let row: Vec<f64> = line.split(',').map(|number| number.parse().unwrap()).collect();

@@ -135,17 +135,17 @@ fn the_mean_of_the_elasticity_is_the_mean_model() {
         let mut samples = [[Sample::default(); 6]; 6];
         for index in 0..4000 {
             let c = ensemble.bone(index).unwrap().elasticity;
-            for i in 0..6 {
-                for j in 0..6 {
-                    samples[i][j].add(c.rows()[i][j]);
+            for (i, row) in samples.iter_mut().enumerate() {
+                for (j, sample) in row.iter_mut().enumerate() {
+                    sample.add(c.rows()[i][j]);
                     assert_eq!(c.rows()[i][j].to_bits(), c.rows()[j][i].to_bits());
                 }
             }
         }
-        for i in 0..6 {
-            for j in 0..=i {
-                let name = format!("seed {seed}, δ {dispersion}, C({i},{j})");
-                samples[i][j].check(mean.rows()[i][j], &name);
+        for (i, row) in samples.iter().enumerate() {
+            for (j, sample) in row.iter().enumerate().take(i + 1) {
+                sample
+                    .check(mean.rows()[i][j], &format!("seed {seed}, δ {dispersion}, C({i},{j})"));
             }
         }
     }
