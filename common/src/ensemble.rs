@@ -180,14 +180,10 @@ mod tests {
         .unwrap()
     }
 
-    /// Expected values from a ChaCha20 written for this purpose in Python (64-bit counter and
-    /// 64-bit stream, checked against the first block of the published all-zero vector).
-    #[test]
-    fn germs_are_those_of_an_independent_chacha20() {
-        let check = |seed, index, expected: [f64; GERMS]| {
-            assert_eq!(Germs::draw(seed, index).values(), &expected, "({seed}, {index})");
-        };
-        check(
+    /// Seed, index and germs from a ChaCha20 written for this purpose in Python (64-bit counter
+    /// and 64-bit stream, checked against the first block of the published all-zero vector).
+    const PINNED: [(u64, u64, [f64; GERMS]); 3] = [
+        (
             0,
             0,
             [
@@ -213,8 +209,8 @@ mod tests {
                 0.3660221493812755,
                 0.060020156066653174,
             ],
-        );
-        check(
+        ),
+        (
             1,
             2746,
             [
@@ -240,8 +236,8 @@ mod tests {
                 0.05397360116911237,
                 0.943284848860747,
             ],
-        );
-        check(
+        ),
+        (
             (1 << 63) - 1,
             (1 << 40) + 7,
             [
@@ -267,7 +263,14 @@ mod tests {
                 0.33016336474624236,
                 0.9390131258356691,
             ],
-        );
+        ),
+    ];
+
+    #[test]
+    fn germs_are_those_of_an_independent_chacha20() {
+        for (seed, index, expected) in PINNED {
+            assert_eq!(Germs::draw(seed, index).values(), &expected, "({seed}, {index})");
+        }
     }
 
     #[test]

@@ -1,1 +1,32 @@
 //! Jobs, simplex, dispatch, reduction and the public gRPC API of osteon.
+//!
+//! The coordinator is a state ([`state`]), reactions to events ([`event`], [`reactor`]) that are
+//! synchronous and know no clock, and effects ([`effect`]). Around it lies one asynchronous
+//! shell that only moves bytes. [`simplex`] and [`search`] decide the path of a job and know no
+//! worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
+//! a worker solves.
+
+pub mod config;
+mod core_task;
+pub mod effect;
+pub mod evaluation;
+pub mod event;
+pub mod failure;
+pub mod ids;
+pub mod listen;
+mod rate;
+pub mod reactor;
+pub mod sanity;
+pub mod search;
+mod service_jobs;
+mod service_workers;
+mod shell;
+pub mod simplex;
+mod snapshot;
+pub mod state;
+pub mod store;
+mod store_thread;
+
+pub use config::Config;
+pub use listen::{BindError, ListenAddress, Listener};
+pub use shell::{Coordinator, StartError, start};

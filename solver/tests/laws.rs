@@ -1,5 +1,8 @@
 //! Laws of physics that hold for every admissible input.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::needless_range_loop, reason = "matrix indices read as in the formulas")]
+
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::parameters::Point;

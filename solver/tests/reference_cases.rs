@@ -1,5 +1,7 @@
 //! The solver against independent reference solutions (see `tests/reference/README.md`).
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 use std::fs;
 use std::path::PathBuf;
 

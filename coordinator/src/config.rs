@@ -1,0 +1,40 @@
+//! What an operator, or a test, may choose.
+
+use std::time::Duration;
+
+/// Settings of a coordinator. None of them changes a bit of any result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// How often both sides of a worker's stream give a sign of life.
+    pub heartbeat: Duration,
+    /// A lease ends after this long without a message.
+    pub expiry: Duration,
+    /// A worker that gives signs of life but answers nothing that it holds for this long has
+    /// lost its lease too.
+    pub answer_timeout: Duration,
+    /// Computing time that a batch should take.
+    pub batch_target: Duration,
+    /// How often time is looked at; also the shortest interval between two snapshots.
+    pub tick: Duration,
+    /// Most jobs that are computed at a time; the others wait in the order of their acceptance.
+    pub active_jobs_max: usize,
+    /// How long a failed write to the store waits before it is tried again.
+    pub store_retry: Duration,
+    /// Longest time that a shutdown waits for streams to end and for the store.
+    pub shutdown_timeout: Duration,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            heartbeat: Duration::from_secs(2),
+            expiry: Duration::from_secs(10),
+            answer_timeout: Duration::from_secs(600),
+            batch_target: Duration::from_millis(200),
+            tick: Duration::from_millis(100),
+            active_jobs_max: 8,
+            store_retry: Duration::from_secs(2),
+            shutdown_timeout: Duration::from_secs(5),
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The one task that owns the state: messages become events, effects become messages.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use osteon_proto::v1;
+use tokio::sync::{mpsc, oneshot, watch};
+
+use crate::config::Config;
+use crate::effect::{Answer, CloseReason, Effect, Refusal};
+use crate::event::{Event, Hello, Request};
+use crate::ids::{JobId, Token, WorkerId};
+use crate::reactor::react;
+use crate::service_workers::{self, Outbound};
+use crate::snapshot;
+use crate::state::State;
+use crate::store_thread::Command;
+
+/// What reaches the one task.
+pub(crate) enum Message {
+    /// Something happened.
+    Event(Event),
+    /// A client asks, and waits for the answer.
+    Ask(Request, oneshot::Sender<Answer>),
+    /// A client wants to watch a job.
+    Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
+    /// A worker's stream began; what is for it goes to `outbound`.
+    Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
+    /// Stop, and say when.
+    Shutdown(oneshot::Sender<()>),
+}
+
+/// Time since the Unix epoch as it was at the start, monotonic from there.
+pub(crate) struct Clock {
+    started: Instant,
+    epoch: Duration,
+}
+
+impl Clock {
+    pub(crate) fn new() -> Self {
+        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { started: Instant::now(), epoch }
+    }
+
+    pub(crate) fn now(&self) -> Duration {
+        self.epoch + self.started.elapsed()
+    }
+}
+
+/// The task that owns the state.
+pub(crate) struct Core {
+    state: State,
+    clock: Clock,
+    commands: mpsc::Sender<Command>,
+    next_token: u64,
+    waiting: BTreeMap<Token, oneshot::Sender<Answer>>,
+    /// Newest snapshots of jobs that somebody watches.
+    watching: BTreeMap<JobId, watch::Sender<v1::JobSnapshot>>,
+    outbound: BTreeMap<WorkerId, Outbound>,
+    on_stop: Option<oneshot::Sender<()>>,
+    stopped: bool,
+    config: Config,
+}
+
+impl Core {
+    pub(crate) fn new(state: State, clock: Clock, commands: mpsc::Sender<Command>) -> Self {
+        let config = state.config;
+        Self {
+            state,
+            clock,
+            commands,
+            next_token: 0,
+            waiting: BTreeMap::new(),
+            watching: BTreeMap::new(),
+            outbound: BTreeMap::new(),
+            on_stop: None,
+            stopped: false,
+            config,
+        }
+    }
+
+    pub(crate) async fn run(
+        mut self,
+        effects: Vec<Effect>,
+        mut inbox: mpsc::Receiver<Message>,
+        mut from_store: mpsc::Receiver<Event>,
+        tick: Duration,
+    ) {
+        let mut followups = VecDeque::new();
+        self.apply(effects, &mut followups);
+        self.handle(followups);
+        let mut ticks = tokio::time::interval(tick);
+        ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        while !self.stopped {
+            // No branch may starve: the choice is random among those that are ready.
+            tokio::select! {
+                Some(message) = inbox.recv() => self.message(message),
+                Some(event) = from_store.recv() => self.handle(VecDeque::from([event])),
+                _ = ticks.tick() => self.handle(VecDeque::from([Event::Tick])),
+            }
+        }
+    }
+
+    fn message(&mut self, message: Message) {
+        match message {
+            Message::Event(event) => self.handle(VecDeque::from([event])),
+            Message::Ask(request, reply) => {
+                let token = Token(self.next_token);
+                self.next_token += 1;
+                // Those who went away do not wait.
+                self.waiting.retain(|_, reply| !reply.is_closed());
+                self.waiting.insert(token, reply);
+                self.handle(VecDeque::from([Event::Requested { token, request }]));
+            }
+            Message::Watch(job, reply) => self.watch(job, reply),
+            Message::Attach { worker, hello, outbound } => {
+                self.outbound.insert(worker, outbound);
+                self.handle(VecDeque::from([Event::Hello { worker, hello }]));
+            }
+            Message::Shutdown(reply) => {
+                self.on_stop = Some(reply);
+                self.handle(VecDeque::from([Event::Drain]));
+            }
+        }
+    }
+
+    /// Reacts to events, and to those that the effects bring about.
+    fn handle(&mut self, mut events: VecDeque<Event>) {
+        while let Some(event) = events.pop_front() {
+            tracing::trace!(?event);
+            if let Event::StreamEnded { worker } = &event {
+                self.outbound.remove(worker);
+            }
+            let effects = react(&mut self.state, event, self.clock.now());
+            self.apply(effects, &mut events);
+        }
+    }
+
+    fn apply(&mut self, effects: Vec<Effect>, followups: &mut VecDeque<Event>) {
+        for effect in effects {
+            tracing::trace!(?effect);
+            match effect {
+                Effect::Welcome { worker, lease } => {
+                    let welcome = service_workers::welcome(worker, lease, &self.config);
+                    self.send(worker, welcome, followups);
+                }
+                Effect::Send { worker, batch, work } => {
+                    self.send(worker, service_workers::batch(batch, &work), followups);
+                }
+                Effect::Revoke { worker, batch } => {
+                    self.send(worker, service_workers::revoke(batch), followups);
+                }
+                Effect::Heartbeat { worker } => {
+                    self.send(worker, service_workers::heartbeat(), followups);
+                }
+                Effect::Close { worker, reason } => self.close(worker, &reason),
+                Effect::Store(record) => {
+                    let (job, key) = record.key();
+                    if let Err(refused) = self.commands.try_send(Command::Put(record)) {
+                        followups.push_back(Event::StoreFailed {
+                            job,
+                            key,
+                            error: refused.to_string(),
+                        });
+                    }
+                }
+                Effect::Answer { token, answer } => {
+                    if let Some(reply) = self.waiting.remove(&token) {
+                        // The client may have gone.
+                        let _ = reply.send(answer);
+                    }
+                }
+                Effect::Publish { job, snapshot } => self.publish(job, snapshot),
+                Effect::Stop => self.stop(),
+            }
+        }
+    }
+
+    fn send(
+        &mut self,
+        worker: WorkerId,
+        message: v1::AttachResponse,
+        followups: &mut VecDeque<Event>,
+    ) {
+        if let Some(outbound) = self.outbound.get(&worker)
+            && outbound.try_send(Ok(message)).is_err()
+        {
+            // What is in flight is bounded: only who does not read, or is gone, lets it pile up.
+            followups.push_back(Event::Misbehaved { worker, reason: CloseReason::NotReading });
+        }
+    }
+
+    fn close(&mut self, worker: WorkerId, reason: &CloseReason) {
+        tracing::info!(%worker, %reason, "a worker's stream is closed");
+        if let Some(outbound) = self.outbound.remove(&worker) {
+            // A full queue belongs to a worker that does not read; it sees the stream end.
+            let _ = outbound.try_send(Err(service_workers::status(reason)));
+        }
+    }
+
+    fn watch(
+        &mut self,
+        job: JobId,
+        reply: oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>,
+    ) {
+        let answer = match snapshot::of(&self.state, job, self.clock.now()) {
+            None => Err(Refusal::NoJob { job }),
+            Some(snapshot) => {
+                let sender =
+                    self.watching.entry(job).or_insert_with(|| watch::Sender::new(snapshot));
+                Ok(sender.subscribe())
+            }
+        };
+        let ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
+            receiver.borrow().state() == v1::JobState::Ended
+        };
+        if answer.as_ref().is_ok_and(ended) {
+            self.watching.remove(&job);
+        }
+        // The client may have gone.
+        let _ = reply.send(answer);
+    }
+
+    fn publish(&mut self, job: JobId, snapshot: v1::JobSnapshot) {
+        let ended = snapshot.state() == v1::JobState::Ended;
+        if let Some(watching) = self.watching.get(&job) {
+            watching.send_replace(snapshot);
+            if ended || watching.receiver_count() == 0 {
+                self.watching.remove(&job);
+            }
+        }
+    }
+
+    fn stop(&mut self) {
+        self.stopped = true;
+        self.watching.clear();
+        if let Some(reply) = self.on_stop.take() {
+            // Who asked may not wait any more.
+            let _ = reply.send(());
+        }
+    }
+}

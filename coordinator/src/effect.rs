@@ -1,0 +1,240 @@
+//! Everything that a coordinator does to the world: one closed list.
+
+use std::time::Duration;
+
+use osteon_proto::batch::Work;
+use osteon_proto::malformed::Malformed;
+use osteon_proto::v1::JobSnapshot;
+use thiserror::Error;
+
+use crate::event::RecordKey;
+use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+
+/// Something to do.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Tell a worker that it is attached.
+    Welcome {
+        /// The worker.
+        worker: WorkerId,
+        /// Its lease.
+        lease: LeaseId,
+    },
+    /// Send a batch.
+    Send {
+        /// To this worker.
+        worker: WorkerId,
+        /// Number of the batch.
+        batch: BatchId,
+        /// What to compute.
+        work: Work,
+    },
+    /// Tell a worker to forget a batch.
+    Revoke {
+        /// The worker.
+        worker: WorkerId,
+        /// The batch.
+        batch: BatchId,
+    },
+    /// Give a worker a sign of life.
+    Heartbeat {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// End a worker's stream.
+    Close {
+        /// The worker.
+        worker: WorkerId,
+        /// Why.
+        reason: CloseReason,
+    },
+    /// Make a record durable, then report it.
+    Store(Record),
+    /// Answer a request.
+    Answer {
+        /// Which.
+        token: Token,
+        /// With this.
+        answer: Answer,
+    },
+    /// Show those who watch a job how it stands.
+    Publish {
+        /// The job.
+        job: JobId,
+        /// How it stands.
+        snapshot: JobSnapshot,
+    },
+    /// Nothing is left to do: everything stored, every stream closed.
+    Stop,
+}
+
+/// A record to store.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// An accepted job.
+    Job(JobRecord),
+    /// A complete evaluation.
+    Evaluation(EvaluationRecord),
+    /// The end of a job.
+    End(EndRecord),
+}
+
+impl Record {
+    /// The job and the name of the record.
+    pub fn key(&self) -> (JobId, RecordKey) {
+        match self {
+            Self::Job(record) => (record.job, RecordKey::Job),
+            Self::Evaluation(record) => (record.job, RecordKey::Evaluation(record.number)),
+            Self::End(record) => (record.job, RecordKey::End),
+        }
+    }
+}
+
+/// Answer to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// The job is accepted and durable.
+    Submitted(JobId),
+    /// How a job stands.
+    Snapshot(JobSnapshot),
+    /// A page of jobs.
+    Page {
+        /// Oldest first.
+        snapshots: Vec<JobSnapshot>,
+        /// The last of them, if there are more.
+        more_after: Option<JobId>,
+    },
+    /// The job has ended; what it left is in the store.
+    Ended {
+        /// The job.
+        record: JobRecord,
+        /// Its end.
+        end: EndRecord,
+    },
+    /// The request is refused.
+    Refused(Refusal),
+}
+
+/// Why a request is refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Refusal {
+    /// There is no such job.
+    #[error("there is no job {job}; `osteon jobs` lists those there are")]
+    NoJob {
+        /// The job asked for.
+        job: JobId,
+    },
+    /// The request id belongs to a job with another specification.
+    #[error(
+        "request id `{request_id}` belongs to job {job}, which has another specification; \
+         choose another request id"
+    )]
+    RequestIdTaken {
+        /// The request id.
+        request_id: String,
+        /// The job it belongs to.
+        job: JobId,
+    },
+    /// Too many jobs wait or run.
+    #[error(
+        "{limit} jobs wait or run already, the most allowed; submit again when some have ended"
+    )]
+    TooManyJobs {
+        /// Most jobs allowed.
+        limit: usize,
+    },
+    /// The job has not ended.
+    #[error("job {job} has not ended; wait for it with `osteon watch {job}`")]
+    NotEnded {
+        /// The job.
+        job: JobId,
+    },
+    /// The coordinator is stopping.
+    #[error("the coordinator is shutting down; try again when it is back")]
+    Draining,
+    /// The store refused the job.
+    #[error("the job could not be stored and is not accepted: {error}")]
+    Store {
+        /// What the store said.
+        error: String,
+    },
+}
+
+/// Why a worker's stream is closed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CloseReason {
+    /// Its numerics differ from the coordinator's.
+    #[error(
+        "this worker's numerics are `{worker}`, the coordinator's are `{coordinator}`; \
+         results would not be reproducible: run the same version of osteon on both"
+    )]
+    FingerprintDiffers {
+        /// Fingerprint of the worker.
+        worker: String,
+        /// Fingerprint of the coordinator.
+        coordinator: String,
+    },
+    /// An impossible number of threads.
+    #[error("this worker announces {threads} threads; 1 to {max} are allowed")]
+    Threads {
+        /// What it announced.
+        threads: u32,
+        /// Most threads allowed.
+        max: u32,
+    },
+    /// A name of its introduction is too long.
+    #[error("a name in this worker's hello has {bytes} bytes; at most {max} are allowed")]
+    NameTooLong {
+        /// Its length.
+        bytes: usize,
+        /// Most bytes allowed.
+        max: usize,
+    },
+    /// Too many workers are attached.
+    #[error("{limit} workers are attached already, the most allowed; attach again later")]
+    TooManyWorkers {
+        /// Most workers allowed.
+        limit: usize,
+    },
+    /// Nothing was heard of it.
+    #[error("nothing was heard of this worker for {silent:?}; its lease has ended, attach again")]
+    Expired {
+        /// For how long.
+        silent: Duration,
+    },
+    /// It lives, but does not answer.
+    #[error(
+        "this worker has not answered anything it holds for {waited:?}; its lease has ended, \
+         attach again"
+    )]
+    Unanswering {
+        /// For how long.
+        waited: Duration,
+    },
+    /// It does not read what is sent to it.
+    #[error("this worker does not read its stream; its lease has ended, attach again")]
+    NotReading,
+    /// A message that no worker of this version sends.
+    #[error("a message of this worker is malformed: {0}")]
+    Malformed(#[from] Malformed),
+    /// An answer of the wrong length.
+    #[error("the answer to batch {batch} has {found} realizations, expected {expected}")]
+    WrongCount {
+        /// The batch.
+        batch: BatchId,
+        /// How many it has.
+        found: usize,
+        /// How many it must have.
+        expected: u64,
+    },
+    /// A second hello.
+    #[error("this worker said hello twice on one stream")]
+    SecondHello,
+    /// It wanted to leave, and has answered everything.
+    #[error("this worker has drained")]
+    Drained,
+    /// The coordinator is stopping.
+    #[error("the coordinator is shutting down; attach again when it is back")]
+    Draining,
+}

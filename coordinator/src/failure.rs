@@ -1,0 +1,59 @@
+//! Why a job fails for other reasons than its search.
+
+use osteon_common::outcome::{Outcome, encode};
+use osteon_common::parameters::Point;
+use thiserror::Error;
+
+use crate::evaluation::Contradiction;
+use crate::search::ReplayError;
+
+/// A failure of a job.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Failure {
+    /// Two answers for one index differ.
+    #[error(
+        "integrity error: two workers answered realization {} at the point {:?} differently, \
+         {} and {}; one of them computes wrongly: run the job on each machine alone and compare \
+         the digests",
+        contradiction.index, point.0, shown(contradiction.earlier), shown(contradiction.later)
+    )]
+    Contradiction {
+        /// The answers.
+        contradiction: Contradiction,
+        /// The point.
+        point: Point,
+    },
+    /// Workers vanish over one realization.
+    #[error(
+        "realization {index} was alone on three workers that vanished; to reproduce it, fix \
+         [parameters] at {:?} (density, longitudinal_young_modulus, longitudinal_poisson_ratio, \
+         longitudinal_shear_modulus, transverse_young_modulus, transverse_poisson_ratio, \
+         dispersion) and run `osteon draw JOB.toml --index {index}`, then `osteon simulate`",
+        point.0
+    )]
+    LethalRealization {
+        /// Index of the realization.
+        index: u64,
+        /// The point.
+        point: Point,
+    },
+    /// The store does not take a record of the job.
+    #[error(
+        "the store does not take the job's records: {error}; make room or repair it and start the \
+         coordinator again: the job continues from its last stored evaluation"
+    )]
+    Store {
+        /// What the store said last.
+        error: String,
+    },
+    /// The stored evaluations are not those of the job's search.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+}
+
+fn shown(outcome: Outcome) -> String {
+    match outcome {
+        Ok(velocity) => format!("{velocity} m/s (bits {:016x})", encode(outcome).1.to_bits()),
+        Err(kind) => kind.name().to_owned(),
+    }
+}

@@ -1,0 +1,209 @@
+//! Where a coordinator listens: a TCP address or a Unix socket.
+//!
+//! Without TLS, which this build does not have, every local user is trusted and nobody else:
+//! an address that other machines can reach is refused unless the operator insists.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use thiserror::Error;
+use tokio::net::{TcpListener, UnixListener, UnixStream};
+
+/// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. Port 0
+/// takes a free port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ListenAddress {
+    /// A TCP address.
+    Tcp(SocketAddr),
+    /// Path of a Unix socket.
+    Unix(PathBuf),
+}
+
+/// A text that is no address to listen on.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "`{text}` is no address to listen on; write IP:PORT (for example 127.0.0.1:0, where port 0 \
+     takes a free port), [IPV6]:PORT, localhost:PORT, or unix:PATH"
+)]
+pub struct AddressError {
+    /// What was given.
+    pub text: String,
+}
+
+/// Why an address cannot be listened on.
+#[derive(Debug, Error)]
+pub enum BindError {
+    /// Other machines could reach it.
+    #[error(
+        "{address} can be reached from other machines, and this build has no TLS to protect it; \
+         listen on 127.0.0.1, on [::1] or on unix:PATH, or pass --insecure to trust everybody who \
+         can reach the port"
+    )]
+    NotLoopback {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// The operating system refused a TCP address.
+    #[error("cannot listen on {address}: {source}; choose another port, or port 0")]
+    Tcp {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        source: io::Error,
+    },
+    /// The operating system refused a Unix socket.
+    #[error("cannot listen on unix:{}: {source}", path.display())]
+    Unix {
+        /// The path.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Another coordinator listens there.
+    #[error("another process listens on unix:{} already; choose another path", path.display())]
+    InUse {
+        /// The path.
+        path: PathBuf,
+    },
+}
+
+/// A bound address, ready to be served by [`crate::start`].
+#[derive(Debug)]
+pub struct Listener {
+    pub(crate) socket: Socket,
+    url: String,
+}
+
+#[derive(Debug)]
+pub(crate) enum Socket {
+    Tcp(TcpListener),
+    Unix(UnixListener, SocketFile),
+}
+
+/// The file of a Unix socket; removed with the last that needs it.
+#[derive(Debug)]
+pub(crate) struct SocketFile(PathBuf);
+
+impl Listener {
+    /// Binds an address. `insecure` allows one that other machines can reach.
+    ///
+    /// A socket file that nobody listens on, as a killed process leaves it, is replaced.
+    ///
+    /// # Errors
+    /// When the address is not a local one, in use, or refused by the operating system.
+    pub async fn bind(address: &ListenAddress, insecure: bool) -> Result<Self, BindError> {
+        match address {
+            ListenAddress::Tcp(address) => Self::bind_tcp(*address, insecure).await,
+            ListenAddress::Unix(path) => Self::bind_unix(path).await,
+        }
+    }
+
+    /// URL that clients and workers use: `http://127.0.0.1:PORT` or `unix:PATH`.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    async fn bind_tcp(address: SocketAddr, insecure: bool) -> Result<Self, BindError> {
+        if !address.ip().is_loopback() && !insecure {
+            return Err(BindError::NotLoopback { address });
+        }
+        let refused = |source| BindError::Tcp { address, source };
+        let listener = TcpListener::bind(address).await.map_err(refused)?;
+        let url = format!("http://{}", listener.local_addr().map_err(refused)?);
+        Ok(Self { socket: Socket::Tcp(listener), url })
+    }
+
+    async fn bind_unix(path: &Path) -> Result<Self, BindError> {
+        let refused = |source| BindError::Unix { path: path.to_owned(), source };
+        let listener = match UnixListener::bind(path) {
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
+                if UnixStream::connect(path).await.is_ok() {
+                    return Err(BindError::InUse { path: path.to_owned() });
+                }
+                std::fs::remove_file(path).map_err(refused)?;
+                UnixListener::bind(path).map_err(refused)?
+            }
+            bound => bound.map_err(refused)?,
+        };
+        let url = format!("unix:{}", path.display());
+        Ok(Self { socket: Socket::Unix(listener, SocketFile(path.to_owned())), url })
+    }
+}
+
+impl FromStr for ListenAddress {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let unreadable = || AddressError { text: text.to_owned() };
+        if let Some(path) = text.strip_prefix("unix:") {
+            return if path.is_empty() { Err(unreadable()) } else { Ok(Self::Unix(path.into())) };
+        }
+        let numeric = match text.strip_prefix("localhost:") {
+            Some(port) => format!("127.0.0.1:{port}"),
+            None => text.to_owned(),
+        };
+        numeric.parse().map(Self::Tcp).map_err(|_| unreadable())
+    }
+}
+
+impl Drop for SocketFile {
+    fn drop(&mut self) {
+        // Nothing can be done about a file that somebody else removed.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_read_or_refused() {
+        let tcp = |text: &str| Some(ListenAddress::Tcp(text.parse().unwrap()));
+        for (text, expected) in [
+            ("127.0.0.1:0", tcp("127.0.0.1:0")),
+            ("[::1]:7000", tcp("[::1]:7000")),
+            ("localhost:7000", tcp("127.0.0.1:7000")),
+            ("unix:/tmp/o.sock", Some(ListenAddress::Unix("/tmp/o.sock".into()))),
+            ("unix:", None),
+            ("", None),
+            ("127.0.0.1", None),
+            ("127.0.0.1:65536", None),
+            ("http://127.0.0.1:1", None),
+        ] {
+            assert_eq!(text.parse::<ListenAddress>().ok(), expected, "{text}");
+        }
+    }
+
+    #[tokio::test]
+    async fn other_machines_are_let_in_only_on_request() {
+        let everywhere = "0.0.0.0:0".parse().unwrap();
+        let error = Listener::bind(&everywhere, false).await.unwrap_err();
+        assert!(error.to_string().contains("--insecure"), "{error}");
+        assert!(error.to_string().contains("no TLS"), "{error}");
+        assert!(Listener::bind(&everywhere, true).await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn port_zero_takes_a_free_port() {
+        let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
+        let port = listener.url().strip_prefix("http://127.0.0.1:").unwrap();
+        assert_ne!(port.parse::<u16>().unwrap(), 0);
+    }
+
+    #[tokio::test]
+    async fn a_dead_socket_is_replaced_and_a_live_one_is_not() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("o.sock");
+        let address = ListenAddress::Unix(path.clone());
+        // A process that was killed leaves the file.
+        drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
+        let listener = Listener::bind(&address, false).await.unwrap();
+        let error = Listener::bind(&address, false).await.unwrap_err();
+        assert!(matches!(error, BindError::InUse { .. }), "{error}");
+        drop(listener);
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,142 @@
+//! Answers to batches, and batches whose worker is lost.
+
+use std::time::Duration;
+
+use osteon_common::outcome::Outcome;
+
+use super::{Effects, jobs, workers};
+use crate::effect::{CloseReason, Effect};
+use crate::failure::Failure;
+use crate::ids::{BatchId, JobId, WorkerId};
+use crate::state::{Assignment, Batch, State};
+
+/// Workers that must be lost while alone with a realization before it fails its job.
+pub(crate) const LOST_ALONE_MAX: u32 = 3;
+/// Weight of the newest measurement in a worker's rate.
+const RATE_WEIGHT: f64 = 0.5;
+/// A shorter computing time than this is not believed, s.
+const ELAPSED_MIN_S: f64 = 1e-6;
+
+/// Takes a worker's answer. Of a batch that was settled before (a copy was faster, or the answer
+/// came twice) it is only compared with what is known; of an unknown batch it means nothing.
+pub(super) fn answered(
+    state: &mut State,
+    worker: WorkerId,
+    batch: BatchId,
+    outcomes: &[Outcome],
+    elapsed_s: f64,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let Some(attached) = state.workers.get_mut(&worker) else {
+        return;
+    };
+    attached.heard = now;
+    attached.answered = now;
+    let held = state.batches.get(&batch).filter(|held| held.worker == worker);
+    let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
+    let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
+        return;
+    };
+    let (found, expected) = (outcomes.len(), assignment.indices.count);
+    if found as u64 != expected {
+        let reason = CloseReason::WrongCount { batch, found, expected };
+        workers::close(state, worker, reason, now, effects);
+        return;
+    }
+    if held.is_some()
+        && let Some(held) = state.settle(batch)
+    {
+        measure(state, &held, elapsed_s, now);
+        if let Some(twin) = held.twin {
+            revoke(state, twin, now, effects);
+        }
+    }
+    fill(state, &assignment, outcomes, now, effects);
+    workers::dismiss_if_drained(state, worker, now, effects);
+}
+
+/// Takes back a batch, telling its worker to forget it.
+pub(super) fn revoke(state: &mut State, batch: BatchId, now: Duration, effects: &mut Effects) {
+    if let Some(revoked) = state.settle(batch) {
+        effects.push(Effect::Revoke { worker: revoked.worker, batch });
+        workers::dismiss_if_drained(state, revoked.worker, now, effects);
+    }
+}
+
+/// Takes back every batch of a job.
+pub(super) fn revoke_all(state: &mut State, job: JobId, now: Duration, effects: &mut Effects) {
+    let of_job = state.batches.iter().filter(|(_, batch)| batch.assignment.job == job);
+    let batches: Vec<BatchId> = of_job.map(|(id, _)| *id).collect();
+    for batch in batches {
+        revoke(state, batch, now, effects);
+    }
+}
+
+/// Hands the indices of a lost worker's batch back, unless a copy of it lives. `alone` says that
+/// the worker held nothing else, `leaving` that it had announced its end.
+pub(super) fn orphaned(
+    state: &mut State,
+    batch: BatchId,
+    alone: bool,
+    leaving: bool,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let Some(Batch { assignment, twin, .. }) = state.settle(batch) else {
+        return;
+    };
+    let Some(evaluation) = state.evaluation_mut(assignment.job) else {
+        return;
+    };
+    if twin.is_some() {
+        return;
+    }
+    let Assignment { job, indices, .. } = assignment;
+    if indices.count > 1 || leaving {
+        evaluation.put_back_in_halves(indices);
+    } else if evaluation.suspect(indices.first, alone) >= LOST_ALONE_MAX {
+        let (index, point) = (indices.first, evaluation.point);
+        jobs::fail(state, job, &Failure::LethalRealization { index, point }, now, effects);
+    }
+}
+
+fn fill(
+    state: &mut State,
+    assignment: &Assignment,
+    outcomes: &[Outcome],
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let Assignment { job, evaluation: number, indices } = *assignment;
+    let Some(evaluation) = state.evaluation_mut(job).filter(|found| found.number == number) else {
+        return;
+    };
+    let before = evaluation.filled();
+    let filled = evaluation.fill(indices, outcomes);
+    let news = evaluation.filled() - before;
+    let point = evaluation.point;
+    if let Some(job) = state.jobs.get_mut(&job) {
+        job.rate.add(news, now);
+        job.progressed = now;
+    }
+    state.changed.insert(job);
+    match filled {
+        Ok(()) => jobs::store_if_complete(state, job, effects),
+        Err(contradiction) => {
+            let failure = Failure::Contradiction { contradiction, point };
+            jobs::fail(state, job, &failure, now, effects);
+        }
+    }
+}
+
+/// Learns from an answer how fast its worker is at its job.
+fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
+    let believed = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
+    let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
+    let rate = batch.assignment.indices.count as f64 / if believed { elapsed_s } else { waited_s };
+    if let Some(worker) = state.workers.get_mut(&batch.worker) {
+        let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
+        *known += RATE_WEIGHT * (rate - *known);
+    }
+}

@@ -1,0 +1,188 @@
+//! Who computes what next.
+//!
+//! Workers are served in the order of how little they hold, jobs in turn, batch by batch. A batch
+//! is sized from the worker's measured rate to the target time, and to at most a quarter of the
+//! worker's share of what remains of the evaluation, so that all workers end together; but while
+//! its share allows, no batch is smaller than the worker's threads. A worker that has nothing to
+//! do gets a copy of the batch that is out longest.
+
+use std::ops::Bound;
+use std::time::Duration;
+
+use osteon_common::limits::BATCH_REALIZATIONS_MAX;
+
+use super::Effects;
+use crate::effect::Effect;
+use crate::evaluation::Indices;
+use crate::ids::{BatchId, JobId, WorkerId};
+use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Stage, State, Worker};
+
+/// Realizations for each thread in a worker's first batch of a job: enough to measure its rate,
+/// little enough to be soon answered.
+const FIRST_BATCH_PER_THREAD: u32 = 4;
+/// A batch holds at most one in so many of a worker's share of what remains.
+const SHARE_DIVISOR: f64 = 4.0;
+
+/// Hands out batches while there is credit and work, then copies.
+pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) {
+    if state.draining {
+        return;
+    }
+    while let Some(worker) = next_worker(state) {
+        if !(hand_suspect(state, worker, now, effects) || hand_batch(state, worker, now, effects)) {
+            break;
+        }
+    }
+    copy_slowest(state, now, effects);
+}
+
+/// The worker with credit that holds least; of equal ones the first.
+fn next_worker(state: &State) -> Option<WorkerId> {
+    let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
+    let with_credit = state.workers.iter().filter(|(_, worker)| {
+        !worker.draining
+            && worker.in_flight.len() < BATCHES_IN_FLIGHT_MAX
+            && !worker.in_flight.iter().any(exclusive)
+    });
+    with_credit.min_by_key(|(id, worker)| (worker.in_flight.len(), **id)).map(|(id, _)| *id)
+}
+
+/// Gives an idle worker a realization that was alone on a lost worker, and nothing else.
+fn hand_suspect(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) -> bool {
+    if state.workers.get(&worker).is_none_or(|worker| !worker.in_flight.is_empty()) {
+        return false;
+    }
+    let active: Vec<JobId> = state.active.iter().copied().collect();
+    for job in active {
+        let Some(evaluation) = state.evaluation_mut(job) else {
+            continue;
+        };
+        let number = evaluation.number;
+        if let Some(index) = evaluation.quarantine.pop_front() {
+            let indices = Indices { first: index, count: 1 };
+            let assignment = Assignment { job, evaluation: number, indices };
+            send(state, worker, assignment, None, true, now, effects);
+            return true;
+        }
+    }
+    false
+}
+
+/// Gives a worker a batch of the job whose turn it is.
+fn hand_batch(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) -> bool {
+    let Some(job) = next_job(state) else {
+        return false;
+    };
+    let Some(Stage::Computing(evaluation)) = state.jobs.get(&job).map(|job| &job.stage) else {
+        return false;
+    };
+    let Some(attached) = state.workers.get(&worker) else {
+        return false;
+    };
+    let size = batch_size(state, attached, job, evaluation.queued());
+    let Some(evaluation) = state.evaluation_mut(job) else {
+        return false;
+    };
+    let number = evaluation.number;
+    let Some(indices) = evaluation.take(size) else {
+        return false;
+    };
+    state.last_served = Some(job);
+    let assignment = Assignment { job, evaluation: number, indices };
+    send(state, worker, assignment, None, false, now, effects);
+    true
+}
+
+/// The first active job with work after the one that was served last, in a circle.
+fn next_job(state: &State) -> Option<JobId> {
+    let has_work = |id: &&JobId| match state.jobs.get(id).map(|job| &job.stage) {
+        Some(Stage::Computing(evaluation)) => !evaluation.queue.is_empty(),
+        _ => false,
+    };
+    let after = match state.last_served {
+        Some(job) => (Bound::Excluded(job), Bound::Unbounded),
+        None => (Bound::Unbounded, Bound::Unbounded),
+    };
+    state.active.range(after).find(has_work).or_else(|| state.active.iter().find(has_work)).copied()
+}
+
+/// Realizations of `job`, of which `queued` are left, that `attached` should get at once.
+pub(super) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u64) -> u64 {
+    let per_thread = mean_rate_per_thread(state, job);
+    let weight = |worker: &Worker| {
+        worker.rates.get(&job).copied().unwrap_or(f64::from(worker.hello.threads) * per_thread)
+    };
+    let total: f64 = state.workers.values().filter(|worker| !worker.draining).map(weight).sum();
+    let share = queued as f64 * weight(attached) / total;
+    let threads = f64::from(attached.hello.threads);
+    let most = (share / SHARE_DIVISOR).max(threads.min(share)).ceil();
+    let target = match attached.rates.get(&job) {
+        Some(rate) => rate * state.config.batch_target.as_secs_f64(),
+        None => f64::from(FIRST_BATCH_PER_THREAD) * threads,
+    };
+    // `as` saturates, and takes NaN for 0.
+    (target.min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
+}
+
+/// Mean rate of one thread at `job` over the workers that are measured; 1 if none is.
+fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
+    let measured = state
+        .workers
+        .values()
+        .filter_map(|worker| Some((*worker.rates.get(&job)?, f64::from(worker.hello.threads))));
+    let (rates, threads) = measured.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    if threads > 0.0 { rates / threads } else { 1.0 }
+}
+
+/// Gives each idle worker a copy of the batch that is out longest elsewhere. Batches younger than
+/// half the target time are about to be answered and are not worth a copy.
+fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
+    let idle = |worker: &Worker| !worker.draining && worker.in_flight.is_empty();
+    let idle: Vec<WorkerId> =
+        state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
+    for worker in idle {
+        let Some(slowest) = slowest_elsewhere(state, worker, now) else {
+            continue;
+        };
+        let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
+            continue;
+        };
+        send(state, worker, assignment, Some(slowest), false, now, effects);
+    }
+}
+
+fn slowest_elsewhere(state: &State, worker: WorkerId, now: Duration) -> Option<BatchId> {
+    let patience = state.config.batch_target / 2;
+    let worth_a_copy = |batch: &Batch| {
+        batch.worker != worker
+            && batch.twin.is_none()
+            && !batch.exclusive
+            && now.saturating_sub(batch.sent) >= patience
+    };
+    let candidates = state.batches.iter().filter(|(_, batch)| worth_a_copy(batch));
+    candidates.min_by_key(|(id, batch)| (batch.sent, **id)).map(|(id, _)| *id)
+}
+
+fn send(
+    state: &mut State,
+    worker: WorkerId,
+    assignment: Assignment,
+    twin: Option<BatchId>,
+    exclusive: bool,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let Some(work) = state.work(&assignment) else {
+        return;
+    };
+    let id = BatchId(state.next_batch);
+    state.next_batch += 1;
+    state.batches.insert(id, Batch { assignment, worker, sent: now, twin, exclusive });
+    if let Some(twin) = twin.and_then(|twin| state.batches.get_mut(&twin)) {
+        twin.twin = Some(id);
+    }
+    if let Some(worker) = state.workers.get_mut(&worker) {
+        worker.in_flight.push(id);
+    }
+    effects.push(Effect::Send { worker, batch: id, work });
+}

@@ -1,0 +1,187 @@
+//! Events against a recording sink: after each, exactly the expected effects, and nothing else;
+//! after each, the whole state fits together.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::case::Setup;
+use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+use osteon_common::outcome::Outcome;
+use osteon_common::version;
+
+use super::*;
+use crate::config::Config;
+use crate::effect::{Answer, Record};
+use crate::event::{Hello, RecordKey, Request};
+use crate::ids::{BatchId, JobId, Token, WorkerId};
+use crate::sanity::sanity_check;
+
+mod dispatch;
+mod jobs;
+mod lost;
+mod workers;
+
+/// A coordinator with a clock that the test moves.
+struct Rig {
+    state: State,
+    now: Duration,
+}
+
+impl Rig {
+    fn new() -> Self {
+        let config = Config { active_jobs_max: 2, ..Config::default() };
+        Self { state: State::new(config, Duration::ZERO), now: Duration::ZERO }
+    }
+
+    /// A rig with a propagation of so many realizations, job 1, and workers 1, 2, … of so many
+    /// threads, who hold what they got.
+    fn with(realizations: u64, threads: &[u32]) -> Self {
+        let mut rig = Self::new();
+        rig.accept(propagation(realizations));
+        for (worker, threads) in (1..).zip(threads) {
+            rig.event(hello(worker, *threads));
+        }
+        rig
+    }
+
+    /// Submits a job and stores it.
+    fn accept(&mut self, specification: JobSpecification) -> JobId {
+        let job = JobId(self.state.next_job);
+        self.event(submit(0, "", specification));
+        self.event(Event::Stored { job, key: RecordKey::Job });
+        job
+    }
+
+    /// What an event brings about, in words.
+    fn event(&mut self, event: Event) -> Vec<String> {
+        let effects = react(&mut self.state, event, self.now);
+        if let Err(insane) = sanity_check(&self.state) {
+            panic!("{insane}\n{:#?}", self.state);
+        }
+        effects.iter().map(described).collect()
+    }
+
+    /// Asserts that an event brings about these effects and nothing else.
+    #[track_caller]
+    fn check(&mut self, event: Event, expected: &[&str]) {
+        let shown = format!("{event:?}");
+        assert_eq!(self.event(event), expected, "after {shown}");
+    }
+
+    /// Lets time pass and asserts what a tick then brings about, snapshots and signs of life aside.
+    #[track_caller]
+    fn check_after(&mut self, time: Duration, expected: &[&str]) {
+        self.now += time;
+        let mut effects = self.event(Event::Tick);
+        effects.retain(|effect| !effect.starts_with("publish") && !effect.starts_with("beat"));
+        assert_eq!(effects, expected);
+    }
+
+    /// A worker is heard of.
+    fn hear(&mut self, worker: u64) {
+        self.check(Event::Heartbeat { worker: WorkerId(worker) }, &[]);
+    }
+}
+
+fn propagation(realizations: u64) -> JobSpecification {
+    JobSpecification {
+        kind: JobKind::Propagation,
+        setup: Setup::default(),
+        data: None,
+        parameters: [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
+        monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
+        objective: Objective::default(),
+        search: Search::default(),
+    }
+}
+
+fn identification(realizations: u64) -> JobSpecification {
+    let mut job = propagation(realizations);
+    job.kind = JobKind::Identification;
+    job.data = Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 });
+    job.parameters[6] = Range::Free { start: 0.1, lower: 0.02, upper: 0.3 };
+    job
+}
+
+fn submit(token: u64, request_id: &str, specification: JobSpecification) -> Event {
+    let request = Request::Submit {
+        specification: Arc::new(specification),
+        request_id: request_id.to_owned(),
+    };
+    Event::Requested { token: Token(token), request }
+}
+
+fn request(token: u64, request: Request) -> Event {
+    Event::Requested { token: Token(token), request }
+}
+
+fn stored(job: u64, key: RecordKey) -> Event {
+    Event::Stored { job: JobId(job), key }
+}
+
+fn hello(worker: u64, threads: u32) -> Event {
+    let hello = Hello {
+        version: version::VERSION.to_owned(),
+        fingerprint: version::fingerprint(),
+        threads,
+        host: "node".to_owned(),
+        process: 42,
+    };
+    Event::Hello { worker: WorkerId(worker), hello }
+}
+
+/// An answer whose velocities follow from the indices, computed in `elapsed_s`.
+fn answer_in(elapsed_s: f64, worker: u64, batch: u64, first: u64, count: u64) -> Event {
+    let outcomes = (first..first + count).map(velocity).collect();
+    Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), outcomes, elapsed_s }
+}
+
+fn answer(worker: u64, batch: u64, first: u64, count: u64) -> Event {
+    answer_in(0.1, worker, batch, first, count)
+}
+
+fn velocity(index: u64) -> Outcome {
+    Ok(3900.0 + index as f64)
+}
+
+fn end_of_stream(worker: u64) -> Event {
+    Event::StreamEnded { worker: WorkerId(worker) }
+}
+
+fn described(effect: &Effect) -> String {
+    match effect {
+        Effect::Welcome { worker, lease } => format!("welcome {worker}, lease {lease}"),
+        Effect::Send { worker, batch, work } => {
+            format!("send {worker}: batch {batch} = {}+{}", work.first, work.count)
+        }
+        Effect::Revoke { worker, batch } => format!("revoke {worker}: batch {batch}"),
+        Effect::Heartbeat { worker } => format!("beat {worker}"),
+        Effect::Close { worker, reason } => format!("close {worker}: {reason}"),
+        Effect::Store(Record::Job(record)) => format!("store job {}", record.job),
+        Effect::Store(Record::Evaluation(record)) => {
+            format!("store job {} evaluation {}", record.job, record.number)
+        }
+        Effect::Store(Record::End(record)) => {
+            let reason = record.ending.reason.as_deref().unwrap_or_default();
+            format!("store job {} end: {} {reason}", record.job, record.ending.status.name())
+        }
+        Effect::Answer { token, answer } => format!("answer {token}: {}", answered(answer)),
+        Effect::Publish { job, .. } => format!("publish {job}"),
+        Effect::Stop => "stop".to_owned(),
+    }
+}
+
+fn answered(answer: &Answer) -> String {
+    match answer {
+        Answer::Submitted(job) => format!("job {job}"),
+        Answer::Snapshot(snapshot) => {
+            format!("{:?} {:?}", snapshot.state(), snapshot.status())
+        }
+        Answer::Page { snapshots, more_after } => {
+            let jobs: Vec<&str> = snapshots.iter().map(|snapshot| snapshot.job.as_str()).collect();
+            format!("{jobs:?}, more after {more_after:?}")
+        }
+        Answer::Ended { record, .. } => format!("ended {}", record.job),
+        Answer::Refused(refusal) => refusal.to_string(),
+    }
+}

@@ -1,0 +1,134 @@
+//! Workers: admitted, refused, silent, leaving.
+
+use super::*;
+use crate::effect::CloseReason;
+
+#[test]
+fn every_attachment_has_a_new_lease() {
+    let mut rig = Rig::new();
+    rig.check(hello(5, 1), &["welcome 5, lease 1"]);
+    rig.check(end_of_stream(5), &[]);
+    rig.check(hello(6, 4096), &["welcome 6, lease 2"]);
+}
+
+#[test]
+fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
+    let with = |change: fn(&mut Hello)| {
+        let Event::Hello { worker, mut hello } = hello(1, 1) else { panic!("no hello") };
+        change(&mut hello);
+        Event::Hello { worker, hello }
+    };
+    let fingerprint = format!(
+        "close 1: this worker's numerics are `other`, the coordinator's are `{}`; results would \
+         not be reproducible: run the same version of osteon on both",
+        version::fingerprint()
+    );
+    for (event, expected) in [
+        (with(|hello| hello.fingerprint = "other".to_owned()), fingerprint.as_str()),
+        (
+            with(|hello| hello.threads = 0),
+            "close 1: this worker announces 0 threads; 1 to 4096 are allowed",
+        ),
+        (
+            with(|hello| hello.threads = 4097),
+            "close 1: this worker announces 4097 threads; 1 to 4096 are allowed",
+        ),
+        (
+            with(|hello| hello.host = "x".repeat(257)),
+            "close 1: a name in this worker's hello has 257 bytes; at most 256 are allowed",
+        ),
+    ] {
+        let mut rig = Rig::with(100, &[]);
+        rig.check(event, &[expected]);
+        // Later messages of a refused worker mean nothing.
+        rig.check(Event::Heartbeat { worker: WorkerId(1) }, &[]);
+        rig.check(answer(1, 1, 0, 1), &[]);
+        rig.check(end_of_stream(1), &[]);
+    }
+}
+
+#[test]
+fn a_second_hello_ends_the_stream() {
+    let mut rig = Rig::new();
+    rig.check(hello(1, 1), &["welcome 1, lease 1"]);
+    rig.check(hello(1, 1), &["close 1: this worker said hello twice on one stream"]);
+    rig.check(hello(2, 1), &["welcome 2, lease 2"]);
+}
+
+#[test]
+fn a_silent_worker_loses_its_lease() {
+    let mut rig = Rig::with(8, &[1]);
+    rig.check_after(Duration::from_secs(9), &[]);
+    rig.hear(1);
+    rig.check_after(Duration::from_secs(10), &[]);
+    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+                   attach again";
+    rig.check_after(Duration::from_millis(1), &[expired]);
+    // What it says later means nothing, what it held goes to the next.
+    rig.check(answer(1, 1, 0, 4), &[]);
+    rig.check(
+        hello(2, 1),
+        &["welcome 2, lease 2", "send 2: batch 3 = 2+1", "send 2: batch 4 = 3+1"],
+    );
+}
+
+#[test]
+fn signs_of_life_are_given_in_time() {
+    let mut rig = Rig::new();
+    rig.event(hello(1, 1));
+    rig.now = Duration::from_millis(1999);
+    rig.check(Event::Tick, &[]);
+    rig.now = Duration::from_secs(2);
+    rig.check(Event::Tick, &["beat 1"]);
+    rig.check(Event::Tick, &[]);
+}
+
+#[test]
+fn a_worker_that_lives_but_never_answers_loses_its_lease() {
+    let mut rig = Rig::with(8, &[1]);
+    for _ in 0..100 {
+        rig.hear(1);
+        rig.check_after(Duration::from_secs(6), &[]);
+    }
+    rig.hear(1);
+    let closed = "close 1: this worker has not answered anything it holds for 600.1s; its lease \
+                  has ended, attach again";
+    rig.check_after(Duration::from_millis(100), &[closed]);
+}
+
+#[test]
+fn a_malformed_answer_ends_the_stream_and_its_batches_return() {
+    let mut rig = Rig::with(8, &[1]);
+    let closed = "close 1: the answer to batch 1 has 3 realizations, expected 2";
+    rig.check(answer(1, 1, 0, 3), &[closed]);
+    let mut rig = Rig::with(8, &[1]);
+    let reason = CloseReason::SecondHello;
+    let closed = "close 1: this worker said hello twice on one stream";
+    rig.check(Event::Misbehaved { worker: WorkerId(1), reason }, &[closed]);
+    rig.check(
+        hello(2, 1),
+        &["welcome 2, lease 2", "send 2: batch 3 = 2+1", "send 2: batch 4 = 3+1"],
+    );
+}
+
+#[test]
+fn a_leaving_worker_gets_no_more_and_is_dismissed_when_it_has_answered() {
+    let mut rig = Rig::with(100, &[1]);
+    rig.check(Event::WorkerDrains { worker: WorkerId(1) }, &[]);
+    rig.check(answer(1, 1, 0, 4), &[]);
+    rig.check(answer(1, 2, 4, 4), &["close 1: this worker has drained"]);
+    rig.check(
+        hello(2, 1),
+        &["welcome 2, lease 2", "send 2: batch 3 = 8+4", "send 2: batch 4 = 12+4"],
+    );
+}
+
+#[test]
+fn answers_to_unknown_batches_mean_nothing() {
+    let mut rig = Rig::with(100, &[1, 1]);
+    // A number nobody has, and one that another worker has.
+    rig.check(answer(1, 99, 0, 4), &[]);
+    rig.check(answer(1, 3, 8, 4), &[]);
+    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    assert_eq!(snapshot.realizations_done, 0);
+}

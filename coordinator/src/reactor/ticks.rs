@@ -1,0 +1,80 @@
+//! What the passing of time brings: lost leases, signs of life, writes tried again, snapshots.
+
+use std::time::Duration;
+
+use super::{Effects, jobs, workers};
+use crate::effect::{CloseReason, Effect};
+use crate::ids::{JobId, WorkerId};
+use crate::snapshot;
+use crate::state::{State, Worker};
+
+/// Active jobs are published this often even if nothing about them changed but time.
+const PUBLISH_EVERY: Duration = Duration::from_secs(1);
+
+pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
+    expire(state, now, effects);
+    beat(state, now, effects);
+    if !state.draining {
+        store_again(state, now, effects);
+    }
+    publish(state, now, effects);
+}
+
+fn expire(state: &mut State, now: Duration, effects: &mut Effects) {
+    let expired: Vec<(WorkerId, CloseReason)> = state
+        .workers
+        .iter()
+        .filter_map(|(id, worker)| Some((*id, overdue(state, worker, now)?)))
+        .collect();
+    for (worker, reason) in expired {
+        workers::close(state, worker, reason, now, effects);
+    }
+}
+
+/// Why the lease of a worker has ended, if it has.
+fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
+    let silent = now.saturating_sub(worker.heard);
+    if silent > state.config.expiry {
+        return Some(CloseReason::Expired { silent });
+    }
+    let oldest = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
+    let since = oldest.map(|batch| batch.sent).min()?.max(worker.answered);
+    let waited = now.saturating_sub(since);
+    (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
+}
+
+fn beat(state: &mut State, now: Duration, effects: &mut Effects) {
+    for (&id, worker) in &mut state.workers {
+        if now.saturating_sub(worker.beat) >= state.config.heartbeat {
+            worker.beat = now;
+            effects.push(Effect::Heartbeat { worker: id });
+        }
+    }
+}
+
+fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
+    let retry_in = state.config.store_retry;
+    for job in state.jobs.values_mut() {
+        let Some(trouble) = &mut job.trouble else {
+            continue;
+        };
+        if now >= trouble.retry_at {
+            // A report of this write moves the time again.
+            trouble.retry_at = now + retry_in;
+            jobs::store_again(job, effects);
+        }
+    }
+}
+
+fn publish(state: &mut State, now: Duration, effects: &mut Effects) {
+    if now.saturating_sub(state.published) >= PUBLISH_EVERY {
+        state.published = now;
+        state.changed.extend(&state.active);
+    }
+    let changed: Vec<JobId> = std::mem::take(&mut state.changed).into_iter().collect();
+    for job in changed {
+        if let Some(snapshot) = snapshot::of(state, job, now) {
+            effects.push(Effect::Publish { job, snapshot });
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Workers come, give signs of life, leave, and are lost.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
+use osteon_common::version;
+
+use super::{Effects, batches};
+use crate::effect::{CloseReason, Effect};
+use crate::event::Hello;
+use crate::ids::{LeaseId, WorkerId};
+use crate::state::{State, Worker};
+
+pub(super) fn hello(
+    state: &mut State,
+    worker: WorkerId,
+    hello: Hello,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    if state.workers.contains_key(&worker) {
+        close(state, worker, CloseReason::SecondHello, now, effects);
+        return;
+    }
+    if let Err(reason) = admit(state, &hello) {
+        effects.push(Effect::Close { worker, reason });
+        return;
+    }
+    let lease = LeaseId(state.next_lease);
+    state.next_lease += 1;
+    state.workers.insert(
+        worker,
+        Worker {
+            lease,
+            hello,
+            heard: now,
+            answered: now,
+            beat: now,
+            in_flight: Vec::new(),
+            settled: VecDeque::new(),
+            rates: BTreeMap::new(),
+            draining: false,
+        },
+    );
+    effects.push(Effect::Welcome { worker, lease });
+}
+
+pub(super) fn heard(state: &mut State, worker: WorkerId, now: Duration) {
+    if let Some(worker) = state.workers.get_mut(&worker) {
+        worker.heard = now;
+    }
+}
+
+pub(super) fn drains(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
+    heard(state, worker, now);
+    if let Some(attached) = state.workers.get_mut(&worker) {
+        attached.draining = true;
+    }
+    dismiss_if_drained(state, worker, now, effects);
+}
+
+/// Closes the stream of a worker that wanted to leave and holds nothing any more.
+pub(super) fn dismiss_if_drained(
+    state: &mut State,
+    worker: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let drained = |worker: &Worker| worker.draining && worker.in_flight.is_empty();
+    if state.workers.get(&worker).is_some_and(drained) {
+        close(state, worker, CloseReason::Drained, now, effects);
+    }
+}
+
+/// Closes a worker's stream; what it held goes to others.
+pub(super) fn close(
+    state: &mut State,
+    worker: WorkerId,
+    reason: CloseReason,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    effects.push(Effect::Close { worker, reason });
+    lost(state, worker, now, effects);
+}
+
+/// Forgets a worker; what it held goes to others. Later events of it mean nothing.
+pub(super) fn lost(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
+    let Some(gone) = state.workers.remove(&worker) else {
+        return;
+    };
+    if state.workers.is_empty() {
+        state.no_worker_since = now;
+    }
+    let alone = gone.in_flight.len() == 1;
+    for batch in gone.in_flight {
+        batches::orphaned(state, batch, alone, gone.draining, now, effects);
+    }
+}
+
+/// Begins the end: no new batch, every stream closed; records on their way are waited for.
+pub(super) fn drain_all(state: &mut State, now: Duration, effects: &mut Effects) {
+    state.draining = true;
+    let workers: Vec<WorkerId> = state.workers.keys().copied().collect();
+    for worker in workers {
+        // A worker that is sent away is not to blame for what it held.
+        if let Some(attached) = state.workers.get_mut(&worker) {
+            attached.draining = true;
+        }
+        close(state, worker, CloseReason::Draining, now, effects);
+    }
+}
+
+fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
+    let coordinator = version::fingerprint();
+    let longest =
+        [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
+    let bytes = longest.unwrap_or(0);
+    if state.draining {
+        Err(CloseReason::Draining)
+    } else if bytes > NAME_BYTES_MAX {
+        Err(CloseReason::NameTooLong { bytes, max: NAME_BYTES_MAX })
+    } else if hello.fingerprint != coordinator {
+        let worker = hello.fingerprint.clone();
+        Err(CloseReason::FingerprintDiffers { worker, coordinator })
+    } else if hello.threads == 0 || hello.threads > WORKER_THREADS_MAX {
+        Err(CloseReason::Threads { threads: hello.threads, max: WORKER_THREADS_MAX })
+    } else if state.workers.len() >= WORKERS_MAX {
+        Err(CloseReason::TooManyWorkers { limit: WORKERS_MAX })
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,177 @@
+//! Re-derives every cross reference of a state, for tests and simulations.
+
+use std::collections::BTreeMap;
+
+use thiserror::Error;
+
+use crate::evaluation::Evaluation;
+use crate::ids::{BatchId, JobId, WorkerId};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, Job, SETTLED_MAX, Stage, State};
+
+/// What does not fit together.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Insane {
+    /// A list of jobs does not hold exactly those in the stage it is for.
+    #[error("job {0} is in a list for another stage, or missing in the list of its stage")]
+    JobList(JobId),
+    /// A worker and a batch disagree about who holds what.
+    #[error("worker {0} and batch {1} disagree about who holds it")]
+    Holding(WorkerId, BatchId),
+    /// A worker holds too much.
+    #[error("worker {0} holds more than it may")]
+    Credit(WorkerId),
+    /// Two copies of a batch do not name each other.
+    #[error("batch {0} and its copy do not match")]
+    Twin(BatchId),
+    /// A batch of an evaluation that is not under way.
+    #[error("batch {0} belongs to no evaluation under way")]
+    Stray(BatchId),
+    /// An index is not in exactly one place: filled, queued, in quarantine, or with a worker.
+    #[error("index {index} of job {job} is in {places} places")]
+    Index {
+        /// The job.
+        job: JobId,
+        /// The index.
+        index: usize,
+        /// In how many places it is.
+        places: u32,
+    },
+    /// The count of filled slots is wrong.
+    #[error("job {0} miscounts its filled slots")]
+    Filled(JobId),
+    /// A request id does not lead to the job that has it.
+    #[error("the request id of job {0} leads elsewhere")]
+    RequestId(JobId),
+    /// The count of ended jobs is wrong.
+    #[error("ended jobs are miscounted")]
+    Ended,
+    /// A number that is handed out next is not above all in use.
+    #[error("a number is about to be given twice")]
+    Numbers,
+}
+
+/// Checks the whole state.
+///
+/// # Errors
+/// The first thing that does not fit together.
+pub fn sanity_check(state: &State) -> Result<(), Insane> {
+    check_jobs(state)?;
+    check_workers(state)?;
+    check_batches(state)?;
+    for (&id, job) in &state.jobs {
+        if let Stage::Computing(evaluation) = &job.stage {
+            check_evaluation(state, id, evaluation)?;
+        }
+    }
+    let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
+    let batches = state.batches.last_key_value();
+    let batches = batches.is_some_and(|(last, _)| last.0 >= state.next_batch);
+    let leases = state.workers.values().any(|worker| worker.lease.0 >= state.next_lease);
+    if jobs || batches || leases { Err(Insane::Numbers) } else { Ok(()) }
+}
+
+fn check_jobs(state: &State) -> Result<(), Insane> {
+    for (&id, job) in &state.jobs {
+        let waiting = state.waiting.iter().filter(|waiting| **waiting == id).count();
+        let active = state.active.contains(&id);
+        let fits = match &job.stage {
+            Stage::Waiting => waiting == 1 && !active,
+            Stage::Computing(_) | Stage::Storing(_) => waiting == 0 && active,
+            Stage::Accepting | Stage::Finishing(_) | Stage::Ended(_) => waiting == 0 && !active,
+        };
+        let has_search = job.search.is_some();
+        let needs_search = matches!(job.stage, Stage::Computing(_) | Stage::Storing(_));
+        let ended = matches!(job.stage, Stage::Ended(_));
+        if !fits || (needs_search && !has_search) || (ended && has_search) {
+            return Err(Insane::JobList(id));
+        }
+        let request_id = &job.record.request_id;
+        if !request_id.is_empty() && state.requests.get(request_id) != Some(&id) {
+            return Err(Insane::RequestId(id));
+        }
+    }
+    let ended = |job: &&Job| matches!(job.stage, Stage::Ended(_));
+    if state.jobs.values().filter(ended).count() != state.ended {
+        return Err(Insane::Ended);
+    }
+    let known = |id: &&JobId| !state.jobs.contains_key(id);
+    let mut listed = state.active.iter().chain(&state.waiting).chain(state.requests.values());
+    match listed.find(known) {
+        Some(id) => Err(Insane::JobList(*id)),
+        None => Ok(()),
+    }
+}
+
+fn check_workers(state: &State) -> Result<(), Insane> {
+    for (&id, worker) in &state.workers {
+        let exclusive = |batch: &BatchId| state.batches.get(batch).is_some_and(|b| b.exclusive);
+        let held = worker.in_flight.len();
+        let alone = !worker.in_flight.iter().any(exclusive) || held == 1;
+        if held > BATCHES_IN_FLIGHT_MAX || !alone || worker.settled.len() > SETTLED_MAX {
+            return Err(Insane::Credit(id));
+        }
+        for batch in &worker.in_flight {
+            if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
+                return Err(Insane::Holding(id, *batch));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_batches(state: &State) -> Result<(), Insane> {
+    for (&id, batch) in &state.batches {
+        let worker = state.workers.get(&batch.worker);
+        let held = worker.map_or(0, |w| w.in_flight.iter().filter(|held| **held == id).count());
+        if held != 1 {
+            return Err(Insane::Holding(batch.worker, id));
+        }
+        if let Some(twin) = batch.twin {
+            let matches = state.batches.get(&twin).is_some_and(|twin| {
+                twin.twin == Some(id)
+                    && twin.assignment == batch.assignment
+                    && twin.worker != batch.worker
+            });
+            if !matches || batch.exclusive {
+                return Err(Insane::Twin(id));
+            }
+        }
+        let current = match state.jobs.get(&batch.assignment.job).map(|job| &job.stage) {
+            Some(Stage::Computing(evaluation)) => evaluation.number == batch.assignment.evaluation,
+            _ => false,
+        };
+        if !current {
+            return Err(Insane::Stray(id));
+        }
+    }
+    Ok(())
+}
+
+/// Every index is in exactly one place.
+fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+    let mut places: Vec<u32> =
+        evaluation.slots.iter().map(|slot| u32::from(slot.is_some())).collect();
+    if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
+        return Err(Insane::Filled(job));
+    }
+    let queued = evaluation.queue.iter().map(|indices| (indices.first, indices.count));
+    let quarantine = evaluation.quarantine.iter().map(|index| (*index, 1));
+    // A batch and its copy are one place.
+    let out: BTreeMap<u64, u64> = state
+        .batches
+        .values()
+        .filter(|batch| batch.assignment.job == job)
+        .map(|batch| (batch.assignment.indices.first, batch.assignment.indices.count))
+        .collect();
+    for (first, count) in queued.chain(quarantine).chain(out) {
+        for index in first..first + count {
+            if let Some(place) = usize::try_from(index).ok().and_then(|i| places.get_mut(i)) {
+                *place += 1;
+            }
+        }
+    }
+    match places.iter().position(|places| *places != 1) {
+        Some(index) => Err(Insane::Index { job, index, places: places[index] }),
+        None => Ok(()),
+    }
+}

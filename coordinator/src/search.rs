@@ -1,0 +1,343 @@
+//! A job as an ask/tell state machine: which point next, and what its outcomes mean.
+//!
+//! An identification asks the simplex, a propagation evaluates one point. Everything here is a
+//! function of the specification and of the outcomes told: telling the stored evaluations again
+//! rebuilds the same state, to the bit.
+
+use std::sync::Arc;
+
+use osteon_common::digest::PathDigest;
+use osteon_common::ensemble::DISPERSION_MAX;
+use osteon_common::job::{Data, JobKind, JobSpecification, Range};
+use osteon_common::outcome::{FailureCounts, Outcome};
+use osteon_common::parameters::Point;
+use osteon_common::results::{BestPoint, Evaluation, JobResult, Moments, Status};
+use osteon_common::statistics::{self, Verdict};
+use thiserror::Error;
+
+use crate::simplex::{Ask, RESTARTS_MAX, Settings, Simplex, Stop};
+
+#[cfg(test)]
+mod tests;
+
+/// What a search wants.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// The outcomes of this point.
+    Evaluate(Point),
+    /// Nothing more.
+    Done(Ending),
+}
+
+/// How a job ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ending {
+    /// The status.
+    pub status: Status,
+    /// Why, in a sentence, where the status needs one.
+    pub reason: Option<String>,
+}
+
+/// A stored evaluation of another search than this one.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "stored evaluation {number} is at {found:?}, but the search goes to {expected:?}: \
+     the store was written by another version of osteon; submit the job again"
+)]
+pub struct ReplayError {
+    /// Number of the evaluation.
+    pub number: u64,
+    /// The stored point.
+    pub found: Box<[f64; 7]>,
+    /// Where this search would go, unless it is done.
+    pub expected: Option<Box<[f64; 7]>>,
+}
+
+/// The lowest cost so far.
+#[derive(Debug, Clone)]
+struct Best {
+    row: Evaluation,
+    outcomes: Arc<[Outcome]>,
+}
+
+#[derive(Debug, Clone)]
+enum Plan {
+    Identification { simplex: Simplex, data: Moments },
+    Propagation { told: Option<Verdict> },
+}
+
+/// A search under way.
+#[derive(Debug, Clone)]
+pub struct Search {
+    specification: Arc<JobSpecification>,
+    plan: Plan,
+    digest: PathDigest,
+    history: Vec<Evaluation>,
+    best: Option<Best>,
+}
+
+impl Search {
+    /// A search of which nothing is known. The specification has passed its check.
+    pub fn new(specification: Arc<JobSpecification>) -> Self {
+        let plan = match (specification.kind, &specification.data) {
+            (JobKind::Identification, Some(data)) => Plan::Identification {
+                simplex: Simplex::new(&start(&specification), settings(&specification)),
+                data: data_moments(data),
+            },
+            // An identification without data has not passed the check.
+            (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
+        };
+        let mut search = Self {
+            specification,
+            plan,
+            digest: PathDigest::new(),
+            history: Vec::new(),
+            best: None,
+        };
+        search.refuse_inadmissible();
+        search
+    }
+
+    /// The search that stored evaluations, in their order, lead to.
+    ///
+    /// # Errors
+    /// When an evaluation is at another point than the search asks for.
+    pub fn replay(
+        specification: Arc<JobSpecification>,
+        evaluations: impl IntoIterator<Item = (Point, Arc<[Outcome]>)>,
+    ) -> Result<Self, ReplayError> {
+        let mut search = Self::new(specification);
+        for (point, outcomes) in evaluations {
+            let found = point.0;
+            let expected = match search.ask() {
+                Step::Evaluate(point) => Some(point.0),
+                Step::Done(_) => None,
+            };
+            if expected.map(|at| at.map(f64::to_bits)) != Some(found.map(f64::to_bits)) {
+                return Err(ReplayError {
+                    number: search.evaluations(),
+                    found: found.into(),
+                    expected: expected.map(Box::new),
+                });
+            }
+            search.tell(outcomes);
+        }
+        Ok(search)
+    }
+
+    /// The next point, or how the job ends. Asking changes nothing.
+    pub fn ask(&self) -> Step {
+        match &self.plan {
+            Plan::Identification { simplex, .. } => match simplex.ask() {
+                Ask::Cost(at) => Step::Evaluate(point(&self.specification, at)),
+                Ask::Stopped(stop) => Step::Done(self.ending(stop)),
+            },
+            Plan::Propagation { told: None } => Step::Evaluate(self.specification.start()),
+            Plan::Propagation { told: Some(verdict) } => Step::Done(self.propagated(verdict)),
+        }
+    }
+
+    /// Takes the outcomes, in index order, of the point asked for. Ignored once done.
+    pub fn tell(&mut self, outcomes: Arc<[Outcome]>) {
+        let Step::Evaluate(point) = self.ask() else {
+            return;
+        };
+        let verdict = Verdict::of(&outcomes, self.specification.monte_carlo.max_failed_fraction);
+        let cost = match &mut self.plan {
+            Plan::Identification { simplex, data } => {
+                let cost = verdict.cost(*data);
+                simplex.tell(cost);
+                Some(cost)
+            }
+            Plan::Propagation { told } => {
+                *told = Some(verdict);
+                None
+            }
+        };
+        self.digest.add_evaluation(&point, &outcomes);
+        let row = Evaluation {
+            number: self.evaluations(),
+            point,
+            moments: verdict.moments,
+            cost,
+            failures: FailureCounts::of(&outcomes),
+        };
+        self.history.push(row);
+        if self.best.as_ref().is_none_or(|best| row.cost < best.row.cost) {
+            self.best = Some(Best { row, outcomes });
+        }
+        self.refuse_inadmissible();
+    }
+
+    /// Points whose outcomes were told.
+    pub fn evaluations(&self) -> u64 {
+        self.history.len() as u64
+    }
+
+    /// Rows of the history, in order.
+    pub fn history(&self) -> &[Evaluation] {
+        &self.history
+    }
+
+    /// The row with the lowest cost; of equal ones the first; of a propagation the only one.
+    pub fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref().map(|best| &best.row)
+    }
+
+    /// The best row, if its point is feasible.
+    pub fn best_feasible(&self) -> Option<&Evaluation> {
+        self.best().filter(|row| row.cost.is_none_or(f64::is_finite))
+    }
+
+    /// What the job leaves, given how it ended, computed by `version` of the program.
+    pub fn result(&self, ending: &Ending, version: &str) -> JobResult {
+        let specification = &self.specification;
+        JobResult {
+            status: ending.status,
+            reason: ending.reason.clone(),
+            digest: self.digest.finish(),
+            best: self.best.as_ref().map(|best| BestPoint {
+                point: best.row.point,
+                cost: best.row.cost,
+                velocity: statistics::estimate(&best.outcomes),
+                failures: best.row.failures,
+                outcomes: best.outcomes.to_vec(),
+            }),
+            data: match &self.plan {
+                Plan::Identification { data, .. } => Some(*data),
+                Plan::Propagation { .. } => None,
+            },
+            evaluations: self.evaluations(),
+            realizations: specification.monte_carlo.realizations,
+            seed: specification.monte_carlo.seed,
+            solver: specification.setup.solver,
+            picking: specification.setup.picking,
+            version: version.to_owned(),
+        }
+    }
+
+    /// Refuses points until the simplex is done or asks for an admissible one.
+    fn refuse_inadmissible(&mut self) {
+        if let Plan::Identification { simplex, .. } = &mut self.plan {
+            while let Ask::Cost(at) = simplex.ask() {
+                if admissible(&point(&self.specification, at)) {
+                    break;
+                }
+                simplex.refuse();
+            }
+        }
+    }
+
+    fn ending(&self, stop: Stop) -> Ending {
+        let (status, reason) = match stop {
+            Stop::CostReached | Stop::Settled => (Status::Converged, None),
+            Stop::EvaluationsUsedUp if self.best_feasible().is_none() => {
+                (Status::Failed, Some(self.no_feasible_point()))
+            }
+            Stop::EvaluationsUsedUp => (Status::MaxEvaluations, None),
+            Stop::RestartsUsedUp => {
+                let reason = format!(
+                    "the simplex collapsed, was restarted {RESTARTS_MAX} times and was still \
+                     finding better points; run on from the best point"
+                );
+                (Status::MaxEvaluations, Some(reason))
+            }
+            Stop::Infeasible => (Status::Failed, Some(self.no_feasible_point())),
+        };
+        Ending { status, reason }
+    }
+
+    fn propagated(&self, verdict: &Verdict) -> Ending {
+        if verdict.feasible {
+            return Ending { status: Status::Converged, reason: None };
+        }
+        let reason = self.history.first().map_or_else(String::new, |row| self.failed(row));
+        Ending { status: Status::Failed, reason: Some(reason) }
+    }
+
+    fn no_feasible_point(&self) -> String {
+        match self.history.first() {
+            None => "no feasible point: every point tried is inadmissible; \
+                     change the starts or the bounds of [parameters]"
+                .to_owned(),
+            Some(row) => format!(
+                "no feasible point among the {} evaluated; at the first {}; change the starts of \
+                 [parameters], raise [solver] refinement, or allow a larger \
+                 [monte_carlo] max_failed_fraction",
+                self.evaluations(),
+                self.failed(row)
+            ),
+        }
+    }
+
+    fn failed(&self, row: &Evaluation) -> String {
+        let kinds: Vec<String> =
+            row.failures.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
+        format!(
+            "{} of {} realizations failed ({}); max_failed_fraction is {}",
+            row.failures.total(),
+            self.specification.monte_carlo.realizations,
+            kinds.join(", "),
+            self.specification.monte_carlo.max_failed_fraction
+        )
+    }
+}
+
+/// Whether realizations can be drawn at `point`.
+fn admissible(point: &Point) -> bool {
+    let dispersion = point.dispersion();
+    point.density() > 0.0
+        && point.density().is_finite()
+        && dispersion > 0.0
+        && dispersion < DISPERSION_MAX
+        && point.constants().elasticity().is_ok()
+}
+
+fn data_moments(data: &Data) -> Moments {
+    match data {
+        Data::Velocities(velocities) => statistics::moments(velocities)
+            .unwrap_or(Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN }),
+        Data::Moments { mean, coefficient_of_variation } => {
+            Moments { mean: *mean, coefficient_of_variation: *coefficient_of_variation }
+        }
+    }
+}
+
+fn settings(specification: &JobSpecification) -> Settings {
+    let search = &specification.search;
+    Settings {
+        max_evaluations: search.max_evaluations,
+        cost_tolerance: search.cost_tolerance,
+        size_tolerance: search.size_tolerance,
+        initial_step: search.initial_step,
+    }
+}
+
+/// Coordinates of the start in the box of the free parameters.
+fn start(specification: &JobSpecification) -> Vec<f64> {
+    specification.parameters.iter().filter_map(unit_start).collect()
+}
+
+fn unit_start(range: &Range) -> Option<f64> {
+    match *range {
+        Range::Fixed(_) => None,
+        Range::Free { start, lower, upper } => {
+            Some(((start - lower) / (upper - lower)).clamp(0.0, 1.0))
+        }
+    }
+}
+
+/// The point with these coordinates in the box. A coordinate that never moved keeps the bits of
+/// its start.
+fn point(specification: &JobSpecification, at: &[f64]) -> Point {
+    let mut at = at.iter();
+    Point(specification.parameters.map(|range| match range {
+        Range::Fixed(value) => value,
+        Range::Free { start, lower, upper } => match at.next() {
+            Some(u) if Some(*u) != unit_start(&range) => {
+                (lower + u * (upper - lower)).clamp(lower, upper)
+            }
+            _ => start,
+        },
+    }))
+}

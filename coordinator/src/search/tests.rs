@@ -1,0 +1,200 @@
+//! The meaning of outcomes, and replay.
+
+use osteon_common::case::Setup;
+use osteon_common::job::{MonteCarlo, Objective, Search as SearchSettings};
+use osteon_common::outcome::FailureKind;
+
+use super::*;
+
+/// Only e_L and the dispersion are free.
+fn specification(max_evaluations: u64) -> JobSpecification {
+    let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+    parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
+    parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
+    JobSpecification {
+        kind: JobKind::Identification,
+        setup: Setup::default(),
+        data: Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
+        parameters,
+        monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
+        objective: Objective::default(),
+        search: SearchSettings { max_evaluations, ..SearchSettings::default() },
+    }
+}
+
+/// Four velocities whose moments follow from e_L and the dispersion.
+fn outcomes(point: &Point) -> Arc<[Outcome]> {
+    let mean = 3900.0 * (point.0[1] / 17.7e9);
+    let spread = mean * point.dispersion() / 4.0;
+    [-1.0, 1.0, -1.0, 1.0].map(|sign| Ok(mean + sign * spread)).into()
+}
+
+/// Points with their outcomes.
+type Told = Vec<(Point, Arc<[Outcome]>)>;
+
+/// The search to its end, with everything told to it.
+fn run(specification: &JobSpecification) -> (Search, Told) {
+    let mut search = Search::new(Arc::new(specification.clone()));
+    let mut told = Vec::new();
+    while let Step::Evaluate(point) = search.ask() {
+        told.push((point, outcomes(&point)));
+        search.tell(outcomes(&point));
+    }
+    (search, told)
+}
+
+fn ending(search: &Search) -> Ending {
+    match search.ask() {
+        Step::Done(ending) => ending,
+        Step::Evaluate(point) => panic!("not done, wants {point:?}"),
+    }
+}
+
+#[test]
+fn an_identification_finds_what_made_the_data() {
+    let (search, _) = run(&specification(400));
+    let ending = ending(&search);
+    assert_eq!(ending, Ending { status: Status::Converged, reason: None });
+    let result = search.result(&ending, "1");
+    let best = result.best.unwrap();
+    assert!(best.cost.unwrap() <= 1e-10);
+    assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-4, "{best:?}");
+    assert!((best.point.dispersion() / 0.12 - 1.0).abs() < 1e-3, "{best:?}");
+    assert_eq!(best.outcomes, outcomes(&best.point).to_vec());
+    assert_eq!(result.evaluations, search.history().len() as u64);
+}
+
+#[test]
+fn the_best_evaluated_point_is_returned_and_not_the_last() {
+    for max_evaluations in 2..30 {
+        let (search, told) = run(&specification(max_evaluations));
+        let costs: Vec<f64> = search.history().iter().map(|row| row.cost.unwrap()).collect();
+        let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        let first = costs.iter().position(|cost| *cost == lowest).unwrap();
+        let best = search.result(&ending(&search), "1").best.unwrap();
+        assert_eq!((best.point, best.cost), (told[first].0, Some(lowest)));
+        assert_eq!(search.best().unwrap().number, first as u64);
+    }
+}
+
+#[test]
+fn the_first_point_has_the_bits_of_the_start() {
+    let specification = specification(10);
+    let search = Search::new(Arc::new(specification.clone()));
+    let Step::Evaluate(point) = search.ask() else { panic!("nothing asked") };
+    assert_eq!(point.0.map(f64::to_bits), specification.start().0.map(f64::to_bits));
+}
+
+#[test]
+fn a_replay_of_any_part_of_the_path_goes_on_the_same_way() {
+    let specification = specification(40);
+    let (full, told) = run(&specification);
+    for length in 0..=told.len() {
+        let part = told[..length].iter().cloned();
+        let mut search = Search::replay(Arc::new(specification.clone()), part).unwrap();
+        assert_eq!(search.evaluations(), length as u64);
+        for (point, outcomes) in &told[length..] {
+            assert_eq!(search.ask(), Step::Evaluate(*point));
+            search.tell(outcomes.clone());
+        }
+        assert_eq!(search.ask(), full.ask());
+        assert_eq!(search.history(), full.history());
+        let (ending, version) = (ending(&full), "1");
+        assert_eq!(search.result(&ending, version), full.result(&ending, version));
+    }
+}
+
+#[test]
+fn a_replay_of_another_path_is_refused() {
+    let specification = specification(40);
+    let (_, mut told) = run(&specification);
+    told[3].0.0[1] += 1.0;
+    let error = Search::replay(Arc::new(specification), told).unwrap_err();
+    assert_eq!(error.number, 3);
+}
+
+#[test]
+fn the_digest_follows_the_order_of_the_path() {
+    let (search, told) = run(&specification(20));
+    let mut digest = PathDigest::new();
+    for (point, outcomes) in &told {
+        digest.add_evaluation(point, outcomes);
+    }
+    assert_eq!(search.result(&ending(&search), "1").digest, digest.finish());
+}
+
+#[test]
+fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
+    let mut search = Search::new(Arc::new(specification(400)));
+    let mut failed = outcomes(&specification(400).start()).to_vec();
+    failed[2] = Err(FailureKind::NoArrival);
+    while let Step::Evaluate(_) = search.ask() {
+        search.tell(failed.clone().into());
+    }
+    let Ending { status, reason } = ending(&search);
+    let reason = reason.unwrap();
+    assert_eq!(status, Status::Failed);
+    assert!(reason.contains("among the 3 evaluated"), "{reason}");
+    assert!(reason.contains("1 of 4 realizations failed (1 no_arrival)"), "{reason}");
+    assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
+    assert!(search.best_feasible().is_none());
+    assert_eq!(search.best().unwrap().number, 0);
+}
+
+#[test]
+fn failures_within_the_fraction_leave_a_finite_cost() {
+    let mut job = specification(400);
+    job.monte_carlo.max_failed_fraction = 0.25;
+    let mut search = Search::new(Arc::new(job));
+    let mut failed = outcomes(&specification(400).start()).to_vec();
+    failed[2] = Err(FailureKind::NoArrival);
+    search.tell(failed.into());
+    assert!(search.history()[0].cost.unwrap().is_finite());
+    assert_eq!(search.history()[0].failures.total(), 1);
+}
+
+#[test]
+fn a_propagation_is_one_evaluation_at_the_start() {
+    let propagation =
+        JobSpecification { kind: JobKind::Propagation, data: None, ..specification(400) };
+    let (search, told) = run(&propagation);
+    assert_eq!(told.len(), 1);
+    assert_eq!(told[0].0, propagation.start());
+    let result = search.result(&ending(&search), "1");
+    assert_eq!((result.status, result.data), (Status::Converged, None));
+    assert_eq!(result.best.unwrap().cost, None);
+
+    let mut search = Search::new(Arc::new(propagation));
+    search.tell([Err(FailureKind::NotFinite); 4].into());
+    let Ending { status, reason } = ending(&search);
+    assert_eq!(status, Status::Failed);
+    assert!(reason.unwrap().contains("4 of 4 realizations failed (4 not_finite)"));
+    assert_eq!(search.best().unwrap().moments, None);
+}
+
+#[test]
+fn inadmissible_points_are_not_evaluated() {
+    // Above ν_L ≈ 0.48 the elasticity at the start is not positive definite.
+    let mut job = specification(60);
+    job.parameters[1] = Range::Fixed(9e9);
+    job.parameters[2] = Range::Free { start: 0.45, lower: 0.1, upper: 1.5 };
+    let mut search = Search::new(Arc::new(job));
+    let mut evaluated = 0;
+    while let Step::Evaluate(point) = search.ask() {
+        assert!(point.constants().violated().is_empty(), "{point:?}");
+        evaluated += 1;
+        search.tell(outcomes(&point));
+    }
+    assert_eq!(search.evaluations(), evaluated);
+}
+
+#[test]
+fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
+    let mut job = specification(60);
+    job.parameters[0] = Range::Fixed(-1.0);
+    let search = Search::new(Arc::new(job));
+    let Ending { status, reason } = ending(&search);
+    assert_eq!(status, Status::Failed);
+    assert!(reason.unwrap().contains("inadmissible"));
+    assert!(search.result(&ending(&search), "1").best.is_none());
+}

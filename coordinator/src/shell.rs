@@ -1,0 +1,193 @@
+//! Starting and stopping: the store's thread, the task that owns the state, the services on one
+//! port. This, the services and [`crate::core_task`] are all that is asynchronous; they only move
+//! bytes.
+
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use osteon_common::limits::MESSAGE_BYTES_MAX;
+use osteon_proto::v1;
+use osteon_proto::v1::jobs_server::JobsServer;
+use osteon_proto::v1::workers_server::WorkersServer;
+use thiserror::Error;
+use tokio::sync::{mpsc, oneshot};
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::{TcpListenerStream, UnixListenerStream};
+use tonic::transport::Server;
+use tonic::transport::server::Router;
+
+use crate::config::Config;
+use crate::core_task::{Clock, Core, Message};
+use crate::listen::{Listener, Socket};
+use crate::reactor::{RestoreError, RestoredJob};
+use crate::service_jobs::JobsService;
+use crate::service_workers::WorkersService;
+use crate::state::State;
+use crate::store::Store;
+use crate::store_thread::{self, Command};
+
+/// Events that may wait for the one task.
+const EVENTS_MAX: usize = 1024;
+/// Streams and calls that one connection may have open.
+const STREAMS_PER_CONNECTION_MAX: u32 = 256;
+/// A silent connection is probed this often, and given up when a probe stays unanswered as long.
+const KEEPALIVE: Duration = Duration::from_secs(10);
+
+/// Why a coordinator does not start.
+#[derive(Debug, Error)]
+pub enum StartError {
+    /// The store cannot be read.
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
+    /// The operating system gives no thread.
+    #[error("cannot start the store's thread: {source}")]
+    Thread {
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The thread that reads the store ended unasked.
+    #[error("the store could not be read: its thread ended unasked")]
+    Interrupted {
+        /// How.
+        source: tokio::task::JoinError,
+    },
+    /// The description of the services cannot be read.
+    #[error("the services' description for gRPC reflection cannot be read")]
+    Reflection {
+        /// Why.
+        source: tonic_reflection::server::Error,
+    },
+}
+
+/// A running coordinator.
+#[derive(Debug)]
+pub struct Coordinator {
+    url: String,
+    messages: mpsc::Sender<Message>,
+    stop_serving: oneshot::Sender<()>,
+    server: tokio::task::JoinHandle<()>,
+    core: tokio::task::JoinHandle<()>,
+    store: JoinHandle<()>,
+    shutdown_timeout: Duration,
+}
+
+/// Starts a coordinator on a bound address, and goes on with the jobs of its store.
+///
+/// # Errors
+/// When the store cannot be read.
+pub async fn start(
+    listener: Listener,
+    mut store: Box<dyn Store>,
+    config: Config,
+) -> Result<Coordinator, StartError> {
+    let load = move || RestoredJob::load(store.as_mut()).map(|restored| (store, restored));
+    let loaded = tokio::task::spawn_blocking(load).await;
+    let (store, restored) = loaded.map_err(|source| StartError::Interrupted { source })??;
+    let clock = Clock::new();
+    let (state, effects) = State::restore(config, restored, clock.now());
+
+    let (messages, inbox) = mpsc::channel(EVENTS_MAX);
+    let (events, from_store) = mpsc::channel(EVENTS_MAX);
+    let (commands, store) =
+        store_thread::start(store, events).map_err(|source| StartError::Thread { source })?;
+    let router = services(&messages, &commands).await?;
+    let url = listener.url().to_owned();
+    let (stop_serving, stopped) = oneshot::channel();
+    let server = tokio::spawn(serve(router, listener.socket, stopped));
+    let core = Core::new(state, clock, commands);
+    let core = tokio::spawn(core.run(effects, inbox, from_store, config.tick));
+    tracing::info!(%url, "the coordinator listens");
+    let shutdown_timeout = config.shutdown_timeout;
+    Ok(Coordinator { url, messages, stop_serving, server, core, store, shutdown_timeout })
+}
+
+impl Coordinator {
+    /// URL that clients and workers use: `http://127.0.0.1:PORT` or `unix:PATH`.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Stops: no new batch, every stream closed, everything complete stored. Waits for that no
+    /// longer than [`Config::shutdown_timeout`]; what is not stored then is computed again by the
+    /// next coordinator on the same store.
+    pub async fn shutdown(self) {
+        let stop = async {
+            let (reply, stopped) = oneshot::channel();
+            if self.messages.send(Message::Shutdown(reply)).await.is_ok() {
+                // The task may be gone already; then there is nothing to wait for.
+                let _ = stopped.await;
+            }
+        };
+        if tokio::time::timeout(self.shutdown_timeout, stop).await.is_err() {
+            tracing::warn!("shutting down before everything is stored");
+        }
+        self.core.abort();
+        let _ = self.core.await;
+        let _ = self.stop_serving.send(());
+        let mut server = self.server;
+        if tokio::time::timeout(self.shutdown_timeout, &mut server).await.is_err() {
+            server.abort();
+            let _ = server.await;
+        }
+        // The services, which hold the last senders of commands, are gone: the thread ends after
+        // the write it is at, and closes the store.
+        let store = self.store;
+        let joined = tokio::task::spawn_blocking(move || store.join());
+        let _ = tokio::time::timeout(self.shutdown_timeout, joined).await;
+    }
+}
+
+/// The services of one port.
+async fn services(
+    messages: &mpsc::Sender<Message>,
+    commands: &mpsc::Sender<Command>,
+) -> Result<Router, StartError> {
+    let jobs = JobsService::new(messages.clone(), commands.clone());
+    let workers = WorkersService::new(messages.clone());
+    let (health, health_service) = tonic_health::server::health_reporter();
+    health.set_serving::<JobsServer<JobsService>>().await;
+    health.set_serving::<WorkersServer<WorkersService>>().await;
+    let reflection = tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(v1::FILE_DESCRIPTOR_SET)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        .build_v1()
+        .map_err(|source| StartError::Reflection { source })?;
+    Ok(Server::builder()
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(KEEPALIVE))
+        .max_concurrent_streams(Some(STREAMS_PER_CONNECTION_MAX))
+        .add_service(health_service)
+        .add_service(reflection)
+        .add_service(
+            JobsServer::new(jobs)
+                .max_decoding_message_size(MESSAGE_BYTES_MAX)
+                .max_encoding_message_size(MESSAGE_BYTES_MAX),
+        )
+        .add_service(
+            WorkersServer::new(workers)
+                .max_decoding_message_size(MESSAGE_BYTES_MAX)
+                .max_encoding_message_size(MESSAGE_BYTES_MAX),
+        ))
+}
+
+async fn serve(router: Router, socket: Socket, stopped: oneshot::Receiver<()>) {
+    let signal = async {
+        // Told, or the coordinator was dropped: both mean stop.
+        let _ = stopped.await;
+    };
+    let served = match socket {
+        Socket::Tcp(listener) => {
+            let connections = TcpListenerStream::new(listener).map(|connection| {
+                // Small messages shall not wait for more; without it they are only slower.
+                connection.inspect(|stream| drop(stream.set_nodelay(true)))
+            });
+            router.serve_with_incoming_shutdown(connections, signal).await
+        }
+        Socket::Unix(listener, _file) => {
+            router.serve_with_incoming_shutdown(UnixListenerStream::new(listener), signal).await
+        }
+    };
+    if let Err(error) = served {
+        tracing::error!(%error, "the server ended");
+    }
+}

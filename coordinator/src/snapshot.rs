@@ -1,0 +1,119 @@
+//! A job at one moment, as clients see it.
+
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_proto::results::status_to_message;
+use osteon_proto::specification::kind_to_message;
+use osteon_proto::v1::{JobSnapshot, JobState};
+
+use crate::ids::JobId;
+use crate::state::{Job, Stage, State};
+
+/// Without an answer for this long, a snapshot says what is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// How `id` stands at `now`; `None` if no client can know of it.
+pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
+    let job = state.jobs.get(&id)?;
+    let specification = &job.record.specification;
+    let realizations = specification.monte_carlo.realizations;
+    let mut snapshot = JobSnapshot {
+        job: id.to_string(),
+        kind: kind_to_message(specification.kind).into(),
+        max_evaluations: match specification.kind {
+            JobKind::Identification => specification.search.max_evaluations,
+            JobKind::Propagation => 1,
+        },
+        realizations,
+        workers: u32::try_from(state.workers.len()).unwrap_or(u32::MAX),
+        elapsed_s: now.saturating_sub(job.record.accepted).as_secs_f64(),
+        ..JobSnapshot::default()
+    };
+    match &job.stage {
+        Stage::Accepting => return None,
+        Stage::Waiting => snapshot.set_state(JobState::Waiting),
+        Stage::Computing(evaluation) => {
+            snapshot.set_state(JobState::Running);
+            snapshot.realizations_done = evaluation.filled();
+        }
+        Stage::Storing(_) | Stage::Finishing(_) => {
+            snapshot.set_state(JobState::Running);
+            snapshot.realizations_done = realizations;
+        }
+        Stage::Ended(_) => snapshot.set_state(JobState::Ended),
+    }
+    if let Stage::Ended(end) = &job.stage {
+        snapshot.status = status_to_message(end.ending.status).into();
+        snapshot.reason = end.ending.reason.clone().unwrap_or_default();
+        snapshot.evaluations = end.evaluations;
+        snapshot.best_cost = end.best_cost;
+        snapshot.best_mean = end.best_moments.map(|moments| moments.mean);
+        snapshot.best_coefficient_of_variation =
+            end.best_moments.map(|moments| moments.coefficient_of_variation);
+        snapshot.elapsed_s = end.ended.saturating_sub(job.record.accepted).as_secs_f64();
+    } else {
+        under_way(state, job, now, &mut snapshot);
+    }
+    Some(snapshot)
+}
+
+fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot) {
+    if let Some(search) = &job.search {
+        let best = search.best_feasible();
+        let moments = best.and_then(|row| row.moments);
+        snapshot.evaluations = search.evaluations();
+        snapshot.best_cost = best.and_then(|row| row.cost);
+        snapshot.best_mean = moments.map(|moments| moments.mean);
+        snapshot.best_coefficient_of_variation =
+            moments.map(|moments| moments.coefficient_of_variation);
+    }
+    snapshot.realizations_per_second = job.rate.per_second(now);
+    snapshot.waiting_for = waiting_for(state, job, now);
+}
+
+/// What a job that has not ended waits for, in words; empty if it does not wait.
+fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
+    let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
+    if let Some(trouble) = &job.trouble {
+        return format!(
+            "the store does not take a record, it is tried again: {} {}",
+            trouble.error,
+            since(trouble.since)
+        );
+    }
+    if state.draining {
+        return "the coordinator is shutting down".to_owned();
+    }
+    match &job.stage {
+        Stage::Waiting => {
+            let before =
+                state.waiting.iter().take_while(|waiting| **waiting != job.record.job).count();
+            format!("the end of {} running and {before} waiting jobs", state.active.len())
+        }
+        Stage::Computing(_) if state.workers.is_empty() => {
+            format!("no worker is attached {}", since(state.no_worker_since))
+        }
+        Stage::Computing(_) if now.saturating_sub(job.progressed) >= PATIENCE => {
+            let oldest = state
+                .batches
+                .values()
+                .filter(|batch| batch.assignment.job == job.record.job)
+                .min_by_key(|batch| batch.sent);
+            match oldest.and_then(|batch| Some((batch, state.workers.get(&batch.worker)?))) {
+                Some((batch, worker)) => format!(
+                    "the answer of {} to {} realizations {}",
+                    worker.name(),
+                    batch.assignment.indices.count,
+                    since(batch.sent)
+                ),
+                None => format!("a worker that takes batches {}", since(job.progressed)),
+            }
+        }
+        Stage::Accepting
+        | Stage::Computing(_)
+        | Stage::Storing(_)
+        | Stage::Finishing(_)
+        | Stage::Ended(_) => String::new(),
+    }
+}

@@ -1,0 +1,95 @@
+//! The one thread that touches the store. Records are written in the order they come, each is
+//! reported as an event; what ended jobs left is read for those who fetch it.
+
+use std::thread::{self, JoinHandle};
+
+use osteon_common::job::JobSpecification;
+use osteon_common::limits::JOBS_MAX;
+use osteon_common::results::{Evaluation, JobResult};
+use thiserror::Error;
+use tokio::sync::{mpsc, oneshot};
+
+use crate::effect::Record;
+use crate::event::Event;
+use crate::reactor::RestoreError;
+use crate::search::{ReplayError, Search};
+use crate::store::{EndRecord, JobRecord, Store};
+
+/// Commands that may wait: a record for every job, and some readers.
+const COMMANDS_MAX: usize = JOBS_MAX + 64;
+
+/// Something to do with the store.
+pub(crate) enum Command {
+    /// Make a record durable.
+    Put(Record),
+    /// Read what an ended job left.
+    Read { record: JobRecord, end: EndRecord, reply: oneshot::Sender<Result<Leftover, ReadError>> },
+}
+
+/// What an ended job left.
+pub(crate) struct Leftover {
+    pub(crate) specification: JobSpecification,
+    pub(crate) result: JobResult,
+    pub(crate) history: Vec<Evaluation>,
+}
+
+/// Why what a job left cannot be read.
+#[derive(Debug, Error)]
+pub(crate) enum ReadError {
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+}
+
+/// Starts the thread. It ends when every sender of commands is gone.
+pub(crate) fn start(
+    mut store: Box<dyn Store>,
+    events: mpsc::Sender<Event>,
+) -> std::io::Result<(mpsc::Sender<Command>, JoinHandle<()>)> {
+    let (sender, mut commands) = mpsc::channel(COMMANDS_MAX);
+    let serve = move || {
+        while let Some(command) = commands.blocking_recv() {
+            match command {
+                Command::Put(record) => {
+                    // Nobody listens any more when the coordinator has stopped.
+                    let _ = events.blocking_send(put(store.as_mut(), &record));
+                }
+                Command::Read { record, end, reply } => {
+                    // The reader may have gone.
+                    let _ = reply.send(read(store.as_mut(), &record, &end));
+                }
+            }
+        }
+    };
+    let thread = thread::Builder::new().name("store".to_owned()).spawn(serve)?;
+    Ok((sender, thread))
+}
+
+fn put(store: &mut dyn Store, record: &Record) -> Event {
+    let (job, key) = record.key();
+    let done = match record {
+        Record::Job(record) => store.put_job(record),
+        Record::Evaluation(record) => store.put_evaluation(record),
+        Record::End(record) => store.finish_job(record),
+    };
+    match done {
+        Ok(()) => Event::Stored { job, key },
+        Err(error) => {
+            tracing::warn!(%job, %error, "a record could not be stored");
+            Event::StoreFailed { job, key, error: error.to_string() }
+        }
+    }
+}
+
+/// What a job left follows from its evaluations: they are told to a fresh search.
+fn read(store: &mut dyn Store, record: &JobRecord, end: &EndRecord) -> Result<Leftover, ReadError> {
+    let evaluations = store.evaluations(record.job).map_err(RestoreError::from)?;
+    let told = evaluations.into_iter().map(|stored| (stored.point, stored.outcomes));
+    let search = Search::replay(record.specification.clone(), told)?;
+    Ok(Leftover {
+        specification: (*record.specification).clone(),
+        result: search.result(&end.ending, &end.version),
+        history: search.history().to_vec(),
+    })
+}

@@ -1,0 +1,103 @@
+//! A cheap stand-in for physics: moments that depend on the point as those of a bone do, and a
+//! failure now and then. Deterministic: a function of point, seed and index.
+
+use std::sync::Arc;
+
+use osteon_common::case::Setup;
+use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_proto::batch::Work;
+
+/// Starts and bounds of the seven parameters.
+const RANGES: [(f64, f64, f64); 7] = [
+    (1700.0, 1500.0, 2000.0),
+    (20e9, 12e9, 25e9),
+    (0.33, 0.2, 0.45),
+    (4.5e9, 3e9, 6.5e9),
+    (11e9, 8e9, 16e9),
+    (0.38, 0.2, 0.5),
+    (0.15, 0.02, 0.3),
+];
+
+/// A small identification.
+pub(crate) fn identification(
+    realizations: u64,
+    max_evaluations: u64,
+    seed: u64,
+) -> JobSpecification {
+    JobSpecification {
+        kind: JobKind::Identification,
+        setup: Setup::default(),
+        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        parameters: RANGES.map(|(start, lower, upper)| Range::Free { start, lower, upper }),
+        monte_carlo: MonteCarlo {
+            realizations,
+            seed,
+            max_failed_fraction: 0.2,
+            ..MonteCarlo::default()
+        },
+        objective: Objective::default(),
+        search: Search { max_evaluations, ..Search::default() },
+    }
+}
+
+/// A propagation at the start.
+pub(crate) fn propagation(realizations: u64, seed: u64) -> JobSpecification {
+    JobSpecification {
+        kind: JobKind::Propagation,
+        data: None,
+        ..identification(realizations, 1, seed)
+    }
+}
+
+/// All outcomes of a batch.
+pub(crate) fn outcomes(work: &Work) -> Vec<Outcome> {
+    (work.first..work.first + u64::from(work.count)).map(|index| outcome(work, index)).collect()
+}
+
+/// The outcome at one index.
+pub(crate) fn outcome(work: &Work, index: u64) -> Outcome {
+    let noise = mix(work.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    if noise.is_multiple_of(29) {
+        return Err(FailureKind::ALL[(noise / 29 % 5) as usize]);
+    }
+    let uniform = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+    let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.point.0;
+    let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
+    let c11 = e_l * e_l * (1.0 - nu_t) / margin;
+    Ok(0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform))
+}
+
+/// A well mixed function of one number (splitmix64).
+pub(crate) fn mix(number: u64) -> u64 {
+    let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Result and history of a specification, computed in one loop without any coordinator.
+pub(crate) fn plain_run(specification: &JobSpecification) -> osteon_common::results::JobResult {
+    use osteon_coordinator::search::{Search, Step};
+    let mut search = Search::new(Arc::new(specification.clone()));
+    loop {
+        match search.ask() {
+            Step::Evaluate(point) => {
+                let work = |first| Work {
+                    setup: specification.setup,
+                    point,
+                    seed: specification.monte_carlo.seed,
+                    sampling: specification.monte_carlo.sampling,
+                    first,
+                    count: 1,
+                };
+                let all = (0..specification.monte_carlo.realizations)
+                    .map(|index| outcome(&work(index), index));
+                search.tell(all.collect());
+            }
+            Step::Done(ending) => {
+                return search.result(&ending, osteon_common::version::VERSION);
+            }
+        }
+    }
+}

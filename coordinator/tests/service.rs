@@ -1,0 +1,292 @@
+//! The services over real sockets, with workers that compute a cheap stand-in.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+mod fake;
+
+use std::time::Duration;
+
+use osteon_common::version;
+use osteon_coordinator::store::Store;
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
+use osteon_proto::v1::attach_request::Message as Request;
+use osteon_proto::v1::attach_response::Message as Response;
+use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::v1::jobs_client::JobsClient;
+use osteon_proto::v1::{
+    AttachRequest, BatchResult, CancelRequest, FetchRequest, GetRequest, JobSnapshot, JobState,
+    JobStatus, ListRequest, SubmitRequest, WatchRequest, WorkerHello,
+};
+use osteon_proto::{batch, realizations, results, specification, status};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::transport::Channel;
+use tonic::{Code, Status};
+
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+async fn coordinator(address: &str, store: Box<dyn Store>) -> Coordinator {
+    let listener = Listener::bind(&address.parse().unwrap(), false).await.unwrap();
+    let config = Config { tick: Duration::from_millis(10), ..Config::default() };
+    start(listener, store, config).await.unwrap()
+}
+
+async fn client(coordinator: &Coordinator) -> JobsClient<Channel> {
+    jobs_client(channel(coordinator).await)
+}
+
+async fn channel(coordinator: &Coordinator) -> Channel {
+    let endpoint: Endpoint = coordinator.url().parse().unwrap();
+    connect(&endpoint, TIMEOUT).await.unwrap()
+}
+
+fn hello(fingerprint: String) -> AttachRequest {
+    let hello = WorkerHello {
+        version: version::VERSION.to_owned(),
+        fingerprint,
+        threads: 2,
+        host: "here".to_owned(),
+        process: 1,
+    };
+    AttachRequest { message: Some(Request::Hello(hello)) }
+}
+
+/// A worker that answers batches until its stream ends, but at most `batches_max`; then it is
+/// gone without a word.
+async fn work(channel: Channel, batches_max: usize) -> Result<usize, Status> {
+    let (outbound, messages) = mpsc::channel(16);
+    outbound.send(hello(version::fingerprint())).await.unwrap();
+    let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await?;
+    let mut stream = attached.into_inner();
+    let mut answered = 0;
+    while answered < batches_max
+        && let Some(message) = stream.message().await?
+    {
+        if let Some(Response::Batch(message)) = message.message {
+            let work = batch::from_message(&message).unwrap();
+            let (codes, velocities) = realizations::pack(&fake::outcomes(&work));
+            let result = BatchResult { batch: message.batch, codes, velocities, elapsed_s: 0.001 };
+            let result = AttachRequest { message: Some(Request::Result(result)) };
+            outbound.send(result).await.unwrap();
+            answered += 1;
+        }
+    }
+    Ok(answered)
+}
+
+async fn submit(
+    client: &mut JobsClient<Channel>,
+    job: &osteon_common::job::JobSpecification,
+    request_id: &str,
+) -> Result<String, Status> {
+    let request = SubmitRequest {
+        specification: Some(specification::to_message(job)),
+        request_id: request_id.to_owned(),
+    };
+    Ok(client.submit(request).await?.into_inner().job)
+}
+
+/// Watches a job to its end; the last snapshot.
+async fn watch(client: &mut JobsClient<Channel>, job: &str) -> JobSnapshot {
+    let request = WatchRequest { job: job.to_owned() };
+    let mut stream = client.watch(request).await.unwrap().into_inner();
+    let mut last = None;
+    let follow = async {
+        while let Some(response) = stream.message().await.unwrap() {
+            last = response.snapshot;
+        }
+    };
+    tokio::time::timeout(TIMEOUT, follow).await.unwrap();
+    last.unwrap()
+}
+
+async fn fetch(client: &mut JobsClient<Channel>, job: &str) -> Result<Vec<Part>, Status> {
+    let request = FetchRequest { job: job.to_owned() };
+    let mut stream = client.fetch(request).await?.into_inner();
+    let mut parts = Vec::new();
+    while let Some(response) = stream.message().await? {
+        parts.push(response.part.unwrap());
+    }
+    Ok(parts)
+}
+
+/// Asserts that what `job` left is the plain run's result.
+async fn check_leftover(
+    client: &mut JobsClient<Channel>,
+    job: &str,
+    expected: &osteon_common::job::JobSpecification,
+) {
+    let parts = fetch(client, job).await.unwrap();
+    let (mut result, mut rows, mut outcomes) = (None, 0, Vec::new());
+    assert_eq!(parts[0], Part::Specification(specification::to_message(expected)));
+    for part in &parts[1..] {
+        match part {
+            Part::Specification(_) => panic!("a second specification"),
+            Part::Result(message) => result = Some(message),
+            Part::History(block) => rows += block.rows.len() as u64,
+            Part::Realizations(block) => {
+                let (first, block) = realizations::from_message(block).unwrap();
+                assert_eq!(first, outcomes.len() as u64);
+                outcomes.extend(block);
+            }
+        }
+    }
+    let result = results::from_message(result.unwrap(), outcomes).unwrap();
+    assert_eq!(result, fake::plain_run(expected));
+    assert_eq!(rows, result.evaluations);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_goes_from_submission_to_result() {
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut client = client(&coordinator).await;
+    let specification = fake::identification(500, 60, 7);
+    let job = submit(&mut client, &specification, "one").await.unwrap();
+    assert_eq!(submit(&mut client, &specification, "one").await.unwrap(), job);
+    let unfinished = fetch(&mut client, &job).await.unwrap_err();
+    assert_eq!(unfinished.code(), Code::FailedPrecondition, "{unfinished}");
+
+    let mut workers = Vec::new();
+    for _ in 0..2 {
+        workers.push(tokio::spawn(work(channel(&coordinator).await, usize::MAX)));
+    }
+    let last = watch(&mut client, &job).await;
+    assert_eq!((last.state(), last.status()), (JobState::Ended, JobStatus::MaxEvaluations));
+    assert_eq!((last.evaluations, last.realizations, last.workers), (60, 500, 2));
+    check_leftover(&mut client, &job, &specification).await;
+
+    coordinator.shutdown().await;
+    for worker in workers {
+        assert_eq!(worker.await.unwrap().unwrap_err().code(), Code::Unavailable);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_restarted_coordinator_goes_on() {
+    let directory = tempfile::tempdir().unwrap();
+    let socket = format!("unix:{}", directory.path().join("o.sock").display());
+    let store = || Box::new(SqliteStore::open(directory.path()).unwrap());
+    let specification = fake::identification(300, 40, 3);
+
+    let first = coordinator(&socket, store()).await;
+    let mut jobs = client(&first).await;
+    let job = submit(&mut jobs, &specification, "").await.unwrap();
+    assert_eq!(work(channel(&first).await, 25).await.unwrap(), 25);
+    let request = GetRequest { job: job.clone() };
+    let before = jobs.get(request).await.unwrap().into_inner().snapshot.unwrap();
+    assert_eq!(before.state(), JobState::Running);
+    drop(jobs);
+    first.shutdown().await;
+
+    let second = coordinator(&socket, store()).await;
+    let mut jobs = client(&second).await;
+    let worker = tokio::spawn(work(channel(&second).await, usize::MAX));
+    let last = watch(&mut jobs, &job).await;
+    assert!(last.evaluations >= before.evaluations);
+    check_leftover(&mut jobs, &job, &specification).await;
+    drop(jobs);
+    second.shutdown().await;
+    assert_eq!(worker.await.unwrap().unwrap_err().code(), Code::Unavailable);
+
+    // What has ended is there after another restart.
+    let third = coordinator(&socket, store()).await;
+    let mut jobs = client(&third).await;
+    check_leftover(&mut jobs, &job, &specification).await;
+    let listed = jobs.list(ListRequest::default()).await.unwrap().into_inner();
+    assert_eq!(listed.jobs.len(), 1);
+    let wanted = JobSnapshot { workers: 0, ..last };
+    assert_eq!(listed.jobs[0], JobSnapshot { realizations_done: 0, ..wanted });
+    drop(jobs);
+    third.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_waiting_job_says_what_it_waits_for_and_can_be_cancelled() {
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut client = client(&coordinator).await;
+    let job = submit(&mut client, &fake::propagation(100, 1), "").await.unwrap();
+    let request = GetRequest { job: job.clone() };
+    let snapshot = client.get(request).await.unwrap().into_inner().snapshot.unwrap();
+    assert_eq!(snapshot.state(), JobState::Running);
+    assert!(snapshot.waiting_for.starts_with("no worker is attached (since "), "{snapshot:?}");
+    for _ in 0..2 {
+        let request = CancelRequest { job: job.clone() };
+        let snapshot = client.cancel(request).await.unwrap().into_inner().snapshot.unwrap();
+        assert_eq!(snapshot.status(), JobStatus::Cancelled);
+    }
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bad_requests_are_refused_with_reasons() {
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut client = client(&coordinator).await;
+
+    let mut wrong = fake::identification(0, 10, 1);
+    wrong.setup.layers.coupling.density = -1.0;
+    let refused = submit(&mut client, &wrong, "").await.unwrap_err();
+    let violations = status::violations(&refused).unwrap();
+    let fields: Vec<&str> = violations.iter().map(|violation| violation.field.as_str()).collect();
+    assert_eq!(fields, ["layers.coupling.density", "monte_carlo.realizations"]);
+
+    submit(&mut client, &fake::propagation(10, 1), "taken").await.unwrap();
+    let refused = submit(&mut client, &fake::propagation(10, 2), "taken").await.unwrap_err();
+    assert_eq!(refused.code(), Code::AlreadyExists, "{refused}");
+    let refused = submit(&mut client, &fake::propagation(10, 1), &"x".repeat(257)).await;
+    assert_eq!(refused.unwrap_err().code(), Code::InvalidArgument);
+    for job in ["99", "none", ""] {
+        let refused = client.get(GetRequest { job: job.to_owned() }).await.unwrap_err();
+        assert_eq!(refused.code(), Code::NotFound, "{refused}");
+    }
+    let request = ListRequest { page_token: "nonsense".to_owned(), ..ListRequest::default() };
+    assert_eq!(client.list(request).await.unwrap_err().code(), Code::InvalidArgument);
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_with_other_numerics_is_refused() {
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let (outbound, messages) = mpsc::channel(16);
+    outbound.send(hello("osteon 0.0.0 numerics 0".to_owned())).await.unwrap();
+    let mut workers = workers_client(channel(&coordinator).await);
+    let mut stream = workers.attach(ReceiverStream::new(messages)).await.unwrap().into_inner();
+    let refused = stream.message().await.unwrap_err();
+    assert_eq!(refused.code(), Code::FailedPrecondition);
+    assert!(refused.message().contains("osteon 0.0.0 numerics 0"), "{refused}");
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn health_and_reflection_are_on_the_same_port() {
+    use tonic_health::pb::health_check_response::ServingStatus;
+    use tonic_health::pb::health_client::HealthClient;
+    use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
+    use tonic_reflection::pb::v1::server_reflection_request::MessageRequest;
+    use tonic_reflection::pb::v1::server_reflection_response::MessageResponse;
+
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut health = HealthClient::new(channel(&coordinator).await);
+    for service in ["", "osteon.v1.Jobs", "osteon.v1.Workers"] {
+        let request = tonic_health::pb::HealthCheckRequest { service: service.to_owned() };
+        let status = health.check(request).await.unwrap().into_inner().status();
+        assert_eq!(status, ServingStatus::Serving, "{service}");
+    }
+    let request = tonic_reflection::pb::v1::ServerReflectionRequest {
+        host: String::new(),
+        message_request: Some(MessageRequest::ListServices(String::new())),
+    };
+    let mut reflection = ServerReflectionClient::new(channel(&coordinator).await);
+    let requests = tokio_stream::once(request);
+    let mut answers = reflection.server_reflection_info(requests).await.unwrap().into_inner();
+    let answer = answers.message().await.unwrap().unwrap().message_response.unwrap();
+    let MessageResponse::ListServicesResponse(listed) = answer else { panic!("{answer:?}") };
+    let names: Vec<&str> = listed.service.iter().map(|service| service.name.as_str()).collect();
+    for expected in ["osteon.v1.Jobs", "osteon.v1.Workers", "grpc.health.v1.Health"] {
+        assert!(names.contains(&expected), "{names:?}");
+    }
+    drop((health, reflection, answers));
+    coordinator.shutdown().await;
+}

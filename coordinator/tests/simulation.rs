@@ -1,0 +1,50 @@
+//! Coordinator, workers and store in one thread under a false clock. One seed decides order,
+//! delays, deaths, stalls, answers that come late, twice or malformed, refusals of the store and
+//! restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes.
+//!
+//! `OSTEON_SIMULATION_SEED=N` runs one seed, for a look at a failure.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+mod fake;
+mod world;
+
+use std::panic;
+
+use world::World;
+
+/// Schedules of one test run.
+const SCHEDULES: u64 = 3000;
+
+#[test]
+fn every_schedule_leaves_what_a_plain_loop_computes() {
+    let one = std::env::var("OSTEON_SIMULATION_SEED").ok();
+    let seeds = match one.and_then(|text| text.parse().ok()) {
+        Some(seed) => seed..seed + 1,
+        None => 0..SCHEDULES,
+    };
+    let mut seen = world::Counts::default();
+    for seed in seeds.clone() {
+        match panic::catch_unwind(|| World::run(seed)) {
+            Ok(counts) => seen.add(&counts),
+            Err(cause) => {
+                eprintln!("failed with OSTEON_SIMULATION_SEED={seed}");
+                panic::resume_unwind(cause);
+            }
+        }
+    }
+    // A simulation in which nothing goes wrong tests nothing.
+    if seeds.end - seeds.start == SCHEDULES {
+        let world::Counts { lost, revoked, closed, late, restarts, refusals } = seen;
+        for (name, count) in [
+            ("workers lost", lost),
+            ("batches revoked", revoked),
+            ("streams closed", closed),
+            ("late answers", late),
+            ("restarts", restarts),
+            ("refusals of the store", refusals),
+        ] {
+            assert!(count > SCHEDULES / 4, "{name}: {count}");
+        }
+    }
+}

@@ -1,0 +1,462 @@
+//! The world around a simulated coordinator.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::version;
+use osteon_coordinator::config::Config;
+use osteon_coordinator::effect::{Answer, Effect, Record};
+use osteon_coordinator::event::{Event, Hello, Request};
+use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::reactor::{RestoredJob, react};
+use osteon_coordinator::sanity::sanity_check;
+use osteon_coordinator::search::Search;
+use osteon_coordinator::state::{BATCHES_IN_FLIGHT_MAX, State};
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::store::{Store, StoredJob};
+use osteon_proto::batch::Work;
+
+use crate::fake;
+
+const TICK: Duration = Duration::from_millis(100);
+/// No schedule takes longer than this, in its own time.
+const HOUR: Duration = Duration::from_secs(3600);
+/// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
+const LOST_ALONE_MAX: u32 = 2;
+
+/// How often what happened.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) lost: u64,
+    pub(crate) revoked: u64,
+    pub(crate) closed: u64,
+    pub(crate) late: u64,
+    pub(crate) restarts: u64,
+    pub(crate) refusals: u64,
+}
+
+impl Counts {
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.lost += other.lost;
+        self.revoked += other.revoked;
+        self.closed += other.closed;
+        self.late += other.late;
+        self.restarts += other.restarts;
+        self.refusals += other.refusals;
+    }
+}
+
+/// Something that will happen.
+enum Happening {
+    Tick,
+    /// A client submits its job until it hears that it is accepted.
+    Submit(usize),
+    /// A worker attaches.
+    Arrive,
+    /// A worker's message arrives.
+    Message(WorkerId, Event),
+    /// A worker's stream breaks.
+    Break(WorkerId),
+    /// A record reaches the disk, or does not.
+    Write(Record),
+    /// A report of the store arrives.
+    Report(Event),
+    /// The coordinator is killed and starts again.
+    Restart,
+}
+
+struct Client {
+    specification: Arc<JobSpecification>,
+    request_id: String,
+    job: Option<JobId>,
+}
+
+#[derive(Default)]
+struct Worker {
+    /// It computes nothing and says nothing, but its stream stands.
+    stalled: bool,
+    heard: Duration,
+    holds: BTreeMap<BatchId, Work>,
+}
+
+pub(crate) struct World {
+    random: u64,
+    now: Duration,
+    agenda: BTreeMap<(Duration, u64), Happening>,
+    state: State,
+    config: Config,
+    store: MemoryStore,
+    clients: Vec<Client>,
+    submissions: BTreeMap<Token, usize>,
+    workers: BTreeMap<WorkerId, Worker>,
+    lost_alone: BTreeMap<(u64, u64), u32>,
+    number: u64,
+    counts: Counts,
+}
+
+impl World {
+    /// Runs one schedule to its end and checks what it left.
+    pub(crate) fn run(seed: u64) -> Counts {
+        let mut world = Self::new(seed);
+        while !world.done() {
+            let Some(((at, _), happening)) = world.agenda.pop_first() else {
+                panic!("nothing will ever happen again");
+            };
+            assert!(at < HOUR, "still not done: {:?}", world.state);
+            world.now = at;
+            world.happen(happening);
+        }
+        world.check_results();
+        world.counts
+    }
+
+    fn new(seed: u64) -> Self {
+        let mut random = fake::mix(seed);
+        let mut draw = |below: u64| {
+            random = fake::mix(random);
+            random % below
+        };
+        let config = Config {
+            expiry: Duration::from_secs(1),
+            active_jobs_max: 1 + draw(2) as usize,
+            batch_target: Duration::from_millis(10 + draw(200)),
+            store_retry: Duration::from_millis(300),
+            ..Config::default()
+        };
+        let clients: Vec<Client> = (0..1 + draw(3))
+            .map(|number| {
+                let specification = match draw(4) {
+                    0 => fake::propagation(1 + draw(60), seed),
+                    _ => fake::identification(1 + draw(40), 2 + draw(12), seed),
+                };
+                let request_id = format!("request {number}");
+                Client { specification: Arc::new(specification), request_id, job: None }
+            })
+            .collect();
+        let (workers, restarts) = (1 + draw(4), draw(3));
+        let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
+        let mut world = Self {
+            random,
+            now: Duration::ZERO,
+            agenda: BTreeMap::new(),
+            state: State::new(config, Duration::ZERO),
+            config,
+            store: MemoryStore::new(),
+            clients,
+            submissions: BTreeMap::new(),
+            workers: BTreeMap::new(),
+            lost_alone: BTreeMap::new(),
+            number: 1,
+            counts: Counts::default(),
+        };
+        world.agenda.insert((TICK, 0), Happening::Tick);
+        for client in 0..world.clients.len() {
+            world.within(500, Happening::Submit(client));
+        }
+        for _ in 0..workers {
+            world.within(500, Happening::Arrive);
+        }
+        for at in restarts {
+            world.after(at, Happening::Restart);
+        }
+        world
+    }
+
+    fn draw(&mut self, below: u64) -> u64 {
+        self.random = fake::mix(self.random);
+        self.random % below
+    }
+
+    fn number(&mut self) -> u64 {
+        self.number += 1;
+        self.number
+    }
+
+    fn after(&mut self, ms: u64, happening: Happening) {
+        let number = self.number();
+        self.agenda.insert((self.now + Duration::from_millis(ms), number), happening);
+    }
+
+    fn within(&mut self, ms: u64, happening: Happening) {
+        let ms = 1 + self.draw(ms);
+        self.after(ms, happening);
+    }
+
+    fn done(&self) -> bool {
+        let stored = self.store.clone().jobs().unwrap();
+        let ended = |client: &Client| {
+            let of_client = |job: &&StoredJob| Some(job.record.job) == client.job;
+            stored.iter().find(of_client).is_some_and(|job| job.end.is_some())
+        };
+        self.clients.iter().all(ended) && self.state.is_idle()
+    }
+
+    fn happen(&mut self, happening: Happening) {
+        match happening {
+            Happening::Tick => self.tick(),
+            Happening::Submit(client) => self.submit(client),
+            Happening::Arrive => self.arrive(),
+            Happening::Message(worker, event) => {
+                if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
+                    self.message(worker, event);
+                }
+            }
+            Happening::Break(worker) => {
+                if !self.workers.contains_key(&worker) {
+                } else if self.may_die(worker) {
+                    self.bury(worker);
+                    self.react(Event::StreamEnded { worker });
+                } else {
+                    self.answer_all(worker);
+                }
+            }
+            Happening::Write(record) => self.write(&record),
+            Happening::Report(event) => self.react(event),
+            Happening::Restart => self.restart(),
+        }
+    }
+
+    fn tick(&mut self) {
+        self.after(TICK.as_millis() as u64, Happening::Tick);
+        let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
+        for worker in workers {
+            let silent = self.now - self.workers[&worker].heard > self.config.expiry;
+            let known = self.workers.get_mut(&worker).unwrap();
+            if !known.stalled {
+                known.heard = self.now;
+                self.react(Event::Heartbeat { worker });
+            } else if silent && !self.may_die(worker) {
+                // It comes back to life in the last moment.
+                let known = self.workers.get_mut(&worker).unwrap();
+                known.stalled = false;
+                known.heard = self.now;
+                self.react(Event::Heartbeat { worker });
+                self.answer_all(worker);
+            }
+        }
+        self.react(Event::Tick);
+    }
+
+    fn answer_all(&mut self, worker: WorkerId) {
+        let known = &self.workers[&worker];
+        let holds: Vec<_> = known.holds.iter().map(|(batch, work)| (*batch, *work)).collect();
+        for (batch, work) in holds {
+            let answer = answer(worker, batch, &work);
+            self.within(50, Happening::Message(worker, answer));
+        }
+    }
+
+    fn submit(&mut self, client: usize) {
+        if self.clients[client].job.is_none() {
+            let token = Token(self.number());
+            self.submissions.insert(token, client);
+            let Client { specification, request_id, .. } = &self.clients[client];
+            let request = Request::Submit {
+                specification: specification.clone(),
+                request_id: request_id.clone(),
+            };
+            // Until it hears of acceptance, a client asks again.
+            self.react(Event::Requested { token, request });
+            self.within(2000, Happening::Submit(client));
+        }
+    }
+
+    fn arrive(&mut self) {
+        let worker = WorkerId(self.number());
+        let hello = Hello {
+            version: version::VERSION.to_owned(),
+            fingerprint: version::fingerprint(),
+            threads: 1 + self.draw(4) as u32,
+            host: "simulated".to_owned(),
+            process: 1,
+        };
+        self.workers.insert(worker, Worker { heard: self.now, ..Worker::default() });
+        self.react(Event::Hello { worker, hello });
+    }
+
+    fn message(&mut self, worker: WorkerId, event: Event) {
+        let known = self.workers.get_mut(&worker).unwrap();
+        if let Event::Answered { batch, outcomes, .. } = &event {
+            let held = known.holds.get(batch).copied();
+            let malformed = held.is_some_and(|work| outcomes.len() != work.count as usize);
+            if malformed && !self.may_die(worker) {
+                let answer = answer(worker, *batch, &held.unwrap());
+                self.message(worker, answer);
+                return;
+            }
+            self.counts.late += u64::from(held.is_none());
+            let known = self.workers.get_mut(&worker).unwrap();
+            if !malformed {
+                known.holds.remove(batch);
+            }
+        }
+        self.workers.get_mut(&worker).unwrap().heard = self.now;
+        self.react(event);
+    }
+
+    /// Whether the coordinator may lose this worker without a third lone death of a realization.
+    fn may_die(&mut self, worker: WorkerId) -> bool {
+        let holds = &self.workers[&worker].holds;
+        let Some(work) = holds.values().next().filter(|work| holds.len() == 1 && work.count == 1)
+        else {
+            return true;
+        };
+        let key = work.point.0.iter().fold(work.seed, |key, x| fake::mix(key ^ x.to_bits()));
+        let lost = self.lost_alone.entry((key, work.first)).or_default();
+        *lost += 1;
+        *lost <= LOST_ALONE_MAX
+    }
+
+    /// A worker is gone; another comes in its place.
+    fn bury(&mut self, worker: WorkerId) {
+        self.workers.remove(&worker);
+        self.counts.lost += 1;
+        self.within(500, Happening::Arrive);
+    }
+
+    fn write(&mut self, record: &Record) {
+        let (job, key) = record.key();
+        let event = if self.draw(30) == 0 {
+            self.counts.refusals += 1;
+            Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
+        } else {
+            put(&mut self.store, record);
+            Event::Stored { job, key }
+        };
+        self.within(5, Happening::Report(event));
+    }
+
+    /// Kills the coordinator: what was on its way to the disk may or may not have reached it.
+    fn restart(&mut self) {
+        self.counts.restarts += 1;
+        let agenda = std::mem::take(&mut self.agenda);
+        for (at, happening) in agenda {
+            match happening {
+                Happening::Write(record) => {
+                    if self.draw(2) == 0 {
+                        put(&mut self.store, &record);
+                    }
+                }
+                Happening::Message(..) | Happening::Break(_) | Happening::Report(_) => {}
+                stays => {
+                    self.agenda.insert(at, stays);
+                }
+            }
+        }
+        for _ in 0..self.workers.len() {
+            self.within(500, Happening::Arrive);
+        }
+        self.workers.clear();
+        self.submissions.clear();
+        let restored = RestoredJob::load(&mut self.store).unwrap();
+        let (state, effects) = State::restore(self.config, restored, self.now);
+        self.state = state;
+        sanity_check(&self.state).unwrap();
+        self.apply(effects);
+    }
+
+    fn react(&mut self, event: Event) {
+        let shown = format!("{event:?}");
+        let effects = react(&mut self.state, event, self.now);
+        if let Err(insane) = sanity_check(&self.state) {
+            panic!("{insane} after {shown}\n{:#?}", self.state);
+        }
+        self.apply(effects);
+    }
+
+    fn apply(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            match effect {
+                Effect::Welcome { worker, .. } | Effect::Heartbeat { worker } => {
+                    assert!(self.workers.contains_key(&worker));
+                }
+                Effect::Send { worker, batch, work } => self.sent(worker, batch, work),
+                Effect::Revoke { worker, batch } => {
+                    self.counts.revoked += 1;
+                    let known = self.workers.get_mut(&worker).unwrap();
+                    known.holds.remove(&batch).unwrap();
+                }
+                Effect::Close { worker, .. } => {
+                    self.counts.closed += 1;
+                    self.bury(worker);
+                }
+                Effect::Store(record) => self.within(20, Happening::Write(record)),
+                Effect::Answer { token, answer } => self.answered(token, &answer),
+                Effect::Publish { .. } => {}
+                Effect::Stop => panic!("nobody asked the coordinator to stop"),
+            }
+        }
+    }
+
+    /// A worker gets a batch; the dice say what becomes of it.
+    fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
+        let known = self.workers.get_mut(&worker).unwrap();
+        assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
+        assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
+        let right = answer(worker, batch, &work);
+        match self.draw(100) {
+            0..3 => self.within(100, Happening::Break(worker)),
+            3..5 => self.workers.get_mut(&worker).unwrap().stalled = true,
+            5..10 => self.within(4000, Happening::Message(worker, right)),
+            10..13 => {
+                self.within(100, Happening::Message(worker, right.clone()));
+                self.within(300, Happening::Message(worker, right));
+            }
+            13 => {
+                let wrong = Work { count: work.count + 1, ..work };
+                let event = answer(worker, batch, &wrong);
+                self.within(100, Happening::Message(worker, event));
+            }
+            14 => {
+                self.within(50, Happening::Message(worker, Event::WorkerDrains { worker }));
+                self.within(100, Happening::Message(worker, right));
+            }
+            _ => self.within(150, Happening::Message(worker, right)),
+        }
+    }
+
+    fn answered(&mut self, token: Token, answer: &Answer) {
+        let Some(client) = self.submissions.remove(&token) else {
+            return;
+        };
+        match answer {
+            Answer::Submitted(job) => {
+                let stored = self.store.clone().jobs().unwrap();
+                assert!(stored.iter().any(|stored| stored.record.job == *job), "not durable");
+                let known = self.clients[client].job.get_or_insert(*job);
+                assert_eq!(known, job, "one request, two jobs");
+            }
+            Answer::Refused(_) => {}
+            other => panic!("{other:?} to a submission"),
+        }
+    }
+
+    fn check_results(&mut self) {
+        let stored = self.store.jobs().unwrap();
+        assert_eq!(stored.len(), self.clients.len(), "a job too many");
+        for StoredJob { record, end } in stored {
+            let evaluations = self.store.evaluations(record.job).unwrap();
+            let told = evaluations.into_iter().map(|stored| (stored.point, stored.outcomes));
+            let search = Search::replay(record.specification.clone(), told).unwrap();
+            let result = search.result(&end.unwrap().ending, version::VERSION);
+            // As text: an unknown standard error is NaN, which equals nothing.
+            let expected = fake::plain_run(&record.specification);
+            assert_eq!(format!("{result:?}"), format!("{expected:?}"));
+        }
+    }
+}
+
+fn answer(worker: WorkerId, batch: BatchId, work: &Work) -> Event {
+    Event::Answered { worker, batch, outcomes: fake::outcomes(work), elapsed_s: 0.01 }
+}
+
+fn put(store: &mut MemoryStore, record: &Record) {
+    match record {
+        Record::Job(record) => store.put_job(record),
+        Record::Evaluation(record) => store.put_evaluation(record),
+        Record::End(record) => store.finish_job(record),
+    }
+    .unwrap();
+}

@@ -1,0 +1,74 @@
+//! Runs the commands that the documentation shows.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use support::{Scratch, osteon};
+
+/// Commands in the `console` blocks of a page, in order, without the program's name.
+fn commands(page: &str) -> Vec<String> {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
+    text.split("```console\n")
+        .skip(1)
+        .flat_map(|block| block.split("```").next().unwrap_or("").lines())
+        .filter_map(|line| {
+            line.strip_prefix("osteon ").or_else(|| line.strip_prefix("cargo run --release -- "))
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn the_readmes_commands_do_what_they_say() {
+    let scratch = Scratch::new();
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), &scratch.path("examples"));
+    let all = commands("README.md");
+    assert!(all.len() > 5, "{all:?}");
+    for (i, command) in all.iter().enumerate() {
+        // The same command with `--out` comes later: once is enough.
+        if all[i + 1..].iter().any(|later| later.starts_with(command.as_str())) {
+            continue;
+        }
+        let (arguments, file) = match command.split_once(" > ") {
+            Some((arguments, file)) => (arguments, Some(file)),
+            None => (command.as_str(), None),
+        };
+        let output = osteon()
+            .args(arguments.split_whitespace())
+            .current_dir(scratch.path("."))
+            .output()
+            .unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "osteon {command}: {errors}");
+        if let Some(file) = file {
+            fs::write(scratch.path(file), &output.stdout).unwrap();
+        }
+    }
+    // The identification of the first command matches the data's moments to its tolerance.
+    let result = fs::read_to_string(scratch.path("quick/result.json")).unwrap();
+    let result: serde_json::Value = serde_json::from_str(&result).unwrap();
+    assert_eq!(result["status"], "converged");
+    for moment in ["mean", "coefficient_of_variation"] {
+        let (model, data) = (&result["velocity"][moment], &result["data"][moment]);
+        let relative = model.as_f64().unwrap() / data.as_f64().unwrap() - 1.0;
+        // √cost_tolerance
+        assert!(relative.abs() <= 1e-4, "{moment}: {relative}");
+    }
+}

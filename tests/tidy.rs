@@ -1,0 +1,180 @@
+//! Reads the repository: what no compiler and no linter holds.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{DependencyKind, MetadataCommand};
+
+/// Longest source file, lines.
+const FILE_LINES_MAX: usize = 600;
+/// Longest function, lines.
+const FUNCTION_LINES_MAX: usize = 70;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Files under the root with one of these endings, without build output.
+fn files(endings: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![root().to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            if path.is_dir() {
+                if !name.starts_with('.') && name != "target" {
+                    folders.push(path);
+                }
+            } else if endings.iter().any(|ending| name.ends_with(ending)) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
+    let metadata = MetadataCommand::new().no_deps().exec().unwrap();
+    let arrows: BTreeSet<(String, String)> = metadata
+        .packages
+        .iter()
+        .flat_map(|package| package.dependencies.iter().map(move |to| (package, to)))
+        .filter(|(_, to)| to.kind == DependencyKind::Normal && to.name.starts_with("osteon"))
+        .map(|(from, to)| (from.name.to_string(), to.name.clone()))
+        .collect();
+    let allowed = [
+        ("osteon", "osteon-common"),
+        ("osteon", "osteon-coordinator"),
+        ("osteon", "osteon-proto"),
+        ("osteon", "osteon-solver"),
+        ("osteon", "osteon-worker"),
+        ("osteon-coordinator", "osteon-common"),
+        ("osteon-coordinator", "osteon-proto"),
+        ("osteon-proto", "osteon-common"),
+        ("osteon-solver", "osteon-common"),
+        ("osteon-worker", "osteon-common"),
+        ("osteon-worker", "osteon-proto"),
+        ("osteon-worker", "osteon-solver"),
+    ];
+    let allowed = allowed.map(|(from, to)| (from.to_owned(), to.to_owned()));
+    assert_eq!(arrows, BTreeSet::from(allowed));
+}
+
+#[test]
+fn state_and_reactions_know_no_clock_no_socket_and_no_future() {
+    let reactor = root().join("coordinator/src/reactor");
+    let pure = files(&[".rs"]).into_iter().filter(|path| {
+        path.starts_with(&reactor)
+            || [
+                "reactor.rs",
+                "state.rs",
+                "search.rs",
+                "simplex.rs",
+                "event.rs",
+                "effect.rs",
+                "evaluation.rs",
+            ]
+            .iter()
+            .any(|name| path.ends_with(Path::new("coordinator/src").join(name)))
+            || path.ends_with("worker/src/state.rs")
+    });
+    let mut count = 0;
+    for path in pure {
+        count += 1;
+        let text = fs::read_to_string(&path).unwrap();
+        for word in [
+            "async ",
+            ".await;",
+            ".await?",
+            "Instant::now",
+            "SystemTime",
+            "tokio::",
+            "tonic::",
+            "std::net",
+            "std::fs",
+        ] {
+            assert!(!text.contains(word), "{} contains {word:?}", path.display());
+        }
+    }
+    assert!(count > 10, "only {count} files were found");
+}
+
+#[test]
+fn files_and_functions_are_short() {
+    let mut long = Vec::new();
+    for path in files(&[".rs"]) {
+        let text = fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        if lines.len() > FILE_LINES_MAX {
+            long.push(format!("{}: {} lines", path.display(), lines.len()));
+        }
+        for (start, line) in lines.iter().enumerate() {
+            let code = line.trim_start();
+            let opens = [
+                "fn ",
+                "pub fn ",
+                "pub(crate) fn ",
+                "pub(super) fn ",
+                "async fn ",
+                "pub async fn ",
+            ]
+            .iter()
+            .any(|word| code.starts_with(word));
+            if !opens {
+                continue;
+            }
+            // The code is formatted: a function ends at its own indentation.
+            let end = format!("{}}}", &line[..line.len() - code.len()]);
+            let length = lines[start..].iter().position(|line| *line == end).unwrap_or(0);
+            if length > FUNCTION_LINES_MAX {
+                long.push(format!("{}:{}: {length} lines", path.display(), start + 1));
+            }
+        }
+    }
+    assert!(long.is_empty(), "too long:\n{}", long.join("\n"));
+}
+
+#[test]
+fn nothing_is_left_over() {
+    // In two pieces, so that this file does not find itself.
+    let words = [
+        concat!("todo", "!("),
+        concat!("unimplemented", "!("),
+        concat!("dbg", "!("),
+        concat!("#[ig", "nore"),
+        concat!("#[al", "low("),
+        concat!("FIX", "ME"),
+    ];
+    for path in files(&[".rs", ".proto", ".toml", ".md"]) {
+        let text = fs::read_to_string(&path).unwrap();
+        for word in words {
+            // CONTRIBUTING.md names what is not used.
+            if !path.ends_with("CONTRIBUTING.md") {
+                assert!(!text.contains(word), "{} contains {word:?}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn links_in_the_documentation_lead_somewhere() {
+    let mut count = 0;
+    for path in files(&[".md"]) {
+        let text = fs::read_to_string(&path).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            if target.starts_with("http") || target.starts_with('#') {
+                continue;
+            }
+            count += 1;
+            let linked = path.parent().unwrap().join(target);
+            assert!(linked.exists(), "{}: {target} does not exist", path.display());
+        }
+    }
+    assert!(count > 5, "only {count} links were found");
+}
