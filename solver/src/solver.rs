@@ -18,7 +18,7 @@ use crate::signal::{Grid, Signal};
 use crate::tables::Tables;
 
 /// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
-const PAIRS_MARGIN: f64 = 4.0;
+const PAIRS_MARGIN: f64 = 2.0;
 
 /// Solves cases of one setup; holds the tables that all its realizations share.
 #[derive(Debug)]
