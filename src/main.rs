@@ -1,2 +1,64 @@
-//! Front door.
-fn main() {}
+//! The front door of osteon: reads the command line, calls the crates behind it, prints.
+//!
+//! Results go to stdout through [`output`], everything else to stderr. Exit codes: 0 done, 1 the
+//! run failed or was cancelled, 2 bad usage or bad input.
+
+mod arguments;
+mod client;
+mod commands;
+mod embedded;
+mod ending;
+mod output;
+mod progress;
+mod resolved;
+mod results_directory;
+mod signals;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use tracing_subscriber::EnvFilter;
+
+use crate::arguments::Arguments;
+use crate::ending::{Ending, Failure};
+use crate::resolved::Resolved;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments) {
+        Ok(Ending::Done) | Err(Failure::ClosedPipe) => ExitCode::SUCCESS,
+        Ok(Ending::RunFailed) => ExitCode::from(1),
+        Err(failure) => {
+            // Nothing is left to be done when stderr is closed, too.
+            let _closed = writeln!(std::io::stderr(), "osteon: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<Ending, Failure> {
+    let resolved = Resolved::from_arguments(arguments)?;
+    trace(resolved.default_log_level());
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::failed(anyhow::Error::new(error).context("cannot start")))?;
+    let result = runtime.block_on(commands::run(resolved));
+    // A computation that was given up may still hold a thread; nobody waits for it.
+    runtime.shutdown_background();
+    result
+}
+
+/// Logs go to stderr; `RUST_LOG` overrides the level.
+fn trace(default_level: &str) {
+    let filter =
+        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_level));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(progress::LogWriter)
+        .with_ansi(false)
+        .with_target(false)
+        .init();
+}

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
 use std::fs;

@@ -1,8 +1,25 @@
 //! Protocol buffers of `osteon.v1`, and the one place where messages become `osteon-common`
 //! types and back.
+//!
+//! Messages from a peer are never trusted: what a client sends is checked field by field and
+//! every [`osteon_common::violations::Violations`] is reported at once, what a coordinator or a
+//! worker sends is either well formed or a typed [`malformed::Malformed`].
+
+pub mod batch;
+pub mod endpoint;
+pub mod malformed;
+pub mod realizations;
+pub mod results;
+pub mod setup;
+pub mod specification;
+pub mod status;
 
 /// The generated messages, clients and servers of package `osteon.v1`.
-#[expect(missing_docs, unreachable_pub, reason = "generated; comments come from the .proto files")]
+#[expect(
+    clippy::large_enum_variant,
+    clippy::allow_attributes,
+    reason = "generated from the .proto files"
+)]
 pub mod v1 {
     tonic::include_proto!("osteon.v1");
 

@@ -1,0 +1,188 @@
+//! A batch of realizations, as the coordinator sends it to a worker.
+
+use osteon_common::case::Setup;
+use osteon_common::check;
+use osteon_common::job::Sampling;
+use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX, SEED_MAX};
+use osteon_common::parameters::Point;
+use osteon_common::violations::Violations;
+
+use crate::malformed::Malformed;
+use crate::setup::{self, SetupMessages};
+use crate::v1;
+
+/// Realizations `first`, `first + 1`, … `first + count - 1` of one point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Work {
+    /// Layers, probe, picking, solver.
+    pub setup: Setup,
+    /// The point (a, δ).
+    pub point: Point,
+    /// Seed of the germs.
+    pub seed: u64,
+    /// How germs are drawn.
+    pub sampling: Sampling,
+    /// Index of the first realization.
+    pub first: u64,
+    /// How many, 1 to [`BATCH_REALIZATIONS_MAX`].
+    pub count: u32,
+}
+
+/// The message of batch number `batch`.
+pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
+    let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&work.setup);
+    v1::Batch {
+        batch,
+        layers: Some(layers),
+        probe: Some(probe),
+        picking: Some(picking),
+        solver: Some(solver),
+        point: work.point.0.to_vec(),
+        seed: work.seed,
+        sampling: work.sampling.name().to_owned(),
+        first: work.first,
+        count: work.count,
+    }
+}
+
+/// The work of a batch.
+///
+/// # Errors
+/// When the setup is incomplete (a worker must not fill in its own defaults) or invalid, the
+/// point has not seven finite numbers, or a number is beyond its limit.
+pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
+    let count = f64::from(message.count);
+    if message.count == 0 || message.count > BATCH_REALIZATIONS_MAX {
+        let allowed = "it must be 1 to 65536";
+        return Err(Malformed::OutOfRange { field: "count", value: count, allowed });
+    }
+    if message.first > REALIZATIONS_MAX - u64::from(message.count).min(REALIZATIONS_MAX) {
+        let allowed = "the batch must end within 10^7 realizations";
+        return Err(Malformed::OutOfRange { field: "first", value: message.first as f64, allowed });
+    }
+    if message.seed > SEED_MAX {
+        let allowed = "it must be at most 2^63 - 1";
+        return Err(Malformed::OutOfRange { field: "seed", value: message.seed as f64, allowed });
+    }
+    let mut violations = Violations::new();
+    let setup = read_setup(message, &mut violations)?;
+    let sampling = setup::named(
+        Some(&message.sampling),
+        &Sampling::ALL.map(|sampling| (sampling.name(), sampling)),
+        "sampling",
+        &mut violations,
+    );
+    violations.into_result(()).map_err(Malformed::InvalidSetup)?;
+    let (point, seed) = (point(&message.point)?, message.seed);
+    Ok(Work { setup, point, seed, sampling, first: message.first, count: message.count })
+}
+
+/// The point of seven finite numbers.
+///
+/// # Errors
+/// When there are not seven, or one is not finite.
+pub fn point(numbers: &[f64]) -> Result<Point, Malformed> {
+    let point: [f64; 7] = numbers.try_into().map_err(|_| Malformed::WrongLength {
+        field: "point",
+        found: numbers.len(),
+        expected: 7,
+    })?;
+    match point.iter().find(|number| !number.is_finite()) {
+        Some(&value) => {
+            let allowed = "every number of a point must be finite";
+            Err(Malformed::OutOfRange { field: "point", value, allowed })
+        }
+        None => Ok(Point(point)),
+    }
+}
+
+/// The setup, which must be complete: what it reads as must be written back as the same messages.
+fn read_setup(message: &v1::Batch, violations: &mut Violations) -> Result<Setup, Malformed> {
+    let (Some(layers), Some(probe), Some(picking), Some(solver)) =
+        (&message.layers, &message.probe, &message.picking, &message.solver)
+    else {
+        return Err(Malformed::IncompleteSetup);
+    };
+    let setup =
+        setup::from_messages(Some(layers), Some(probe), Some(picking), Some(solver), violations);
+    check::setup(&setup, violations);
+    if !violations.is_empty() {
+        return Ok(setup);
+    }
+    let written = setup::to_messages(&setup);
+    let complete = written.layers == *layers
+        && written.probe == *probe
+        && written.picking == *picking
+        && written.solver == *solver;
+    if complete { Ok(setup) } else { Err(Malformed::IncompleteSetup) }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const WORK: fn(f64, u64, u64, u32) -> Work = |density, seed, first, count| Work {
+        setup: Setup::default(),
+        point: Point([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+        seed,
+        sampling: Sampling::MonteCarlo,
+        first,
+        count,
+    };
+
+    proptest! {
+        #[test]
+        fn work_survives_the_wire(
+            number: u64,
+            density in 1e-300..1e300,
+            seed in 0..=SEED_MAX,
+            first in 0..REALIZATIONS_MAX - u64::from(BATCH_REALIZATIONS_MAX),
+            count in 1..=BATCH_REALIZATIONS_MAX,
+        ) {
+            let work = WORK(density, seed, first, count);
+            let message = to_message(number, &work);
+            prop_assert_eq!(message.batch, number);
+            prop_assert_eq!(from_message(&message), Ok(work));
+        }
+    }
+
+    fn refused(change: impl FnOnce(&mut v1::Batch)) -> Malformed {
+        let mut message = to_message(1, &WORK(1598.8, 1, 0, 10));
+        change(&mut message);
+        from_message(&message).unwrap_err()
+    }
+
+    #[test]
+    fn what_a_worker_must_not_guess_is_refused() {
+        assert_eq!(refused(|batch| batch.layers = None), Malformed::IncompleteSetup);
+        let without_density = |batch: &mut v1::Batch| {
+            batch.layers.as_mut().unwrap().coupling.as_mut().unwrap().density = None;
+        };
+        assert_eq!(refused(without_density), Malformed::IncompleteSetup);
+        assert!(matches!(
+            refused(|batch| batch.sampling = "dice".to_owned()),
+            Malformed::InvalidSetup(_)
+        ));
+        let negative = |batch: &mut v1::Batch| {
+            batch.layers.as_mut().unwrap().coupling.as_mut().unwrap().density = Some(-1.0);
+        };
+        assert!(matches!(refused(negative), Malformed::InvalidSetup(_)));
+    }
+
+    #[test]
+    fn each_number_has_its_limit() {
+        let field = |malformed| match malformed {
+            Malformed::OutOfRange { field, .. } | Malformed::WrongLength { field, .. } => field,
+            other => panic!("{other}"),
+        };
+        assert_eq!(field(refused(|batch| batch.count = 0)), "count");
+        assert_eq!(field(refused(|batch| batch.count = BATCH_REALIZATIONS_MAX + 1)), "count");
+        assert_eq!(field(refused(|batch| batch.first = REALIZATIONS_MAX - 9)), "first");
+        assert_eq!(field(refused(|batch| batch.first = u64::MAX)), "first");
+        assert_eq!(field(refused(|batch| batch.seed = SEED_MAX + 1)), "seed");
+        assert_eq!(field(refused(|batch| batch.point.clear())), "point");
+        assert_eq!(field(refused(|batch| batch.point[6] = f64::NAN)), "point");
+    }
+}

@@ -1,0 +1,87 @@
+//! Outcomes of consecutive indices, packed: a code byte and a double each.
+
+use osteon_common::outcome::{self, Outcome};
+
+use crate::malformed::Malformed;
+use crate::v1;
+
+/// The block of `outcomes` whose first has index `first`.
+pub fn to_message(first: u64, outcomes: &[Outcome]) -> v1::RealizationBlock {
+    let (codes, velocities) = pack(outcomes);
+    v1::RealizationBlock { first, codes, velocities }
+}
+
+/// Index of the first realization of a block, and its outcomes.
+///
+/// # Errors
+/// As [`unpack`].
+pub fn from_message(block: &v1::RealizationBlock) -> Result<(u64, Vec<Outcome>), Malformed> {
+    Ok((block.first, unpack(&block.codes, &block.velocities)?))
+}
+
+/// Code bytes and velocities (m/s, 0 on failure) of `outcomes`, in their order.
+pub fn pack(outcomes: &[Outcome]) -> (Vec<u8>, Vec<f64>) {
+    outcomes.iter().map(|&outcome| outcome::encode(outcome)).unzip()
+}
+
+/// The outcomes that [`pack`] wrote.
+///
+/// # Errors
+/// When the lengths differ, or a pair is not one that an outcome encodes to.
+pub fn unpack(codes: &[u8], velocities: &[f64]) -> Result<Vec<Outcome>, Malformed> {
+    if codes.len() != velocities.len() {
+        return Err(Malformed::WrongLength {
+            field: "velocities",
+            found: velocities.len(),
+            expected: codes.len(),
+        });
+    }
+    let pairs = codes.iter().zip(velocities).enumerate();
+    pairs
+        .map(|(index, (&code, &velocity))| {
+            outcome::decode(code, velocity).ok_or(Malformed::Outcome { index, code, velocity })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::outcome::FailureKind;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn outcomes() -> impl Strategy<Value = Vec<Outcome>> {
+        let outcome = prop_oneof![
+            (f64::MIN_POSITIVE..1e5).prop_map(Ok),
+            (0..FailureKind::ALL.len()).prop_map(|kind| Err(FailureKind::ALL[kind])),
+        ];
+        proptest::collection::vec(outcome, 0..50)
+    }
+
+    proptest! {
+        #[test]
+        fn outcomes_survive_the_wire(first: u64, outcomes in outcomes()) {
+            let block = to_message(first, &outcomes);
+            prop_assert_eq!(from_message(&block).unwrap(), (first, outcomes));
+        }
+
+        #[test]
+        fn arbitrary_blocks_are_read_or_refused(
+            codes: Vec<u8>,
+            velocities in proptest::collection::vec(proptest::num::f64::ANY, 0..50),
+        ) {
+            if let Ok(outcomes) = unpack(&codes, &velocities) {
+                prop_assert_eq!(pack(&outcomes), (codes, velocities));
+            }
+        }
+    }
+
+    #[test]
+    fn unequal_lengths_are_refused() {
+        assert_eq!(
+            unpack(&[0, 0], &[3900.0]),
+            Err(Malformed::WrongLength { field: "velocities", found: 1, expected: 2 })
+        );
+    }
+}

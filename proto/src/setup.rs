@@ -1,0 +1,183 @@
+//! Layers, probe, picking and solver settings as messages.
+//!
+//! Absent fields take the `Default` of the `osteon-common` types, so that a client needs to send
+//! only what differs from them.
+
+use osteon_common::case::Setup;
+use osteon_common::layers::{Fluid, Layers};
+use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_common::violations::Violations;
+
+use crate::v1;
+
+/// The four messages that stand for a [`Setup`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetupMessages {
+    /// Field `layers`.
+    pub layers: v1::Layers,
+    /// Field `probe`.
+    pub probe: v1::Probe,
+    /// Field `picking`.
+    pub picking: v1::Picking,
+    /// Field `solver`.
+    pub solver: v1::SolverSettings,
+}
+
+/// The complete messages of a setup: every field is present.
+pub fn to_messages(setup: &Setup) -> SetupMessages {
+    SetupMessages {
+        layers: layers_to_message(&setup.layers),
+        probe: probe_to_message(&setup.probe),
+        picking: picking_to_message(&setup.picking),
+        solver: solver_to_message(&setup.solver),
+    }
+}
+
+/// The setup of four optional messages. Names that are not known are added to `violations`;
+/// numbers are not looked at.
+pub fn from_messages(
+    layers: Option<&v1::Layers>,
+    probe: Option<&v1::Probe>,
+    picking: Option<&v1::Picking>,
+    solver: Option<&v1::SolverSettings>,
+    violations: &mut Violations,
+) -> Setup {
+    Setup {
+        layers: layers.map(layers_from_message).unwrap_or_default(),
+        probe: probe.map(probe_from_message).unwrap_or_default(),
+        picking: picking
+            .map(|message| picking_from_message(message, violations))
+            .unwrap_or_default(),
+        solver: solver.map(|message| solver_from_message(message, violations)).unwrap_or_default(),
+    }
+}
+
+/// Picking as a complete message.
+pub fn picking_to_message(picking: &Picking) -> v1::Picking {
+    v1::Picking {
+        extremum: Some(picking.extremum.name().to_owned()),
+        threshold: Some(picking.threshold),
+    }
+}
+
+/// Solver settings as a complete message.
+pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
+    v1::SolverSettings {
+        method: Some(solver.method.name().to_owned()),
+        refinement: Some(solver.refinement),
+    }
+}
+
+/// Picking of a message; a name that is not known is added to `violations`.
+pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) -> Picking {
+    let default = Picking::default();
+    Picking {
+        extremum: named(
+            message.extremum.as_deref(),
+            &Extremum::ALL.map(|extremum| (extremum.name(), extremum)),
+            "picking.extremum",
+            violations,
+        ),
+        threshold: message.threshold.unwrap_or(default.threshold),
+    }
+}
+
+/// Solver settings of a message; a name that is not known is added to `violations`.
+pub fn solver_from_message(
+    message: &v1::SolverSettings,
+    violations: &mut Violations,
+) -> SolverSettings {
+    let default = SolverSettings::default();
+    SolverSettings {
+        method: named(
+            message.method.as_deref(),
+            &Method::ALL.map(|method| (method.name(), method)),
+            "solver.method",
+            violations,
+        ),
+        refinement: message.refinement.unwrap_or(default.refinement),
+    }
+}
+
+/// The value that `name` stands for; the default if it is absent, or unknown and so recorded.
+pub(crate) fn named<T: Copy + Default>(
+    name: Option<&str>,
+    known: &[(&str, T)],
+    field: &str,
+    violations: &mut Violations,
+) -> T {
+    let Some(name) = name else { return T::default() };
+    if let Some(&(_, value)) = known.iter().find(|&&(known, _)| known == name) {
+        return value;
+    }
+    let allowed: Vec<String> = known.iter().map(|(known, _)| format!("\"{known}\"")).collect();
+    let shown: String = name.chars().take(SHOWN_CHARACTERS_MAX).collect();
+    violations.add(field, format!("is {shown:?}; it must be {}", allowed.join(" or ")));
+    T::default()
+}
+
+/// Most characters of a client's string that a message repeats.
+const SHOWN_CHARACTERS_MAX: usize = 64;
+
+fn layers_to_message(layers: &Layers) -> v1::Layers {
+    let fluid = |fluid: &Fluid| v1::Fluid {
+        thickness: Some(fluid.thickness),
+        density: Some(fluid.density),
+        sound_speed: Some(fluid.sound_speed),
+    };
+    v1::Layers {
+        coupling: Some(fluid(&layers.coupling)),
+        bone: Some(v1::BoneLayer { thickness: Some(layers.bone_thickness) }),
+        marrow: Some(fluid(&layers.marrow)),
+    }
+}
+
+fn layers_from_message(message: &v1::Layers) -> Layers {
+    let default = Layers::default();
+    let fluid = |message: Option<&v1::Fluid>, default: Fluid| {
+        message.map_or(default, |message| Fluid {
+            thickness: message.thickness.unwrap_or(default.thickness),
+            density: message.density.unwrap_or(default.density),
+            sound_speed: message.sound_speed.unwrap_or(default.sound_speed),
+        })
+    };
+    let bone_thickness = message.bone.as_ref().and_then(|bone| bone.thickness);
+    Layers {
+        coupling: fluid(message.coupling.as_ref(), default.coupling),
+        bone_thickness: bone_thickness.unwrap_or(default.bone_thickness),
+        marrow: fluid(message.marrow.as_ref(), default.marrow),
+    }
+}
+
+fn probe_to_message(probe: &Probe) -> v1::Probe {
+    v1::Probe {
+        center_frequency: Some(probe.center_frequency),
+        amplitude: Some(probe.amplitude),
+        source: Some(v1::Source { x1: Some(probe.source.x1), x3: Some(probe.source.x3) }),
+        receivers: Some(v1::Receivers {
+            first_x1: Some(probe.receivers.first_x1),
+            pitch: Some(probe.receivers.pitch),
+            count: Some(probe.receivers.count),
+            x3: Some(probe.receivers.x3),
+        }),
+    }
+}
+
+fn probe_from_message(message: &v1::Probe) -> Probe {
+    let default = Probe::default();
+    Probe {
+        center_frequency: message.center_frequency.unwrap_or(default.center_frequency),
+        amplitude: message.amplitude.unwrap_or(default.amplitude),
+        source: message.source.as_ref().map_or(default.source, |source| Source {
+            x1: source.x1.unwrap_or(default.source.x1),
+            x3: source.x3.unwrap_or(default.source.x3),
+        }),
+        receivers: message.receivers.as_ref().map_or(default.receivers, |receivers| Receivers {
+            first_x1: receivers.first_x1.unwrap_or(default.receivers.first_x1),
+            pitch: receivers.pitch.unwrap_or(default.receivers.pitch),
+            count: receivers.count.unwrap_or(default.receivers.count),
+            x3: receivers.x3.unwrap_or(default.receivers.x3),
+        }),
+    }
+}

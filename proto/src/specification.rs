@@ -1,0 +1,235 @@
+//! A job's specification as a message.
+
+use osteon_common::check;
+use osteon_common::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
+};
+use osteon_common::parameters::Parameter;
+use osteon_common::violations::Violations;
+
+use crate::setup;
+use crate::v1;
+
+/// The complete message of a specification: every field is present.
+pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
+    let messages = setup::to_messages(&specification.setup);
+    v1::JobSpecification {
+        kind: kind_to_message(specification.kind).into(),
+        layers: Some(messages.layers),
+        probe: Some(messages.probe),
+        picking: Some(messages.picking),
+        solver: Some(messages.solver),
+        data: specification.data.as_ref().map(data_to_message),
+        parameters: Some(parameters_to_message(&specification.parameters)),
+        monte_carlo: Some(monte_carlo_to_message(&specification.monte_carlo)),
+        objective: Some(v1::Objective { kind: Some(specification.objective.name().to_owned()) }),
+        search: Some(search_to_message(&specification.search)),
+    }
+}
+
+/// The specification of a message, defaults filled in and every rule checked.
+///
+/// # Errors
+/// Every violation, by the field's path in the job file.
+pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, Violations> {
+    let mut violations = Violations::new();
+    let specification = read(message, &mut violations);
+    check::job(&specification, &mut violations);
+    violations.into_result(specification)
+}
+
+/// What `kind` stands for in messages.
+pub fn kind_to_message(kind: JobKind) -> v1::JobKind {
+    match kind {
+        JobKind::Identification => v1::JobKind::Identification,
+        JobKind::Propagation => v1::JobKind::Propagation,
+    }
+}
+
+/// Reads all fields; one that cannot be read is recorded and replaced by a default.
+fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpecification {
+    let kind = match message.kind() {
+        v1::JobKind::Identification => JobKind::Identification,
+        v1::JobKind::Propagation => JobKind::Propagation,
+        v1::JobKind::Unspecified => {
+            violations
+                .add("kind", "is missing or unknown; it must be identification or propagation");
+            JobKind::Identification
+        }
+    };
+    JobSpecification {
+        kind,
+        setup: setup::from_messages(
+            message.layers.as_ref(),
+            message.probe.as_ref(),
+            message.picking.as_ref(),
+            message.solver.as_ref(),
+            violations,
+        ),
+        data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
+        parameters: parameters_from_message(message.parameters.as_ref(), violations),
+        monte_carlo: monte_carlo_from_message(message.monte_carlo.as_ref(), violations),
+        objective: setup::named(
+            message.objective.as_ref().and_then(|objective| objective.kind.as_deref()),
+            &Objective::ALL.map(|objective| (objective.name(), objective)),
+            "objective.kind",
+            violations,
+        ),
+        search: search_from_message(message.search.as_ref(), violations),
+    }
+}
+
+fn data_to_message(data: &Data) -> v1::Data {
+    match data {
+        Data::Velocities(velocities) => {
+            v1::Data { velocities: velocities.clone(), mean: None, coefficient_of_variation: None }
+        }
+        Data::Moments { mean, coefficient_of_variation } => v1::Data {
+            velocities: Vec::new(),
+            mean: Some(*mean),
+            coefficient_of_variation: Some(*coefficient_of_variation),
+        },
+    }
+}
+
+fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<Data> {
+    let v1::Data { velocities, mean, coefficient_of_variation } = message;
+    match (velocities.is_empty(), *mean, *coefficient_of_variation) {
+        (true, Some(mean), Some(coefficient_of_variation)) => {
+            Some(Data::Moments { mean, coefficient_of_variation })
+        }
+        (false, None, None) => Some(Data::Velocities(velocities.clone())),
+        (false, ..) => {
+            violations.add("data", "has velocities and moments; give either one or the other");
+            None
+        }
+        (true, None, None) => {
+            violations.add(
+                "data",
+                "is empty; give `velocities`, or `mean` and `coefficient_of_variation`",
+            );
+            None
+        }
+        (true, mean, _) => {
+            let missing = if mean.is_none() { "mean" } else { "coefficient_of_variation" };
+            violations.add(format!("data.{missing}"), "is missing; moments need both numbers");
+            None
+        }
+    }
+}
+
+fn parameters_to_message(ranges: &[Range; 7]) -> v1::Parameters {
+    let message = |parameter: Parameter| {
+        let range = match ranges[parameter as usize] {
+            Range::Fixed(value) => v1::parameter_range::Range::Fixed(value),
+            Range::Free { start, lower, upper } => {
+                v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper })
+            }
+        };
+        Some(v1::ParameterRange { range: Some(range) })
+    };
+    v1::Parameters {
+        density: message(Parameter::Density),
+        longitudinal_young_modulus: message(Parameter::LongitudinalYoungModulus),
+        longitudinal_poisson_ratio: message(Parameter::LongitudinalPoissonRatio),
+        longitudinal_shear_modulus: message(Parameter::LongitudinalShearModulus),
+        transverse_young_modulus: message(Parameter::TransverseYoungModulus),
+        transverse_poisson_ratio: message(Parameter::TransversePoissonRatio),
+        dispersion: message(Parameter::Dispersion),
+    }
+}
+
+fn parameters_from_message(
+    message: Option<&v1::Parameters>,
+    violations: &mut Violations,
+) -> [Range; 7] {
+    Parameter::ALL.map(|parameter| {
+        let range = message.and_then(|message| parameter_message(message, parameter));
+        match range.and_then(|range| range.range.as_ref()) {
+            Some(v1::parameter_range::Range::Fixed(value)) => Range::Fixed(*value),
+            Some(v1::parameter_range::Range::Free(free)) => {
+                Range::Free { start: free.start, lower: free.lower, upper: free.upper }
+            }
+            None => {
+                violations.add(
+                    format!("parameters.{}", parameter.name()),
+                    "is missing; give `fixed`, or `start` and `bounds`",
+                );
+                Range::Fixed(f64::NAN)
+            }
+        }
+    })
+}
+
+fn parameter_message(
+    message: &v1::Parameters,
+    parameter: Parameter,
+) -> Option<&v1::ParameterRange> {
+    match parameter {
+        Parameter::Density => message.density.as_ref(),
+        Parameter::LongitudinalYoungModulus => message.longitudinal_young_modulus.as_ref(),
+        Parameter::LongitudinalPoissonRatio => message.longitudinal_poisson_ratio.as_ref(),
+        Parameter::LongitudinalShearModulus => message.longitudinal_shear_modulus.as_ref(),
+        Parameter::TransverseYoungModulus => message.transverse_young_modulus.as_ref(),
+        Parameter::TransversePoissonRatio => message.transverse_poisson_ratio.as_ref(),
+        Parameter::Dispersion => message.dispersion.as_ref(),
+    }
+}
+
+fn monte_carlo_to_message(monte_carlo: &MonteCarlo) -> v1::MonteCarlo {
+    v1::MonteCarlo {
+        realizations: Some(monte_carlo.realizations),
+        seed: Some(monte_carlo.seed),
+        sampling: Some(monte_carlo.sampling.name().to_owned()),
+        max_failed_fraction: Some(monte_carlo.max_failed_fraction),
+    }
+}
+
+fn monte_carlo_from_message(
+    message: Option<&v1::MonteCarlo>,
+    violations: &mut Violations,
+) -> MonteCarlo {
+    let default = MonteCarlo::default();
+    let Some(message) = message else { return default };
+    MonteCarlo {
+        realizations: message.realizations.unwrap_or(default.realizations),
+        seed: message.seed.unwrap_or(default.seed),
+        sampling: setup::named(
+            message.sampling.as_deref(),
+            &Sampling::ALL.map(|sampling| (sampling.name(), sampling)),
+            "monte_carlo.sampling",
+            violations,
+        ),
+        max_failed_fraction: message.max_failed_fraction.unwrap_or(default.max_failed_fraction),
+    }
+}
+
+fn search_to_message(search: &Search) -> v1::Search {
+    v1::Search {
+        method: Some(search.method.name().to_owned()),
+        max_evaluations: Some(search.max_evaluations),
+        cost_tolerance: Some(search.cost_tolerance),
+        size_tolerance: Some(search.size_tolerance),
+        initial_step: Some(search.initial_step),
+    }
+}
+
+fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations) -> Search {
+    let default = Search::default();
+    let Some(message) = message else { return default };
+    Search {
+        method: setup::named(
+            message.method.as_deref(),
+            &SearchMethod::ALL.map(|method| (method.name(), method)),
+            "search.method",
+            violations,
+        ),
+        max_evaluations: message.max_evaluations.unwrap_or(default.max_evaluations),
+        cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
+        size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
+        initial_step: message.initial_step.unwrap_or(default.initial_step),
+    }
+}
+
+#[cfg(test)]
+mod tests;

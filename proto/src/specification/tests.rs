@@ -1,0 +1,177 @@
+use osteon_common::case::Setup;
+use proptest::prelude::*;
+
+use super::*;
+
+/// The paper's box, all parameters free.
+const RANGES: [(f64, f64, f64); 7] = [
+    (1700.0, 1500.0, 2000.0),
+    (18e9, 12e9, 25e9),
+    (0.35, 0.2, 0.45),
+    (4.5e9, 3e9, 6.5e9),
+    (10e9, 8e9, 16e9),
+    (0.4, 0.2, 0.5),
+    (0.1, 0.02, 0.3),
+];
+
+fn parameters() -> impl Strategy<Value = [Range; 7]> {
+    proptest::array::uniform7((any::<bool>(), 0.0..1.0)).prop_map(|choices| {
+        std::array::from_fn(|i| {
+            let (start, lower, upper) = RANGES[i];
+            let (fixed, shift) = choices[i];
+            let value = start + 0.01 * shift * (upper - lower);
+            // An identification needs something to search.
+            if fixed && i < 6 {
+                Range::Fixed(value)
+            } else {
+                Range::Free { start: value, lower, upper }
+            }
+        })
+    })
+}
+
+fn data() -> impl Strategy<Value = Data> {
+    prop_oneof![
+        // The first keeps the others from being all equal.
+        proptest::collection::vec(1000.0..6000.0, 1..20).prop_map(|mut velocities| {
+            velocities.insert(0, 999.0);
+            Data::Velocities(velocities)
+        }),
+        (1000.0..6000.0, 0.001..0.5).prop_map(|(mean, coefficient_of_variation)| {
+            Data::Moments { mean, coefficient_of_variation }
+        }),
+    ]
+}
+
+prop_compose! {
+    fn specification()(
+        data in proptest::option::of(data()),
+        parameters in parameters(),
+        realizations in 1_u64..=10_000_000,
+        seed in 0..1_u64 << 63,
+        max_failed_fraction in 0.0..1.0,
+        max_evaluations in 1_u64..1000,
+        initial_step in 0.01..0.5,
+    ) -> JobSpecification {
+        JobSpecification {
+            kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
+            setup: Setup::default(),
+            data,
+            parameters,
+            monte_carlo: MonteCarlo {
+                realizations,
+                seed,
+                max_failed_fraction,
+                ..MonteCarlo::default()
+            },
+            objective: Objective::default(),
+            search: Search { max_evaluations, initial_step, ..Search::default() },
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn specifications_survive_the_wire(specification in specification()) {
+        let message = to_message(&specification);
+        prop_assert_eq!(from_message(&message), Ok(specification));
+    }
+}
+
+fn message() -> v1::JobSpecification {
+    let free = |i: usize| {
+        let (start, lower, upper) = RANGES[i];
+        Range::Free { start, lower, upper }
+    };
+    to_message(&JobSpecification {
+        kind: JobKind::Identification,
+        setup: Setup::default(),
+        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        parameters: std::array::from_fn(free),
+        monte_carlo: MonteCarlo::default(),
+        objective: Objective::default(),
+        search: Search::default(),
+    })
+}
+
+#[test]
+fn absent_messages_take_the_defaults() {
+    let sparse = v1::JobSpecification {
+        kind: v1::JobKind::Identification.into(),
+        data: message().data,
+        parameters: message().parameters,
+        ..v1::JobSpecification::default()
+    };
+    assert_eq!(from_message(&sparse), from_message(&message()));
+    let with_empty_messages = v1::JobSpecification {
+        layers: Some(v1::Layers { coupling: Some(v1::Fluid::default()), ..Default::default() }),
+        probe: Some(v1::Probe { receivers: Some(v1::Receivers::default()), ..Default::default() }),
+        picking: Some(v1::Picking::default()),
+        solver: Some(v1::SolverSettings::default()),
+        monte_carlo: Some(v1::MonteCarlo::default()),
+        objective: Some(v1::Objective::default()),
+        search: Some(v1::Search::default()),
+        ..sparse
+    };
+    assert_eq!(from_message(&with_empty_messages), from_message(&message()));
+}
+
+/// The fields at fault after `change`, in the order they are reported.
+fn faults(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
+    let mut message = message();
+    change(&mut message);
+    let violations = from_message(&message).unwrap_err();
+    violations.iter().map(|violation| violation.field.clone()).collect()
+}
+
+#[test]
+fn each_fault_is_named_by_its_path() {
+    assert_eq!(faults(|m| m.kind = 0), ["kind"]);
+    assert_eq!(faults(|m| m.kind = 17), ["kind"]);
+    assert_eq!(faults(|m| m.data = Some(v1::Data::default())), ["data"]);
+    assert_eq!(faults(|m| m.data.as_mut().unwrap().velocities = vec![1.0, 2.0]), ["data"]);
+    assert_eq!(faults(|m| m.data.as_mut().unwrap().mean = None), ["data.mean"]);
+    assert_eq!(
+        faults(|m| m.data.as_mut().unwrap().coefficient_of_variation = None),
+        ["data.coefficient_of_variation"]
+    );
+    assert_eq!(
+        faults(|m| m.picking.as_mut().unwrap().extremum = Some("third".to_owned())),
+        ["picking.extremum"]
+    );
+    assert_eq!(
+        faults(|m| m.solver.as_mut().unwrap().method = Some("guess".to_owned())),
+        ["solver.method"]
+    );
+    assert_eq!(
+        faults(|m| m.parameters.as_mut().unwrap().dispersion = None),
+        ["parameters.dispersion"]
+    );
+    assert_eq!(
+        faults(|m| m.parameters.as_mut().unwrap().density.as_mut().unwrap().range = None),
+        ["parameters.density"]
+    );
+    assert_eq!(faults(|m| m.parameters = None).len(), 7);
+}
+
+#[test]
+fn all_faults_are_reported_at_once() {
+    let fields = faults(|m| {
+        m.search.as_mut().unwrap().method = Some("luck".to_owned());
+        m.monte_carlo.as_mut().unwrap().sampling = Some("dice".to_owned());
+        m.objective.as_mut().unwrap().kind = Some("beauty".to_owned());
+        m.data.as_mut().unwrap().mean = None;
+    });
+    for field in ["search.method", "monte_carlo.sampling", "objective.kind", "data.mean"] {
+        assert!(fields.iter().any(|found| found == field), "{field} in {fields:?}");
+    }
+    assert_eq!(fields.len(), 4);
+}
+
+#[test]
+fn a_long_name_is_not_repeated_whole() {
+    let mut message = message();
+    message.solver.as_mut().unwrap().method = Some("x".repeat(1 << 20));
+    let violations = from_message(&message).unwrap_err().to_string();
+    assert!(violations.len() < 200, "{} bytes", violations.len());
+}

@@ -1,0 +1,76 @@
+//! Violations as a gRPC status with `google.rpc.BadRequest`, and back.
+
+use osteon_common::violations::Violations;
+use tonic::{Code, Status};
+use tonic_types::{ErrorDetails, StatusExt as _};
+
+/// Most bytes of fields and messages that a status carries; what is beyond is counted in a last
+/// entry. HTTP/2 peers refuse trailers of more than 16 KiB, and base64 adds a third.
+const DETAIL_BYTES_MAX: usize = 8 << 10;
+
+/// `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names every field at fault.
+pub fn invalid_argument(violations: &Violations) -> Status {
+    let mut details = ErrorDetails::new();
+    let mut bytes = 0;
+    let total = violations.iter().count();
+    for (listed, violation) in violations.iter().enumerate() {
+        bytes += violation.field.len() + violation.message.len();
+        if bytes > DETAIL_BYTES_MAX {
+            details.add_bad_request_violation("", format!("and {} more", total - listed));
+            break;
+        }
+        details.add_bad_request_violation(&violation.field, &violation.message);
+    }
+    let message = match total {
+        1 => "the specification breaks a rule".to_owned(),
+        _ => format!("the specification breaks {total} rules"),
+    };
+    Status::with_error_details(Code::InvalidArgument, message, details)
+}
+
+/// The violations that a status carries, if it is one of [`invalid_argument`].
+pub fn violations(status: &Status) -> Option<Violations> {
+    if status.code() != Code::InvalidArgument {
+        return None;
+    }
+    let mut violations = Violations::new();
+    for violation in status.get_details_bad_request()?.field_violations {
+        violations.add(violation.field, violation.description);
+    }
+    (!violations.is_empty()).then_some(violations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn violations_survive_the_status() {
+        let mut expected = Violations::new();
+        expected.add("layers.coupling.density", "is -1; it must be above 0 (kg/m³)");
+        expected.add("probe.receivers.count", "is 2; it must be 3 to 64");
+        let status = invalid_argument(&expected);
+        assert_eq!(status.code(), Code::InvalidArgument);
+        assert_eq!(violations(&status), Some(expected));
+    }
+
+    #[test]
+    fn a_long_list_is_cut_and_counted() {
+        let mut long = Violations::new();
+        for i in 0..1000 {
+            long.add(format!("data.velocities[{i}]"), "is -1; it must be above 0 (m/s)");
+        }
+        let status = invalid_argument(&long);
+        assert!(status.details().len() < 12 << 10, "{} bytes", status.details().len());
+        let listed = violations(&status).unwrap();
+        let count = listed.iter().count();
+        let last = listed.iter().last().unwrap();
+        assert_eq!(last.message, format!("and {} more", 1000 - (count - 1)));
+    }
+
+    #[test]
+    fn other_statuses_carry_none() {
+        assert_eq!(violations(&Status::not_found("no job")), None);
+        assert_eq!(violations(&Status::invalid_argument("plain")), None);
+    }
+}

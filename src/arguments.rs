@@ -1,0 +1,223 @@
+//! The command line as typed. What it means is decided in [`crate::resolved`].
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use osteon_proto::endpoint::Endpoint;
+
+/// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
+#[derive(Debug, Parser)]
+#[command(name = "osteon", version, max_term_width = 100)]
+pub(crate) struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Search the mean elasticity and dispersion whose velocities match the data of a job file
+    Identify(RunArguments),
+    /// Monte Carlo at the fixed/start point of a job file, without a search
+    Propagate(RunArguments),
+    /// Solve one case: picked times, velocity, and with --out the pressure traces
+    Simulate(SimulateArguments),
+    /// Print the case file of one realization of a job
+    Draw(DrawArguments),
+    /// Serve jobs to clients and workers, until interrupted
+    Coordinator(CoordinatorArguments),
+    /// Compute for a coordinator, until interrupted
+    Worker(WorkerArguments),
+    /// Hand a job to a coordinator and print its id
+    Submit(SubmitArguments),
+    /// List the jobs of a coordinator
+    Jobs(JobsArguments),
+    /// Follow a job until it ends
+    Watch(JobArguments),
+    /// End a job before its time
+    Cancel(JobArguments),
+    /// Write the results of an ended job to a directory
+    Fetch(FetchArguments),
+}
+
+/// Of `identify` and `propagate`.
+#[derive(Debug, Args)]
+pub(crate) struct RunArguments {
+    /// Job file (TOML or JSON)
+    pub(crate) job: PathBuf,
+    /// Worker processes to start here [default: 2]
+    #[arg(long, value_name = "N", conflicts_with = "coordinator",
+          value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub(crate) workers: Option<u32>,
+    /// Threads of each worker [default: cores / N, at least 1]
+    #[arg(long, value_name = "T", conflicts_with = "coordinator",
+          value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// Run on this coordinator instead: http://HOST:PORT or unix:PATH
+    ///
+    /// Without it the environment's OSTEON_COORDINATOR counts, unless --workers or --threads ask
+    /// for a run on this machine.
+    #[arg(long, value_name = "URL")]
+    pub(crate) coordinator: Option<Endpoint>,
+    /// Keep the results here; the same command continues or shows what is there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Of `simulate`.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArguments {
+    /// Case file (TOML or JSON)
+    pub(crate) case: PathBuf,
+    /// Write the pressure traces here, as traces.csv
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Duration of the traces, s
+    #[arg(long, value_name = "S", default_value = "16e-6", value_parser = positive)]
+    pub(crate) duration: f64,
+    /// Time step of the traces, s
+    #[arg(long, value_name = "S", default_value = "1e-8", value_parser = positive)]
+    pub(crate) time_step: f64,
+}
+
+/// Of `draw`.
+#[derive(Debug, Args)]
+pub(crate) struct DrawArguments {
+    /// Job file (TOML or JSON)
+    pub(crate) job: PathBuf,
+    /// Index of the realization, from 0
+    #[arg(long, value_name = "I")]
+    pub(crate) index: u64,
+    /// Draw at the best point of DIR/result.json instead of the fixed/start point
+    #[arg(long, value_name = "DIR")]
+    pub(crate) at: Option<PathBuf>,
+}
+
+/// Of `coordinator`.
+#[derive(Debug, Args)]
+pub(crate) struct CoordinatorArguments {
+    /// HOST:PORT (port 0 takes a free one) or unix:PATH
+    #[arg(long, value_name = "ADDR")]
+    pub(crate) listen: String,
+    /// Directory of the store; the URL in use is written to DIR/address
+    #[arg(long, value_name = "DIR")]
+    pub(crate) store: PathBuf,
+    /// Serve addresses other than loopback without TLS: whoever reaches them can use them
+    #[arg(long)]
+    pub(crate) insecure: bool,
+}
+
+/// Of `worker`.
+#[derive(Debug, Args)]
+pub(crate) struct WorkerArguments {
+    /// The coordinator: http://HOST:PORT or unix:PATH
+    #[arg(long, value_name = "URL", env = "OSTEON_COORDINATOR")]
+    pub(crate) coordinator: Endpoint,
+    /// Threads to compute on [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// End after this long without a coordinator, s [default: never]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) give_up_after: Option<f64>,
+    /// Finish the work in hand and end after this long, s [default: never]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) time_limit: Option<f64>,
+}
+
+/// Of every command that speaks to a coordinator.
+#[derive(Debug, Args)]
+pub(crate) struct ClientArguments {
+    /// The coordinator: http://HOST:PORT or unix:PATH
+    #[arg(long, value_name = "URL", env = "OSTEON_COORDINATOR")]
+    pub(crate) coordinator: Endpoint,
+}
+
+/// Of `submit`.
+#[derive(Debug, Args)]
+pub(crate) struct SubmitArguments {
+    /// Job file (TOML or JSON)
+    pub(crate) job: PathBuf,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Submit a propagation instead of an identification
+    #[arg(long)]
+    pub(crate) propagate: bool,
+    /// Submitting again with the same ID gives the same job (at most 256 bytes)
+    #[arg(long, value_name = "ID", value_parser = request_id)]
+    pub(crate) request_id: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Of `jobs`.
+#[derive(Debug, Args)]
+pub(crate) struct JobsArguments {
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Of commands about one job.
+#[derive(Debug, Args)]
+pub(crate) struct JobArguments {
+    /// Id of the job
+    #[arg(value_name = "ID")]
+    pub(crate) job: String,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+}
+
+/// Of `fetch`.
+#[derive(Debug, Args)]
+pub(crate) struct FetchArguments {
+    /// Id of the job
+    #[arg(value_name = "ID")]
+    pub(crate) job: String,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Directory for the results
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// Longest span that a command line may ask for, s: a year.
+const SECONDS_MAX: f64 = 366.0 * 86_400.0;
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a number above 0 (s)".to_owned()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= SECONDS_MAX => Ok(number),
+        _ => Err(format!("it must be a number above 0 and at most {SECONDS_MAX} (s)")),
+    }
+}
+
+fn request_id(text: &str) -> Result<String, String> {
+    let max = osteon_common::limits::NAME_BYTES_MAX;
+    if text.is_empty() || text.len() > max {
+        return Err(format!("it must have 1 to {max} bytes"));
+    }
+    Ok(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,48 @@
+use clap::CommandFactory as _;
+
+use super::*;
+
+#[test]
+fn the_definition_is_sound() {
+    Arguments::command().debug_assert();
+}
+
+fn refusal(line: &str) -> String {
+    let error = Arguments::try_parse_from(line.split_whitespace()).unwrap_err();
+    assert_eq!(error.exit_code(), 2, "{line}");
+    error.to_string()
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused() {
+    let check = |line: &str, expected: &str| {
+        let message = refusal(line);
+        assert!(message.contains(expected), "{line}: {message}");
+    };
+    check("osteon identify", "<JOB>");
+    check("osteon identify a.toml --workers 0", "0 is not in 1..=256");
+    check("osteon identify a.toml --workers 257", "257 is not in 1..=256");
+    check("osteon identify a.toml --threads 4097", "4097 is not in 1..=4096");
+    check("osteon identify a.toml --workers two", "invalid digit");
+    check("osteon identify a.toml --coordinator https://a:1", "TLS");
+    check("osteon identify a.toml --coordinator http://a:1 --workers 2", "cannot be used with");
+    check("osteon identify a.toml --coordinator http://a:1 --threads 2", "cannot be used with");
+    check("osteon identify a.toml --tls-ca ca.pem", "unexpected argument");
+    check("osteon simulate a.toml --duration 0", "it must be a number above 0");
+    check("osteon simulate a.toml --duration nan", "it must be a number above 0");
+    check("osteon simulate a.toml --time-step -1e-8", "unexpected argument");
+    check("osteon simulate a.toml --time-step inf", "it must be a number above 0");
+    check("osteon simulate a.toml --check", "unexpected argument");
+    check("osteon draw a.toml", "--index");
+    check("osteon draw a.toml --index -1", "unexpected argument");
+    check("osteon draw a.toml --index 1.5", "invalid digit");
+    check("osteon worker --coordinator somewhere", "http://HOST:PORT or unix:PATH");
+    check("osteon worker --coordinator unix:a --give-up-after 0", "above 0");
+    check("osteon worker --coordinator unix:a --time-limit 1e9", "at most");
+    check("osteon coordinator --listen 127.0.0.1:0", "--store");
+    check("osteon submit a.toml --coordinator unix:a --request-id=", "1 to 256 bytes");
+    check("osteon fetch 1 --coordinator unix:a", "--out");
+    check("osteon report DIR", "unrecognized subcommand");
+    check("osteon frobnicate", "unrecognized subcommand");
+    check("osteon", "Usage");
+}

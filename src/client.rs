@@ -1,0 +1,331 @@
+//! A client of the service of jobs: every wait has an end, every error names the coordinator.
+
+use std::time::Duration;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::limits::REALIZATIONS_MAX;
+use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
+use osteon_common::violations::Violations;
+use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::malformed::Malformed;
+use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::v1::jobs_client::JobsClient;
+use osteon_proto::v1::{self, JobSnapshot};
+use osteon_proto::{realizations, results, specification, status};
+use thiserror::Error;
+use tokio::time::{Instant, sleep, timeout};
+use tonic::transport::Channel;
+use tonic::{Code, Response, Status};
+
+/// Longest wait for a coordinator, s.
+const ANSWER_S_MAX: u64 = 10;
+/// Wait between two attempts to find a coordinator again, ms.
+const RETRY_MS: u64 = 250;
+/// Most pages of jobs that a list may have: each holds up to 1000.
+const PAGES_MAX: usize = 10_000;
+
+/// Why a coordinator did not do what was asked.
+#[derive(Debug, Error)]
+pub(crate) enum ClientError {
+    /// There is no coordinator.
+    #[error(transparent)]
+    Connect(#[from] ConnectError),
+    /// It is there, and says nothing.
+    #[error("the coordinator at {endpoint} did not answer within {ANSWER_S_MAX} s")]
+    Unanswered {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+    },
+    /// It went away.
+    #[error("lost the coordinator at {endpoint}: {reason}")]
+    Lost {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// What the transport says.
+        reason: String,
+    },
+    /// It refuses the specification.
+    #[error("the coordinator refuses the job:{}", indented(.0))]
+    Violations(Violations),
+    /// It refuses the request.
+    #[error("the coordinator at {endpoint} refuses: {reason}")]
+    Refused {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// The status.
+        code: Code,
+        /// What it says.
+        reason: String,
+    },
+    /// It sent what cannot be read.
+    #[error("the coordinator at {endpoint} answers what cannot be read: {source}")]
+    Malformed {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// What is wrong.
+        source: Malformed,
+    },
+}
+
+impl ClientError {
+    /// Whether the user must give something else.
+    pub(crate) fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Violations(_) => true,
+            Self::Refused { code, .. } => {
+                matches!(code, Code::NotFound | Code::InvalidArgument | Code::AlreadyExists)
+            }
+            _ => false,
+        }
+    }
+}
+
+fn indented(violations: &Violations) -> String {
+    violations.iter().map(|violation| format!("\n  {violation}")).collect()
+}
+
+/// Everything that an ended job left.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fetched {
+    /// The specification, defaults filled in.
+    pub(crate) specification: JobSpecification,
+    /// The result, with the outcomes of the best point.
+    pub(crate) result: JobResult,
+    /// The evaluations in order.
+    pub(crate) history: Vec<Evaluation>,
+}
+
+/// A connection to a coordinator.
+#[derive(Debug, Clone)]
+pub(crate) struct Client {
+    endpoint: Endpoint,
+    jobs: JobsClient<Channel>,
+}
+
+impl Client {
+    /// Connects to the coordinator at `endpoint`.
+    pub(crate) async fn connect(endpoint: &Endpoint) -> Result<Self, ClientError> {
+        let channel = endpoint::connect(endpoint, answer_limit()).await?;
+        Ok(Self { endpoint: endpoint.clone(), jobs: endpoint::jobs_client(channel) })
+    }
+
+    /// Submits a job; its id.
+    pub(crate) async fn submit(
+        &mut self,
+        specification: &JobSpecification,
+        request_id: &str,
+    ) -> Result<String, ClientError> {
+        let request = v1::SubmitRequest {
+            specification: Some(specification::to_message(specification)),
+            request_id: request_id.to_owned(),
+        };
+        let call = self.jobs.submit(request);
+        Ok(answered(&self.endpoint, call).await?.job)
+    }
+
+    /// All jobs, oldest first.
+    pub(crate) async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
+        let mut jobs = Vec::new();
+        let mut page_token = String::new();
+        for _ in 0..PAGES_MAX {
+            let call = self.jobs.list(v1::ListRequest { page_size: 0, page_token });
+            let page = answered(&self.endpoint, call).await?;
+            jobs.extend(page.jobs);
+            page_token = page.next_page_token;
+            if page_token.is_empty() {
+                break;
+            }
+        }
+        Ok(jobs)
+    }
+
+    /// Cancels a job; how it is then.
+    pub(crate) async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
+        let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });
+        let snapshot = answered(&self.endpoint, call).await?.snapshot;
+        self.present(snapshot, "snapshot")
+    }
+
+    /// Follows a job until it has ended, and shows every snapshot to `show`. A coordinator that
+    /// goes away and comes back within 10 s is found again.
+    pub(crate) async fn watch<E: From<ClientError>>(
+        &mut self,
+        job: &str,
+        mut show: impl FnMut(&JobSnapshot) -> Result<(), E>,
+    ) -> Result<JobSnapshot, E> {
+        let mut lost_since: Option<Instant> = None;
+        loop {
+            let error = match self.watch_stream(job, &mut show, &mut lost_since).await? {
+                Ok(snapshot) => return Ok(snapshot),
+                Err(error) => error,
+            };
+            let gone = matches!(
+                error,
+                ClientError::Lost { .. } | ClientError::Connect(_) | ClientError::Unanswered { .. }
+            );
+            let since = *lost_since.get_or_insert_with(Instant::now);
+            if !gone || since.elapsed() >= answer_limit() {
+                return Err(error.into());
+            }
+            sleep(Duration::from_millis(RETRY_MS)).await;
+        }
+    }
+
+    /// One stream of snapshots: the last one, or why there is none. The outer error is that of
+    /// `show`.
+    async fn watch_stream<E>(
+        &mut self,
+        job: &str,
+        show: &mut impl FnMut(&JobSnapshot) -> Result<(), E>,
+        lost_since: &mut Option<Instant>,
+    ) -> Result<Result<JobSnapshot, ClientError>, E> {
+        let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned() });
+        let mut stream = match answered(&self.endpoint, call).await {
+            Ok(stream) => stream,
+            Err(error) => return Ok(Err(error)),
+        };
+        loop {
+            // No limit here: a job may be long, and the connection is probed while it is silent.
+            let snapshot = match stream.message().await {
+                Ok(Some(message)) => match self.present(message.snapshot, "snapshot") {
+                    Ok(snapshot) => snapshot,
+                    Err(error) => return Ok(Err(error)),
+                },
+                Ok(None) => {
+                    let reason = "the stream of snapshots ended before the job".to_owned();
+                    let endpoint = self.endpoint.clone();
+                    return Ok(Err(ClientError::Lost { endpoint, reason }));
+                }
+                Err(status) => return Ok(Err(refused(&self.endpoint, &status))),
+            };
+            *lost_since = None;
+            show(&snapshot)?;
+            if snapshot.state() == v1::JobState::Ended {
+                return Ok(Ok(snapshot));
+            }
+        }
+    }
+
+    /// Everything that an ended job left.
+    pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
+        let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
+        let mut stream = answered(&self.endpoint, call).await?;
+        let mut parts = Parts::default();
+        loop {
+            let Ok(message) = timeout(answer_limit(), stream.message()).await else {
+                return Err(ClientError::Unanswered { endpoint: self.endpoint.clone() });
+            };
+            match message {
+                Ok(Some(message)) => {
+                    let part = self.present(message.part, "part")?;
+                    parts.add(part).map_err(|source| self.malformed(source))?;
+                }
+                Ok(None) => break,
+                Err(status) => return Err(refused(&self.endpoint, &status)),
+            }
+        }
+        parts.whole().map_err(|source| self.malformed(source))
+    }
+
+    fn present<T>(&self, field: Option<T>, name: &'static str) -> Result<T, ClientError> {
+        field.ok_or_else(|| self.malformed(Malformed::Missing { field: name }))
+    }
+
+    fn malformed(&self, source: Malformed) -> ClientError {
+        ClientError::Malformed { endpoint: self.endpoint.clone(), source }
+    }
+}
+
+/// How a job ended; `None` while it has not.
+pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
+    results::status_from_message(snapshot.status).ok().flatten()
+}
+
+fn answer_limit() -> Duration {
+    Duration::from_secs(ANSWER_S_MAX)
+}
+
+async fn answered<T>(
+    endpoint: &Endpoint,
+    call: impl Future<Output = Result<Response<T>, Status>>,
+) -> Result<T, ClientError> {
+    match timeout(answer_limit(), call).await {
+        Ok(Ok(response)) => Ok(response.into_inner()),
+        Ok(Err(status)) => Err(refused(endpoint, &status)),
+        Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),
+    }
+}
+
+fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
+    if let Some(violations) = status::violations(status) {
+        return ClientError::Violations(violations);
+    }
+    let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
+    match status.code() {
+        Code::Unavailable | Code::Unknown | Code::Cancelled | Code::DeadlineExceeded => {
+            ClientError::Lost { endpoint, reason }
+        }
+        // tonic reports a broken HTTP/2 connection so.
+        Code::Internal if std::error::Error::source(status).is_some() => {
+            ClientError::Lost { endpoint, reason }
+        }
+        code => ClientError::Refused { endpoint, code, reason },
+    }
+}
+
+/// The parts of a fetch that have come.
+#[derive(Debug, Default)]
+struct Parts {
+    specification: Option<v1::JobSpecification>,
+    result: Option<v1::JobResult>,
+    history: Vec<Evaluation>,
+    outcomes: Vec<osteon_common::outcome::Outcome>,
+}
+
+impl Parts {
+    fn add(&mut self, part: Part) -> Result<(), Malformed> {
+        match part {
+            Part::Specification(specification) => self.specification = Some(specification),
+            Part::Result(result) => self.result = Some(result),
+            Part::History(block) => {
+                for row in &block.rows {
+                    self.history.push(results::evaluation_from_message(row)?);
+                }
+            }
+            Part::Realizations(block) => {
+                let (first, outcomes) = realizations::from_message(&block)?;
+                let here = self.outcomes.len() as u64;
+                if first != here || here + outcomes.len() as u64 > REALIZATIONS_MAX {
+                    let allowed = "blocks of realizations must follow each other";
+                    return Err(Malformed::OutOfRange {
+                        field: "first",
+                        value: first as f64,
+                        allowed,
+                    });
+                }
+                self.outcomes.extend(outcomes);
+            }
+        }
+        Ok(())
+    }
+
+    fn whole(self) -> Result<Fetched, Malformed> {
+        let specification =
+            self.specification.ok_or(Malformed::Missing { field: "specification" })?;
+        let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
+        let expected = if result.best.is_some() { result.realizations } else { 0 };
+        if self.outcomes.len() as u64 != expected {
+            return Err(Malformed::WrongLength {
+                field: "realizations",
+                found: self.outcomes.len(),
+                expected: usize::try_from(expected).unwrap_or(usize::MAX),
+            });
+        }
+        Ok(Fetched {
+            specification: specification::from_message(&specification)
+                .map_err(Malformed::InvalidSpecification)?,
+            result: results::from_message(&result, self.outcomes)?,
+            history: self.history,
+        })
+    }
+}

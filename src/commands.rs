@@ -1,0 +1,32 @@
+//! One file per subcommand, or per family of them.
+
+mod coordinator;
+mod draw;
+mod jobs;
+mod run;
+mod simulate;
+mod worker;
+
+use crate::ending::{Ending, Failure};
+use crate::resolved::Resolved;
+
+/// Does what the command line says.
+///
+/// # Errors
+/// When it cannot be done.
+pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
+    match resolved {
+        Resolved::Run(run) => run::run(run).await,
+        Resolved::Simulate(arguments) => simulate::simulate(arguments).await,
+        Resolved::Draw(arguments) => draw::draw(&arguments),
+        Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
+        Resolved::Worker(config) => worker::serve(config).await,
+        Resolved::Submit { job, kind, request_id, coordinator, format } => {
+            jobs::submit(&job, kind, &request_id, &coordinator, format).await
+        }
+        Resolved::Jobs { coordinator, format } => jobs::list(&coordinator, format).await,
+        Resolved::Watch { job, coordinator } => jobs::watch(&job, &coordinator).await,
+        Resolved::Cancel { job, coordinator } => jobs::cancel(&job, &coordinator).await,
+        Resolved::Fetch { job, coordinator, out } => jobs::fetch(&job, &coordinator, &out).await,
+    }
+}

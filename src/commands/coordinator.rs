@@ -1,0 +1,50 @@
+//! `coordinator`: serves jobs to clients and workers until it is told to end.
+
+use std::fs;
+
+use anyhow::Context as _;
+use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::{BindError, Config, ListenAddress, Listener};
+
+use crate::arguments::CoordinatorArguments;
+use crate::ending::{Ending, Failure, stdout_failure};
+use crate::output;
+use crate::resolved::Format;
+use crate::results_directory;
+use crate::signals;
+
+/// Serves until SIGINT or SIGTERM. The URL in use is printed, and stands in DIR/address.
+pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
+    let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
+    let interruption = signals::interruption()?;
+    let directory = arguments.store;
+    if matches!(address, ListenAddress::Unix(_)) {
+        // The socket may be meant to lie in the directory of the store.
+        fs::create_dir_all(&directory)
+            .with_context(|| format!("cannot create the directory {}", directory.display()))
+            .map_err(Failure::Failed)?;
+    }
+    let listener = Listener::bind(&address, arguments.insecure).await.map_err(bind_failure)?;
+    let store = SqliteStore::open(&directory).map_err(Failure::failed)?;
+    let coordinator = osteon_coordinator::start(listener, Box::new(store), Config::default())
+        .await
+        .map_err(Failure::failed)?;
+    let address_file = directory.join("address");
+    results_directory::write(&address_file, &format!("{}\n", coordinator.url()))
+        .map_err(Failure::Failed)?;
+    let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
+    if printed.is_ok() {
+        interruption.await;
+    }
+    drop(fs::remove_file(&address_file));
+    coordinator.shutdown().await;
+    printed.map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+fn bind_failure(error: BindError) -> Failure {
+    match error {
+        BindError::NotLoopback { .. } => Failure::bad_input(error),
+        _ => Failure::failed(error),
+    }
+}

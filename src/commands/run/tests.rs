@@ -1,0 +1,54 @@
+use osteon_common::document::Format;
+use std::path::Path;
+
+use super::*;
+
+fn specification(max_failed_fraction: f64) -> JobSpecification {
+    let fixed = [
+        ("density", 1598.8),
+        ("longitudinal_young_modulus", 17.717e9),
+        ("longitudinal_poisson_ratio", 0.3816),
+        ("longitudinal_shear_modulus", 4.795e9),
+        ("transverse_young_modulus", 9.8254e9),
+        ("transverse_poisson_ratio", 0.4495),
+        ("dispersion", 0.1029),
+    ];
+    let mut text = format!(
+        "[monte_carlo]\nrealizations = 100\nmax_failed_fraction = {max_failed_fraction:?}\n"
+    );
+    for (name, value) in fixed {
+        text.push_str(&format!("[parameters.{name}]\nfixed = {value:?}\n"));
+    }
+    job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Propagation).unwrap()
+}
+
+#[test]
+fn an_identification_ends_as_its_status_says() {
+    let check = |status: &str, expected| {
+        let json = format!("{{\"status\": \"{status}\"}}");
+        let ending = ending(JobKind::Identification, &specification(0.01), &json);
+        assert_eq!(ending, expected, "{status}");
+    };
+    check("converged", Ending::Done);
+    check("max_evaluations", Ending::Done);
+    check("cancelled", Ending::RunFailed);
+    check("failed", Ending::RunFailed);
+}
+
+#[test]
+fn a_propagation_fails_above_the_accepted_fraction() {
+    let check = |json: &str, expected| {
+        assert_eq!(ending(JobKind::Propagation, &specification(0.02), json), expected, "{json}");
+    };
+    check(r#"{"failures": {}, "velocity": {"mean": 3900.0}}"#, Ending::Done);
+    check(
+        r#"{"failures": {"no_arrival": 1, "not_finite": 1}, "velocity": {"mean": 3900.0}}"#,
+        Ending::Done,
+    );
+    check(
+        r#"{"failures": {"no_arrival": 2, "not_finite": 1}, "velocity": {"mean": 3900.0}}"#,
+        Ending::RunFailed,
+    );
+    check(r#"{"failures": {}, "velocity": {"mean": null}}"#, Ending::RunFailed);
+    check("no JSON", Ending::RunFailed);
+}

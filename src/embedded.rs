@@ -1,0 +1,102 @@
+//! A coordinator in this process and worker processes beside it, on a private Unix socket.
+
+mod workers;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use anyhow::Context as _;
+use osteon_coordinator::store::Store;
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::{Config, Coordinator, ListenAddress, Listener};
+use osteon_proto::endpoint::Endpoint;
+use tempfile::TempDir;
+
+use crate::embedded::workers::Workers;
+use crate::ending::Failure;
+
+/// Longest directory of temporary files that leaves room for the socket's name, bytes.
+const TEMPORARY_BYTES_MAX: usize = 70;
+
+/// Where the coordinator keeps its jobs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum StorePlace {
+    /// Nowhere: they go with the process.
+    Memory,
+    /// In a directory, to continue after an interruption.
+    Directory(PathBuf),
+}
+
+/// A coordinator and its workers.
+pub(crate) struct Embedded {
+    coordinator: Coordinator,
+    workers: Workers,
+    endpoint: Endpoint,
+    /// Holds the socket; removed at the end.
+    _directory: TempDir,
+}
+
+impl Embedded {
+    /// Starts everything; `progress` grows whenever the workers have achieved something.
+    pub(crate) async fn start(
+        store: StorePlace,
+        workers: u32,
+        threads: u32,
+        progress: Arc<AtomicU64>,
+    ) -> Result<Self, Failure> {
+        let directory = private_directory().map_err(Failure::Failed)?;
+        let socket = directory.path().join("socket");
+        let endpoint = Endpoint::Unix(socket.clone());
+        let executable = std::env::current_exe()
+            .context("cannot find this program to start workers")
+            .map_err(Failure::Failed)?;
+        let coordinator = start_coordinator(store, socket).await?;
+        let workers = Workers::start(executable, &endpoint, workers, threads, progress);
+        Ok(Self { coordinator, workers, endpoint, _directory: directory })
+    }
+
+    /// Address of the coordinator.
+    pub(crate) fn endpoint(&self) -> &Endpoint {
+        &self.endpoint
+    }
+
+    /// Completes when the workers cannot go on.
+    pub(crate) async fn workers_failed(&mut self) -> Failure {
+        self.workers.failed().await
+    }
+
+    /// Ends and reaps the workers, then the coordinator.
+    pub(crate) async fn end(self) {
+        self.workers.end().await;
+        self.coordinator.shutdown().await;
+    }
+}
+
+async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordinator, Failure> {
+    let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
+    let listener = listener.map_err(Failure::failed)?;
+    let store: Box<dyn Store> = match store {
+        StorePlace::Memory => Box::new(MemoryStore::new()),
+        StorePlace::Directory(path) => Box::new(SqliteStore::open(&path).map_err(Failure::failed)?),
+    };
+    osteon_coordinator::start(listener, store, Config::default()).await.map_err(Failure::failed)
+}
+
+/// A directory that only this user can enter.
+fn private_directory() -> anyhow::Result<TempDir> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("osteon-").permissions(std::fs::Permissions::from_mode(0o700));
+    let parent = std::env::temp_dir();
+    // The kernel takes short paths of sockets only.
+    let parent = if parent.as_os_str().len() <= TEMPORARY_BYTES_MAX {
+        parent
+    } else {
+        PathBuf::from("/tmp")
+    };
+    builder
+        .tempdir_in(&parent)
+        .with_context(|| format!("cannot create a directory in {}", parent.display()))
+}

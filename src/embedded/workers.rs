@@ -1,0 +1,245 @@
+//! The worker processes of an embedded coordinator: started, watched, started again, ended.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::process::{ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use osteon_proto::endpoint::Endpoint;
+use tokio::io::{AsyncBufReadExt as _, AsyncRead, AsyncReadExt as _, BufReader};
+use tokio::process::{Child, Command};
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinSet;
+use tokio::time::{sleep, timeout};
+
+use crate::ending::Failure;
+use crate::progress::say;
+
+/// A worker leaves by itself after this long without this process, s.
+const GIVE_UP_AFTER_S: u64 = 5;
+/// Most deaths in a row, over all workers, without any progress between them.
+const DEATHS_IN_A_ROW_MAX: u32 = 10;
+/// Wait before a worker is started again, ms, times the deaths in a row.
+const RESPAWN_MS: u64 = 50;
+/// Lines of a worker's stderr that are kept to explain its death.
+const LINES_KEPT_MAX: usize = 20;
+/// Longest line of a worker's stderr, bytes.
+const LINE_BYTES_MAX: u64 = 4096;
+/// Longest wait for the rest of a dead worker's stderr, ms.
+const LAST_WORDS_MS: u64 = 500;
+
+/// The worker processes; all end when this is dropped.
+pub(crate) struct Workers {
+    tasks: JoinSet<()>,
+    stop: watch::Sender<bool>,
+    failures: mpsc::Receiver<anyhow::Error>,
+}
+
+/// What all keepers of workers share.
+struct Shared {
+    executable: PathBuf,
+    endpoint: Endpoint,
+    threads: u32,
+    progress: Arc<AtomicU64>,
+    deaths: Mutex<Deaths>,
+}
+
+/// Deaths since the last progress.
+#[derive(Debug, Default)]
+struct Deaths {
+    in_a_row: u32,
+    progress_at_last: u64,
+}
+
+impl Deaths {
+    /// Counts a death at `progress`; how many there were in a row.
+    fn count(&mut self, progress: u64) -> u32 {
+        self.in_a_row = if progress == self.progress_at_last { self.in_a_row + 1 } else { 1 };
+        self.progress_at_last = progress;
+        self.in_a_row
+    }
+}
+
+impl Workers {
+    /// Starts `count` worker processes of `executable`, of `threads` threads each.
+    pub(crate) fn start(
+        executable: PathBuf,
+        endpoint: &Endpoint,
+        count: u32,
+        threads: u32,
+        progress: Arc<AtomicU64>,
+    ) -> Self {
+        let deaths = Mutex::default();
+        let endpoint = endpoint.clone();
+        let shared = Arc::new(Shared { executable, endpoint, threads, progress, deaths });
+        let (stop, stopped) = watch::channel(false);
+        let (failure_sender, failures) = mpsc::channel(1);
+        let mut tasks = JoinSet::new();
+        for number in 1..=count {
+            tasks.spawn(keep(number, Arc::clone(&shared), stopped.clone(), failure_sender.clone()));
+        }
+        Self { tasks, stop, failures }
+    }
+
+    /// Completes when there is no hope that the workers get on.
+    pub(crate) async fn failed(&mut self) -> Failure {
+        match self.failures.recv().await {
+            Some(error) => Failure::Failed(error),
+            None => Failure::failed(anyhow!("all workers have ended")),
+        }
+    }
+
+    /// Ends and reaps all processes.
+    pub(crate) async fn end(mut self) {
+        // Fails only when every task has ended already.
+        let _ended = self.stop.send(true);
+        while self.tasks.join_next().await.is_some() {}
+    }
+}
+
+/// Keeps one worker alive until it is told to stop, or all hope is gone.
+async fn keep(
+    number: u32,
+    shared: Arc<Shared>,
+    mut stopped: watch::Receiver<bool>,
+    failures: mpsc::Sender<anyhow::Error>,
+) {
+    loop {
+        let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
+            Ok(mut child) => {
+                let words = tokio::spawn(listen(number, child.stderr.take()));
+                tokio::select! {
+                    status = child.wait() => (describe_death(status), last_words(words).await),
+                    _ = stopped.changed() => {
+                        // Kills and reaps; a process that is already dead is no error here.
+                        drop(child.kill().await);
+                        return;
+                    }
+                }
+            }
+            Err(error) => (format!("cannot be started: {error:#}"), String::new()),
+        };
+        let progress = shared.progress.load(Ordering::Relaxed);
+        let in_a_row = {
+            let mut deaths = shared.deaths.lock().unwrap_or_else(PoisonError::into_inner);
+            deaths.count(progress)
+        };
+        if in_a_row >= DEATHS_IN_A_ROW_MAX {
+            let error = anyhow!(
+                "the workers died {in_a_row} times in a row without any progress; \
+                 the last one {death}{words}"
+            );
+            // A full channel holds the same message of another worker.
+            drop(failures.try_send(error));
+            return;
+        }
+        say(&format!("worker {number} {death}; starting another"));
+        let wait = Duration::from_millis(RESPAWN_MS * u64::from(in_a_row));
+        tokio::select! {
+            () = sleep(wait) => {}
+            _ = stopped.changed() => return,
+        }
+    }
+}
+
+/// Starts one worker, in a process group of its own: the terminal's Ctrl-C is for this process,
+/// which ends its workers itself.
+fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result<Child> {
+    let mut command = Command::new(executable);
+    command
+        .arg("worker")
+        .args(["--coordinator", &endpoint.to_string()])
+        .args(["--threads", &threads.to_string()])
+        .args(["--give-up-after", &GIVE_UP_AFTER_S.to_string()])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .kill_on_drop(true);
+    if std::env::var_os("RUST_LOG").is_none() {
+        command.env("RUST_LOG", "warn");
+    }
+    command.spawn().with_context(|| format!("cannot start {}", executable.display()))
+}
+
+/// Passes a worker's stderr on, line by line; its last lines.
+async fn listen(number: u32, stderr: Option<impl AsyncRead + Unpin>) -> VecDeque<String> {
+    let mut lines = VecDeque::new();
+    let Some(stderr) = stderr else { return lines };
+    let mut reader = BufReader::new(stderr);
+    let mut bytes = Vec::new();
+    loop {
+        bytes.clear();
+        match (&mut reader).take(LINE_BYTES_MAX).read_until(b'\n', &mut bytes).await {
+            Ok(0) | Err(_) => return lines,
+            Ok(_) => {}
+        }
+        let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+        say(&format!("worker {number}: {line}"));
+        if lines.len() == LINES_KEPT_MAX {
+            lines.pop_front();
+        }
+        lines.push_back(line);
+    }
+}
+
+async fn last_words(words: tokio::task::JoinHandle<VecDeque<String>>) -> String {
+    match timeout(Duration::from_millis(LAST_WORDS_MS), words).await {
+        Ok(Ok(lines)) => lines.iter().map(|line| format!("\n  {line}")).collect(),
+        _ => String::new(),
+    }
+}
+
+fn describe_death(status: std::io::Result<ExitStatus>) -> String {
+    match status {
+        Ok(status) => format!("ended unexpectedly ({status})"),
+        Err(error) => format!("cannot be waited for: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_forgives_deaths() {
+        let mut deaths = Deaths::default();
+        assert_eq!([deaths.count(0), deaths.count(0), deaths.count(0)], [1, 2, 3]);
+        assert_eq!([deaths.count(5), deaths.count(5), deaths.count(7)], [1, 2, 1]);
+    }
+
+    #[tokio::test]
+    async fn the_last_lines_are_kept() {
+        let text: String = (0..100).map(|i| format!("line {i}\n")).collect();
+        let lines = listen(1, Some(text.as_bytes())).await;
+        assert_eq!(lines.len(), LINES_KEPT_MAX);
+        assert_eq!(lines.back().map(String::as_str), Some("line 99"));
+        let endless = vec![b'x'; 3 * 4096];
+        let lines = listen(1, Some(endless.as_slice())).await;
+        assert_eq!(lines.len(), 3);
+    }
+
+    #[tokio::test]
+    async fn workers_that_only_die_end_the_run_with_their_last_words() {
+        let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
+        // Knows no option of a worker, says so, and ends.
+        let executable = PathBuf::from("cat");
+        let mut workers = Workers::start(executable, &endpoint, 2, 1, Arc::default());
+        let failure = workers.failed().await.to_string();
+        workers.end().await;
+        assert!(failure.contains("died 10 times in a row"), "{failure}");
+        assert!(failure.contains("--coordinator"), "{failure}");
+    }
+
+    #[tokio::test]
+    async fn a_program_that_cannot_be_started_is_named() {
+        let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
+        let executable = PathBuf::from("/nonexistent/osteon");
+        let mut workers = Workers::start(executable, &endpoint, 1, 1, Arc::default());
+        let failure = workers.failed().await.to_string();
+        assert!(failure.contains("/nonexistent/osteon"), "{failure}");
+    }
+}

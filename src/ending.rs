@@ -1,0 +1,106 @@
+//! How a command ends, and the exit code of each way.
+
+use std::fmt;
+
+use crate::client::ClientError;
+
+/// A command that ran to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ending {
+    /// Exit code 0.
+    Done,
+    /// The result is there, and says that the run failed or was cancelled: exit code 1.
+    RunFailed,
+}
+
+/// A command that did not run to its end.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Bad usage or bad input; nothing was started. Exit code 2.
+    BadInput(anyhow::Error),
+    /// Everything else. Exit code 1.
+    Failed(anyhow::Error),
+    /// Whoever reads stdout has seen enough. Exit code 0.
+    ClosedPipe,
+}
+
+impl Failure {
+    /// Bad usage or bad input.
+    pub(crate) fn bad_input(error: impl Into<anyhow::Error>) -> Self {
+        Self::BadInput(error.into())
+    }
+
+    /// Something that is not the user's fault.
+    pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Self {
+        Self::Failed(error.into())
+    }
+
+    /// Exit code of the process.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::BadInput(_) => 2,
+            Self::Failed(_) => 1,
+            Self::ClosedPipe => 0,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BadInput(error) | Self::Failed(error) => {
+                write!(f, "{error}")?;
+                // Causes that the message does not already tell.
+                let mut told = error.to_string();
+                for cause in error.chain().skip(1) {
+                    let text = cause.to_string();
+                    if !told.contains(&text) {
+                        write!(f, ": {text}")?;
+                        told.push_str(&text);
+                    }
+                }
+                Ok(())
+            }
+            Self::ClosedPipe => f.write_str("stdout is closed"),
+        }
+    }
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Self {
+        if error.is_bad_input() { Self::bad_input(error) } else { Self::failed(error) }
+    }
+}
+
+/// An error of writing to stdout.
+pub(crate) fn stdout_failure(error: std::io::Error) -> Failure {
+    if error.kind() == std::io::ErrorKind::BrokenPipe {
+        return Failure::ClosedPipe;
+    }
+    Failure::failed(anyhow::Error::new(error).context("cannot write to stdout"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_are_told_once() {
+        let cause = std::io::Error::other("disk full");
+        let failure = Failure::failed(anyhow::Error::new(cause).context("cannot write DIR"));
+        assert_eq!(failure.to_string(), "cannot write DIR: disk full");
+        assert_eq!(failure.exit_code(), 1);
+        let cause = std::io::Error::other("disk full");
+        let failure = Failure::bad_input(anyhow::Error::new(cause).context("refused: disk full"));
+        assert_eq!(failure.to_string(), "refused: disk full");
+        assert_eq!(failure.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_closed_pipe_is_no_failure() {
+        let closed = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
+        assert_eq!(stdout_failure(closed).exit_code(), 0);
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        assert_eq!(stdout_failure(full).exit_code(), 1);
+    }
+}

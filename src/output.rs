@@ -1,0 +1,72 @@
+//! What goes to stdout: one trait, one implementation for people and one for programs.
+
+mod json;
+mod text;
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use osteon_common::case::Setup;
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_proto::v1::JobSnapshot;
+use osteon_solver::{Arrival, Failure};
+
+use crate::resolved::Format;
+
+/// A result to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownResult<'a> {
+    /// What the job was.
+    pub(crate) kind: JobKind,
+    /// Its specification.
+    pub(crate) specification: &'a JobSpecification,
+    /// The text of `result.json`.
+    pub(crate) json: &'a str,
+    /// Why the job failed, where a coordinator said so.
+    pub(crate) reason: Option<&'a str>,
+    /// Where the files are, if they are kept.
+    pub(crate) directory: Option<&'a Path>,
+}
+
+/// A simulation to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownSimulation<'a> {
+    /// What was simulated.
+    pub(crate) setup: &'a Setup,
+    /// What was picked.
+    pub(crate) arrival: &'a Result<Arrival, Failure>,
+    /// The file of the traces, if there is one.
+    pub(crate) traces: Option<&'a Path>,
+}
+
+/// One way to print. Every method writes whole lines.
+pub(crate) trait Output {
+    /// The result of a job.
+    fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()>;
+    /// The outcome of one case.
+    fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
+    /// The id of an accepted job.
+    fn submitted(&mut self, job: &str) -> io::Result<()>;
+    /// All jobs.
+    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()>;
+    /// One job as of now.
+    fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()>;
+    /// A text that is the same for people and programs: a case file, a URL.
+    fn verbatim(&mut self, text: &str) -> io::Result<()>;
+}
+
+/// The output of `format` on stdout.
+pub(crate) fn stdout(format: Format) -> Box<dyn Output> {
+    on(format, Box::new(io::stdout()))
+}
+
+/// The output of `format` on `writer`.
+fn on<'a>(format: Format, writer: Box<dyn Write + 'a>) -> Box<dyn Output + 'a> {
+    match format {
+        Format::Text => Box::new(text::TextOutput::new(writer)),
+        Format::Json => Box::new(json::JsonOutput::new(writer)),
+    }
+}
+
+#[cfg(test)]
+mod tests;

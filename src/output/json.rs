@@ -1,0 +1,96 @@
+//! Output for programs: one JSON value per command, without inf or NaN.
+
+use std::io::{self, Write};
+
+use osteon_common::version;
+use osteon_proto::v1::JobSnapshot;
+use serde_json::{Value, json};
+
+use super::{Output, ShownResult, ShownSimulation};
+use crate::output::text::{kind_name, state_name, status_name};
+
+/// Output for programs.
+pub(crate) struct JsonOutput<'a> {
+    writer: Box<dyn Write + 'a>,
+}
+
+impl<'a> JsonOutput<'a> {
+    pub(crate) fn new(writer: Box<dyn Write + 'a>) -> Self {
+        Self { writer }
+    }
+
+    fn value(&mut self, value: &Value) -> io::Result<()> {
+        writeln!(self.writer, "{value:#}")?;
+        self.writer.flush()
+    }
+}
+
+impl Output for JsonOutput<'_> {
+    fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()> {
+        self.verbatim(result.json)
+    }
+
+    fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
+        let setup = simulation.setup;
+        let arrival = simulation.arrival;
+        let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
+            let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
+            json!({ "x1": x1, "time": time })
+        });
+        let receivers: Vec<Value> = receivers.collect();
+        self.value(&json!({
+            "velocity": arrival.as_ref().ok().map(|arrival| arrival.velocity),
+            "failure": arrival.as_ref().err().map(|failure| failure.kind.name()),
+            "detail": arrival.as_ref().err().map(|failure| failure.detail.as_str()),
+            "receivers": receivers,
+            "picking": {
+                "extremum": setup.picking.extremum.name(),
+                "threshold": setup.picking.threshold,
+            },
+            "solver": {
+                "method": setup.solver.method.name(),
+                "refinement": setup.solver.refinement,
+            },
+            "version": version::VERSION,
+        }))
+    }
+
+    fn submitted(&mut self, job: &str) -> io::Result<()> {
+        self.value(&json!({ "job": job }))
+    }
+
+    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()> {
+        self.value(&Value::Array(jobs.iter().map(snapshot_value).collect()))
+    }
+
+    fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
+        self.value(&snapshot_value(snapshot))
+    }
+
+    fn verbatim(&mut self, text: &str) -> io::Result<()> {
+        self.writer.write_all(text.as_bytes())?;
+        self.writer.flush()
+    }
+}
+
+fn snapshot_value(snapshot: &JobSnapshot) -> Value {
+    let text = |text: &str| (!text.is_empty()).then(|| text.to_owned());
+    json!({
+        "job": snapshot.job,
+        "kind": kind_name(snapshot),
+        "state": state_name(snapshot),
+        "status": status_name(snapshot),
+        "reason": text(&snapshot.reason),
+        "evaluations": snapshot.evaluations,
+        "max_evaluations": snapshot.max_evaluations,
+        "realizations_done": snapshot.realizations_done,
+        "realizations": snapshot.realizations,
+        "best_cost": snapshot.best_cost,
+        "best_mean": snapshot.best_mean,
+        "best_coefficient_of_variation": snapshot.best_coefficient_of_variation,
+        "realizations_per_second": snapshot.realizations_per_second,
+        "workers": snapshot.workers,
+        "elapsed_s": snapshot.elapsed_s,
+        "waiting_for": text(&snapshot.waiting_for),
+    })
+}

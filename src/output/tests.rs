@@ -1,0 +1,194 @@
+use osteon_common::document::Format as FileFormat;
+use osteon_common::job_file;
+use osteon_common::outcome::FailureKind;
+use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
+
+use super::*;
+
+fn printed(format: Format, print: impl FnOnce(&mut dyn Output)) -> String {
+    let mut bytes = Vec::new();
+    print(on(format, Box::new(&mut bytes)).as_mut());
+    String::from_utf8(bytes).unwrap()
+}
+
+fn specification(kind: JobKind, free: &[&str]) -> JobSpecification {
+    let parameters = [
+        ("density", "start = 1700.0", "bounds = [1500.0, 2000.0]", "fixed = 1598.8"),
+        ("longitudinal_young_modulus", "start = 18e9", "bounds = [12e9, 25e9]", "fixed = 17.717e9"),
+        ("longitudinal_poisson_ratio", "start = 0.35", "bounds = [0.2, 0.45]", "fixed = 0.3816"),
+        ("longitudinal_shear_modulus", "start = 4e9", "bounds = [3e9, 6.5e9]", "fixed = 4.795e9"),
+        ("transverse_young_modulus", "start = 10e9", "bounds = [8e9, 16e9]", "fixed = 9.8254e9"),
+        ("transverse_poisson_ratio", "start = 0.4", "bounds = [0.2, 0.5]", "fixed = 0.4495"),
+        ("dispersion", "start = 0.1", "bounds = [0.02, 0.3]", "fixed = 0.1029"),
+    ];
+    let mut text = "[data]\nmean = 3905.91\ncoefficient_of_variation = 0.02711\n".to_owned();
+    for (name, start, bounds, fixed) in parameters {
+        text.push_str(&format!("[parameters.{name}]\n"));
+        if free.contains(&name) {
+            text.push_str(&format!("{start}\n{bounds}\n"));
+        } else {
+            text.push_str(&format!("{fixed}\n"));
+        }
+    }
+    job_file::parse(&text, FileFormat::Toml, Path::new(""), kind).unwrap()
+}
+
+const RESULT: &str = r#"{
+  "status": "converged",
+  "digest": "00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff00ff",
+  "cost": 3.21e-11,
+  "parameters": {
+    "density": 1598.8,
+    "longitudinal_young_modulus": 17717000000.0,
+    "longitudinal_poisson_ratio": 0.3816,
+    "longitudinal_shear_modulus": 4795000000.0,
+    "transverse_young_modulus": 9825400000.0,
+    "transverse_poisson_ratio": 0.4495
+  },
+  "dispersion": 0.1029,
+  "velocity": {
+    "mean": 3905.9104,
+    "coefficient_of_variation": 0.02711004,
+    "standard_error": {"mean": 2.0203, "coefficient_of_variation": 0.000366}
+  },
+  "data": {"mean": 3905.91, "coefficient_of_variation": 0.02711},
+  "evaluations": 181,
+  "realizations": 2747,
+  "failures": {"no_arrival": 2, "not_finite": 1}
+}
+"#;
+
+fn shown(kind: JobKind, free: &[&str], json: &str, reason: Option<&str>) -> String {
+    let specification = specification(kind, free);
+    let directory = Some(Path::new("results"));
+    let result = ShownResult { kind, specification: &specification, json, reason, directory };
+    printed(Format::Text, |output| output.result(&result).unwrap())
+}
+
+#[test]
+fn a_search_says_what_the_data_determine() {
+    let free = [
+        "density",
+        "longitudinal_young_modulus",
+        "longitudinal_poisson_ratio",
+        "longitudinal_shear_modulus",
+        "transverse_young_modulus",
+        "transverse_poisson_ratio",
+        "dispersion",
+    ];
+    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT, None));
+}
+
+#[test]
+fn two_searched_parameters_are_determined() {
+    let free = ["longitudinal_young_modulus", "dispersion"];
+    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT, None));
+}
+
+#[test]
+fn a_failed_search_says_why() {
+    let failed = r#"{"status": "failed", "reason": "no point was feasible", "digest": "00",
+        "cost": null, "parameters": {"density": null}, "dispersion": null,
+        "evaluations": 30, "realizations": 2747, "failures": {}}"#;
+    insta::assert_snapshot!(shown(JobKind::Identification, &["dispersion"], failed, None));
+}
+
+#[test]
+fn a_propagation_shows_moments() {
+    insta::assert_snapshot!(shown(JobKind::Propagation, &[], RESULT, None));
+}
+
+#[test]
+fn json_is_what_stands_in_the_file() {
+    let specification = specification(JobKind::Identification, &["dispersion"]);
+    let result = ShownResult {
+        kind: JobKind::Identification,
+        specification: &specification,
+        json: RESULT,
+        reason: None,
+        directory: None,
+    };
+    assert_eq!(printed(Format::Json, |output| output.result(&result).unwrap()), RESULT);
+}
+
+fn arrival() -> Arrival {
+    Arrival { velocity: 3908.75, times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6] }
+}
+
+fn simulation(format: Format, arrival: &Result<Arrival, Failure>) -> String {
+    let mut setup = Setup::default();
+    setup.probe.receivers.count = 3;
+    let shown = ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")) };
+    printed(format, |output| output.simulation(&shown).unwrap())
+}
+
+#[test]
+fn a_simulation_shows_times_and_velocity() {
+    insta::assert_snapshot!(simulation(Format::Text, &Ok(arrival())));
+    insta::assert_snapshot!(simulation(Format::Json, &Ok(arrival())));
+}
+
+#[test]
+fn a_simulation_without_velocity_says_why() {
+    let failure = || Failure {
+        kind: FailureKind::NoArrival,
+        detail: "receiver 3 has no extremum".to_owned(),
+    };
+    insta::assert_snapshot!(simulation(Format::Text, &Err(failure())));
+    insta::assert_snapshot!(simulation(Format::Json, &Err(failure())));
+}
+
+fn jobs() -> Vec<JobSnapshot> {
+    let running = JobSnapshot {
+        job: "1".to_owned(),
+        kind: KindMessage::Identification.into(),
+        state: JobState::Running.into(),
+        evaluations: 41,
+        max_evaluations: 400,
+        realizations_done: 1747,
+        realizations: 2747,
+        best_cost: Some(1.25e-5),
+        realizations_per_second: 1000.0,
+        workers: 2,
+        elapsed_s: 112.7,
+        ..JobSnapshot::default()
+    };
+    let ended = JobSnapshot {
+        job: "22".to_owned(),
+        kind: KindMessage::Propagation.into(),
+        state: JobState::Ended.into(),
+        status: JobStatus::Failed.into(),
+        reason: "3 of 100 realizations failed".to_owned(),
+        realizations_done: 100,
+        realizations: 100,
+        best_cost: Some(f64::INFINITY),
+        elapsed_s: 0.4,
+        ..JobSnapshot::default()
+    };
+    vec![running, ended]
+}
+
+#[test]
+fn jobs_are_a_table_or_a_list() {
+    insta::assert_snapshot!(printed(Format::Text, |output| output.jobs(&jobs()).unwrap()));
+    insta::assert_snapshot!(printed(Format::Json, |output| output.jobs(&jobs()).unwrap()));
+    assert_eq!(printed(Format::Text, |output| output.jobs(&[]).unwrap()), "no jobs\n");
+    assert_eq!(printed(Format::Json, |output| output.jobs(&[]).unwrap()), "[]\n");
+}
+
+#[test]
+fn a_snapshot_is_one_line() {
+    let lines = printed(Format::Text, |output| {
+        for job in jobs() {
+            output.snapshot(&job).unwrap();
+        }
+    });
+    insta::assert_snapshot!(lines);
+}
+
+#[test]
+fn an_id_is_printed_alone() {
+    assert_eq!(printed(Format::Text, |output| output.submitted("7").unwrap()), "7\n");
+    let json = printed(Format::Json, |output| output.submitted("7").unwrap());
+    assert_eq!(json, "{\n  \"job\": \"7\"\n}\n");
+}

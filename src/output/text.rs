@@ -1,0 +1,162 @@
+//! Output for people.
+
+mod result;
+
+use std::io::{self, Write};
+
+use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
+
+use super::{Output, ShownResult, ShownSimulation};
+use crate::client;
+use crate::progress::{describe, span};
+
+/// Output for people.
+pub(crate) struct TextOutput<'a> {
+    writer: Box<dyn Write + 'a>,
+}
+
+impl<'a> TextOutput<'a> {
+    pub(crate) fn new(writer: Box<dyn Write + 'a>) -> Self {
+        Self { writer }
+    }
+}
+
+impl Output for TextOutput<'_> {
+    fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()> {
+        self.verbatim(&result::table(result))
+    }
+
+    fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
+        self.verbatim(&simulation_table(simulation))
+    }
+
+    fn submitted(&mut self, job: &str) -> io::Result<()> {
+        self.verbatim(&format!("{job}\n"))
+    }
+
+    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()> {
+        if jobs.is_empty() {
+            return self.verbatim("no jobs\n");
+        }
+        let header = ["ID", "KIND", "STATE", "TIME", "WORKERS", "PROGRESS"];
+        let mut rows = vec![header.map(str::to_owned)];
+        for job in jobs {
+            rows.push([
+                job.job.clone(),
+                kind_name(job).to_owned(),
+                status_name(job).unwrap_or_else(|| state_name(job)).to_owned(),
+                span(job.elapsed_s),
+                job.workers.to_string(),
+                progress(job),
+            ]);
+        }
+        self.verbatim(&aligned(&rows))
+    }
+
+    fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
+        let state = status_name(snapshot).unwrap_or_else(|| state_name(snapshot));
+        let time = span(snapshot.elapsed_s);
+        self.verbatim(&format!("{time:>7}  {state}: {}\n", progress(snapshot)))
+    }
+
+    fn verbatim(&mut self, text: &str) -> io::Result<()> {
+        self.writer.write_all(text.as_bytes())?;
+        self.writer.flush()
+    }
+}
+
+/// `identification` or `propagation`.
+pub(super) fn kind_name(snapshot: &JobSnapshot) -> &'static str {
+    match snapshot.kind() {
+        JobKind::Identification => "identification",
+        JobKind::Propagation => "propagation",
+        JobKind::Unspecified => "unknown",
+    }
+}
+
+/// `waiting`, `running` or `ended`.
+pub(super) fn state_name(snapshot: &JobSnapshot) -> &'static str {
+    match snapshot.state() {
+        JobState::Waiting => "waiting",
+        JobState::Running => "running",
+        JobState::Ended => "ended",
+        JobState::Unspecified => "unknown",
+    }
+}
+
+/// How the job ended; `None` while it has not.
+pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
+    client::job_status(snapshot).map(osteon_common::results::Status::name)
+}
+
+fn progress(snapshot: &JobSnapshot) -> String {
+    let mut text = describe(snapshot);
+    if !snapshot.reason.is_empty() {
+        text.push_str("; ");
+        text.push_str(&snapshot.reason);
+    }
+    text
+}
+
+fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
+    let picking = simulation.setup.picking;
+    let mut text = match simulation.arrival {
+        Ok(arrival) => format!(
+            "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)\n",
+            significant(arrival.velocity, 8),
+            picking.extremum.name(),
+            picking.threshold
+        ),
+        Err(failure) if failure.detail.is_empty() => {
+            format!("no velocity: {}\n", failure.kind.name())
+        }
+        Err(failure) => format!("no velocity: {} ({})\n", failure.kind.name(), failure.detail),
+    };
+    if let Ok(arrival) = simulation.arrival {
+        text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
+        let positions = simulation.setup.probe.receivers.positions();
+        for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {
+            text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
+        }
+    }
+    if let Some(path) = simulation.traces {
+        text.push_str(&format!("\ntraces in {}\n", path.display()));
+    }
+    text
+}
+
+/// Columns of equal width, two spaces between.
+pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
+    let width =
+        |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; COLUMNS] = std::array::from_fn(width);
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (cell, width) in row.iter().zip(widths) {
+            line.push_str(&format!("{cell:<width$}  "));
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+/// A number with so many significant digits, without trailing zeros.
+pub(super) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 = scientific.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
+    if !(-4..=9).contains(&exponent) {
+        return scientific;
+    }
+    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+    let plain = format!("{value:.decimals$}");
+    if plain.contains('.') {
+        plain.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        plain
+    }
+}

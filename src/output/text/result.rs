@@ -1,0 +1,156 @@
+//! The table of a result, made from the text of `result.json`: a result that was stored looks as
+//! one that was just computed.
+
+use osteon_common::job::{JobKind, JobSpecification, Range};
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::results_json;
+use serde_json::Value;
+
+use super::{aligned, significant};
+use crate::output::ShownResult;
+
+/// The table.
+pub(super) fn table(shown: &ShownResult<'_>) -> String {
+    let Ok(value) = serde_json::from_str::<Value>(shown.json) else {
+        return format!("the stored result is no JSON:\n{}\n", shown.json);
+    };
+    let mut text = String::new();
+    match shown.kind {
+        JobKind::Identification => identification(&mut text, &value, shown),
+        JobKind::Propagation => propagation(&mut text, &value, shown),
+    }
+    if let Some(digest) = value["digest"].as_str() {
+        text.push_str(&format!("\ndigest {digest}\n"));
+    }
+    if let Some(directory) = shown.directory {
+        text.push_str(&format!("files in {}\n", directory.display()));
+    }
+    text
+}
+
+fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
+    let status = value["status"].as_str().unwrap_or("unknown");
+    let headline = match status {
+        "converged" => "Converged",
+        "max_evaluations" => "Not converged: the evaluations are used up",
+        "cancelled" => "Cancelled",
+        _ => "Failed",
+    };
+    text.push_str(headline);
+    let reason = value["reason"].as_str().or(shown.reason);
+    if let Some(reason) = reason.filter(|reason| !reason.is_empty()) {
+        text.push_str(&format!(": {reason}"));
+    }
+    let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
+    text.push_str(&format!("\n{evaluations} evaluations of {realizations} realizations"));
+    let Ok(point) = results_json::best_point(shown.json) else {
+        text.push_str("; no point was feasible\n");
+        return;
+    };
+    text.push_str(&format!("; at the best point {}\n\n", failures(value)));
+    text.push_str(&moments(value, true));
+    text.push('\n');
+    text.push_str(&parameters(&point, shown.specification));
+    text.push_str(&uniqueness(&point, shown.specification));
+}
+
+fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
+    if let Some(reason) = shown.reason.filter(|reason| !reason.is_empty()) {
+        text.push_str(&format!("Failed: {reason}\n"));
+    }
+    text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
+    text.push_str(&moments(value, false));
+}
+
+fn failures(value: &Value) -> String {
+    let counts = value["failures"].as_object();
+    let counts: Vec<String> =
+        counts.into_iter().flatten().map(|(kind, count)| format!("{count} {kind}")).collect();
+    if counts.is_empty() {
+        "none failed".to_owned()
+    } else {
+        format!("failed: {}", counts.join(", "))
+    }
+}
+
+/// Moments with their standard errors, against the data's.
+fn moments(value: &Value, with_data: bool) -> String {
+    let row = |name: &str, key: &str, unit: &str| {
+        let error = &value["velocity"]["standard_error"][key];
+        let model = match (value["velocity"][key].as_f64(), error.as_f64()) {
+            (Some(number), Some(error)) => with_error(number, error, unit),
+            (Some(number), None) => format!("{}{unit}", significant(number, 8)),
+            _ => "none".to_owned(),
+        };
+        let data = value["data"][key].as_f64();
+        let data = data.map(|number| format!("{}{unit}", significant(number, 7)));
+        [name.to_owned(), model, data.unwrap_or_default()]
+    };
+    let mut rows = Vec::new();
+    if with_data {
+        rows.push(["".to_owned(), "model ± standard error".to_owned(), "data".to_owned()]);
+    }
+    rows.push(row("mean velocity", "mean", " m/s"));
+    rows.push(row("coefficient of variation", "coefficient_of_variation", ""));
+    if let Some(cost) = value["cost"].as_f64() {
+        rows.push(["cost".to_owned(), significant(cost, 4), String::new()]);
+    }
+    aligned(&rows)
+}
+
+/// A number with enough digits to compare it with the data's, and two digits of its standard
+/// error.
+fn with_error(number: f64, error: f64, unit: &str) -> String {
+    format!("{} ± {}{unit}", significant(number, 7), significant(error, 2))
+}
+
+fn parameters(point: &Point, specification: &JobSpecification) -> String {
+    let mut rows = Vec::new();
+    for parameter in Parameter::ALL {
+        let (scale, unit) = scale(parameter);
+        let shown = |value: f64| significant(value * scale, 6);
+        let range = match specification.range(parameter) {
+            Range::Fixed(_) => "fixed".to_owned(),
+            Range::Free { lower, upper, .. } => {
+                format!("searched in {} to {}", shown(lower), shown(upper))
+            }
+        };
+        let name = parameter.name().replace('_', " ");
+        rows.push([name, format!("{}{unit}", shown(point.get(parameter))), range]);
+    }
+    aligned(&rows)
+}
+
+/// Factor and unit that make a parameter readable.
+fn scale(parameter: Parameter) -> (f64, &'static str) {
+    match parameter.unit() {
+        "Pa" => (1e-9, " GPa"),
+        "" => (1.0, ""),
+        _ => (1.0, " kg/m³"),
+    }
+}
+
+/// Which of the found numbers the data determine.
+fn uniqueness(point: &Point, specification: &JobSpecification) -> String {
+    let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
+    let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
+    let dispersion = free(Parameter::Dispersion);
+    let elastic = searched - usize::from(dispersion);
+    let Ok(elasticity) = point.constants().elasticity() else { return String::new() };
+    let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
+    let speed = format!("√(c1111/ρ) = {} m/s", significant(speed, 6));
+    if elastic < 2 {
+        return format!("\n{speed} at this point.\n");
+    }
+    let dispersion = if dispersion {
+        format!(" and the dispersion {}", significant(point.dispersion(), 4))
+    } else {
+        String::new()
+    };
+    format!(
+        "\nTwo moments cannot fix {searched} parameters. The data determine only\n    \
+         {speed}{dispersion};\n\
+         the other values are one of many sets that match the data equally well.\n\
+         Fix what is known from elsewhere (`fixed = …`) to narrow them down.\n"
+    )
+}

@@ -1,0 +1,35 @@
+//! Every help text, as a user sees it.
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use support::run;
+
+#[test]
+fn help_of_every_command() {
+    let mut text = run(&["--help"]).succeeded().to_owned();
+    for command in [
+        "identify",
+        "propagate",
+        "simulate",
+        "draw",
+        "coordinator",
+        "worker",
+        "submit",
+        "jobs",
+        "watch",
+        "cancel",
+        "fetch",
+    ] {
+        text.push_str(&format!("\n==== osteon {command}\n"));
+        text.push_str(run(&[command, "--help"]).succeeded());
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn the_version_is_the_packages() {
+    let expected = format!("osteon {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(run(&["--version"]).succeeded(), expected);
+}

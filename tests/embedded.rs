@@ -1,0 +1,196 @@
+//! `identify` and `propagate` on worker processes of their own: same bits however many work,
+//! results kept and continued, nothing left behind.
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use support::{Owned, Scratch, children, eventually, is_alive, job, osteon, run, signal, text};
+
+#[test]
+fn the_digest_does_not_depend_on_who_computes() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(60, 8));
+    let mut results = BTreeSet::new();
+    for (workers, threads) in [("1", "1"), ("2", "1"), ("3", "1"), ("1", "2"), ("2", "2")] {
+        let arguments =
+            ["identify", text(&job), "--json", "--workers", workers, "--threads", threads];
+        results.insert(run(&arguments).succeeded().to_owned());
+    }
+    assert_eq!(results.len(), 1, "{results:?}");
+    let result: Value = serde_json::from_str(results.first().unwrap()).unwrap();
+    assert_eq!(result["digest"].as_str().unwrap().len(), 64);
+    assert_eq!(result["evaluations"], 8);
+    assert_eq!(result["status"], "max_evaluations");
+}
+
+#[test]
+fn propagate_has_the_bits_of_draw_and_simulate() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(40, 1));
+    let out = scratch.path("out");
+    let propagated = run(&["propagate", text(&job), "--json", "--out", text(&out)]).json();
+    assert_eq!(propagated["realizations"], 40);
+    let file = fs::read_to_string(out.join("result.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&file).unwrap(), propagated);
+
+    let csv = fs::read_to_string(out.join("realizations.csv")).unwrap();
+    let rows: Vec<&str> = csv.lines().skip(1).collect();
+    assert_eq!(rows.len(), 40);
+    for index in [0, 1, 17, 39] {
+        let case = run(&["draw", text(&job), "--index", &index.to_string()]);
+        let case = scratch.write(&format!("{index}.toml"), case.succeeded());
+        let velocity = run(&["simulate", text(&case), "--json"]).json()["velocity"].clone();
+        let row: Vec<&str> = rows[index].split(',').collect();
+        assert_eq!(row[0], index.to_string());
+        let stored: f64 = row[1].parse().unwrap();
+        assert_eq!(velocity.as_f64().unwrap().to_bits(), stored.to_bits(), "index {index}");
+    }
+}
+
+#[test]
+fn a_finished_directory_is_shown_again_and_another_job_refused() {
+    let scratch = Scratch::new();
+    let first = scratch.write("job.toml", &job(30, 4));
+    let out = scratch.path("out");
+    let arguments = ["identify", text(&first), "--json", "--out", text(&out)];
+    let computed = run(&arguments);
+    let names = |directory: &Path| {
+        let entries = fs::read_dir(directory).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    };
+    let expected = ["history.csv", "job.toml", "realizations.csv", "result.json"];
+    let listed: BTreeSet<String> = names(&out);
+    assert_eq!(listed, expected.map(str::to_owned).into());
+
+    let modified = || fs::metadata(out.join("result.json")).unwrap().modified().unwrap();
+    let before = modified();
+    assert_eq!(run(&arguments).succeeded(), computed.succeeded());
+    assert_eq!(modified(), before);
+
+    let other = scratch.write("other.toml", &job(31, 4));
+    let refused = run(&["identify", text(&other), "--out", text(&out)]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("different specification"), "{refused:?}");
+    assert!(refused.stderr.contains("realizations = 31"), "{refused:?}");
+    let refused = run(&["propagate", text(&first), "--out", text(&out)]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert_eq!(modified(), before);
+}
+
+#[test]
+fn the_stored_job_is_complete_and_runs_to_the_same_bits() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(30, 4));
+    let (first, second) = (scratch.path("first"), scratch.path("second"));
+    run(&["identify", text(&job), "--out", text(&first)]).succeeded();
+    run(&["identify", text(&first.join("job.toml")), "--out", text(&second)]).succeeded();
+    for name in ["job.toml", "result.json", "history.csv", "realizations.csv"] {
+        let bytes = |directory: &Path| fs::read(directory.join(name)).unwrap();
+        assert_eq!(bytes(&first), bytes(&second), "{name}");
+    }
+}
+
+/// A search of a few seconds.
+fn long_job() -> String {
+    job(100, 60)
+}
+
+/// The result of [`long_job`] without any disturbance.
+fn undisturbed() -> &'static Value {
+    static RESULT: OnceLock<Value> = OnceLock::new();
+    RESULT.get_or_init(|| {
+        let scratch = Scratch::new();
+        let job = scratch.write("job.toml", &long_job());
+        run(&["identify", text(&job), "--json"]).json()
+    })
+}
+
+/// A long run in `out`, seen to have completed some evaluations.
+fn long_run(scratch: &Scratch, out: &Path) -> (Owned, Vec<u32>) {
+    let job = scratch.write("long.toml", &long_job());
+    let mut command = osteon();
+    command.args(["identify", text(&job), "--json", "--out", text(out)]);
+    let process = Owned::spawn(&mut command);
+    let mut workers = Vec::new();
+    eventually("two workers run", || {
+        workers = children(process.id());
+        workers.len() == 2
+    });
+    eventually("the job is accepted", || out.join("job.toml").exists());
+    (process, workers)
+}
+
+#[test]
+fn an_interrupted_run_ends_its_workers_and_can_be_continued() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let (mut process, workers) = long_run(&scratch, &out);
+    process.signal("TERM");
+    assert_eq!(process.code(), Some(1));
+    // They were reaped by their parent before it ended.
+    assert!(workers.iter().all(|&worker| !is_alive(worker)), "{workers:?}");
+    assert!(!out.join("result.json").exists());
+
+    let job = scratch.path("long.toml");
+    let continued = run(&["identify", text(&job), "--json", "--out", text(&out)]).json();
+    assert_eq!(&continued, undisturbed());
+}
+
+#[test]
+fn workers_of_a_killed_run_go_away_and_it_can_be_continued() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let (mut process, workers) = long_run(&scratch, &out);
+    process.kill();
+    eventually("the workers leave", || workers.iter().all(|&worker| !is_alive(worker)));
+    let job = scratch.path("long.toml");
+    let continued = run(&["identify", text(&job), "--json", "--out", text(&out)]).json();
+    assert_eq!(&continued, undisturbed());
+}
+
+#[test]
+fn a_killed_worker_is_replaced() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let (mut process, workers) = long_run(&scratch, &out);
+    signal(workers[0], "KILL");
+    eventually("another worker is started", || {
+        let now = children(process.id());
+        now.len() == 2 && !now.contains(&workers[0])
+    });
+    assert_eq!(process.code(), Some(0));
+    let result = fs::read_to_string(out.join("result.json")).unwrap();
+    assert_eq!(&serde_json::from_str::<Value>(&result).unwrap(), undisturbed());
+}
+
+#[test]
+fn two_runs_do_not_share_a_directory() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let (_process, _) = long_run(&scratch, &out);
+    let job = scratch.path("long.toml");
+    let second = run(&["identify", text(&job), "--out", text(&out)]);
+    assert_eq!(second.code, Some(1), "{second:?}");
+    assert!(second.stderr.contains("another osteon is running"), "{second:?}");
+}
+
+#[test]
+fn a_propagation_above_the_accepted_fraction_fails() {
+    let scratch = Scratch::new();
+    // The direct wave in such a fast coupling overtakes the wave through the bone.
+    let slow = job(10, 1)
+        + "[layers]\ncoupling = { thickness = 10e-3, density = 1000.0, sound_speed = 6000.0 }\n";
+    let job = scratch.write("job.toml", &slow);
+    let failed = run(&["propagate", text(&job), "--json"]);
+    assert_eq!(failed.code, Some(1), "{failed:?}");
+    let result: Value = serde_json::from_str(&failed.stdout).unwrap();
+    assert_eq!(result["failures"]["direct_wave_first"], 10);
+    assert_eq!(result["velocity"]["mean"], Value::Null);
+}

@@ -1,0 +1,228 @@
+//! The services as an operator and a user meet them: coordinator, worker, and every client
+//! command.
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::fs;
+use std::io::Write as _;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use support::{Coordinator, Owned, Scratch, eventually, job, osteon, run};
+
+#[test]
+fn a_job_from_submission_to_its_results() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let address = fs::read_to_string(scratch.path("store/address")).unwrap();
+    assert_eq!(address.trim_end(), coordinator.url);
+    assert_eq!(coordinator.client(&["jobs", "--json"]).json(), Value::Array(vec![]));
+
+    let id = coordinator.submit(&file);
+    let waiting = coordinator.job(&id);
+    assert_eq!((&waiting["status"], &waiting["kind"]), (&Value::Null, &"identification".into()));
+
+    // Without a worker the job waits, and fetching it writes nothing.
+    let out = scratch.path("out");
+    let unfinished = coordinator.client(&["fetch", &id, "--out", out.to_str().unwrap()]);
+    assert_eq!(unfinished.code, Some(1), "{unfinished:?}");
+    assert!(unfinished.stderr.contains("has not ended"), "{unfinished:?}");
+    assert!(!out.exists());
+
+    let _worker = coordinator.worker(2);
+    let watched = coordinator.client(&["watch", &id]);
+    assert!(watched.succeeded().lines().last().unwrap().contains("max_evaluations"), "{watched:?}");
+    coordinator.client(&["fetch", &id, "--out", out.to_str().unwrap()]).succeeded();
+    for name in ["job.toml", "result.json", "history.csv", "realizations.csv"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    let fetched: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("result.json")).unwrap()).unwrap();
+
+    // The same job embedded, and through `identify --coordinator`: the same object.
+    assert_eq!(run(&["identify", file.to_str().unwrap(), "--json"]).json(), fetched);
+    let remote = coordinator.client(&["identify", file.to_str().unwrap(), "--json"]).json();
+    assert_eq!(remote, fetched);
+}
+
+#[test]
+fn submission_is_idempotent_by_request_id() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let other = scratch.write("other.toml", &job(31, 4));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let submit = |file: &std::path::Path| {
+        let arguments = ["submit", file.to_str().unwrap(), "--request-id", "monday", "--json"];
+        coordinator.client(&arguments)
+    };
+    let first = submit(&file).json();
+    assert_eq!(submit(&file).json(), first);
+    let refused = submit(&other);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert_ne!(coordinator.submit(&file), first["job"].as_str().unwrap());
+    let propagation = ["submit", file.to_str().unwrap(), "--propagate"];
+    let id = coordinator.client(&propagation).succeeded().trim_end().to_owned();
+    assert_eq!(coordinator.job(&id)["kind"], "propagation");
+}
+
+#[test]
+fn a_cancelled_job_ends_and_says_so() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(1000, 400));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let _worker = coordinator.worker(1);
+    let id = coordinator.submit(&file);
+    eventually("the job runs", || coordinator.job(&id)["realizations_done"].as_u64() > Some(0));
+    coordinator.client(&["cancel", &id]).succeeded();
+    let watched = coordinator.client(&["watch", &id]);
+    assert_eq!(watched.code, Some(1), "{watched:?}");
+    assert!(watched.stdout.contains("cancelled"), "{watched:?}");
+    let out = scratch.path("out");
+    coordinator.client(&["fetch", &id, "--out", out.to_str().unwrap()]).succeeded();
+    let result: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("result.json")).unwrap()).unwrap();
+    assert_eq!(result["status"], "cancelled");
+}
+
+#[test]
+fn unknown_jobs_are_named() {
+    let scratch = Scratch::new();
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let out = scratch.path("out");
+    for arguments in [
+        &["watch", "nonsense"] as &[&str],
+        &["cancel", "nonsense"],
+        &["fetch", "nonsense", "--out", out.to_str().unwrap()],
+    ] {
+        let finished = coordinator.client(arguments);
+        assert_eq!(finished.code, Some(2), "{finished:?}");
+        assert!(finished.stderr.contains("nonsense"), "{finished:?}");
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn an_unreachable_coordinator_is_named_in_time() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let out = scratch.path("out");
+    // A port that was free a moment ago, and one that accepts but never speaks.
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let silent = format!("http://{}", listener.local_addr().unwrap());
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    for url in [format!("http://{free}"), silent, "unix:/nonexistent/socket".to_owned()] {
+        let arguments = [
+            &["jobs"] as &[&str],
+            &["submit", file.to_str().unwrap()],
+            &["identify", file.to_str().unwrap(), "--out", out.to_str().unwrap()],
+        ];
+        std::thread::scope(|scope| {
+            for arguments in arguments {
+                let url = &url;
+                scope.spawn(move || {
+                    let start = Instant::now();
+                    let finished = run(&[arguments, &["--coordinator", url]].concat());
+                    assert_eq!(finished.code, Some(1), "{finished:?}");
+                    assert!(finished.stderr.contains(url), "{finished:?}");
+                    assert_eq!(finished.stdout, "");
+                    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+                });
+            }
+        });
+    }
+    assert!(!out.join("job.toml").exists());
+}
+
+#[test]
+fn a_worker_gives_up_only_when_told_to() {
+    let scratch = Scratch::new();
+    let url = format!("unix:{}", scratch.path("socket").display());
+    let gave_up = run(&["worker", "--coordinator", &url, "--give-up-after", "0.3"]);
+    assert_eq!(gave_up.code, Some(1), "{gave_up:?}");
+    assert!(gave_up.stderr.contains(&url) && gave_up.stderr.contains("gave up"), "{gave_up:?}");
+
+    let limited = run(&["worker", "--coordinator", &url, "--time-limit", "0.3"]);
+    assert_eq!(limited.code, Some(0), "{limited:?}");
+}
+
+#[test]
+fn services_end_cleanly_when_told_to() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(1000, 400));
+    let mut coordinator = Coordinator::start(&scratch.path("store"));
+    let mut worker = coordinator.worker(1);
+    let id = coordinator.submit(&file);
+    eventually("the job runs", || coordinator.job(&id)["realizations_done"].as_u64() > Some(0));
+    worker.signal("TERM");
+    assert_eq!(worker.code(), Some(0));
+    eventually("the worker is gone", || coordinator.job(&id)["workers"] == 0);
+    coordinator.process.signal("INT");
+    assert_eq!(coordinator.process.code(), Some(0));
+    assert!(!scratch.path("store/address").exists());
+}
+
+#[test]
+fn workers_wait_for_their_coordinator_and_find_it_again() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(300, 20));
+    let socket = scratch.path("socket");
+    let url = format!("unix:{}", socket.display());
+    let mut worker = osteon();
+    let _worker = Owned::spawn(worker.args(["worker", "--coordinator", &url, "--threads", "1"]));
+    let start = || {
+        let mut command = osteon();
+        command.args(["coordinator", "--listen", &url, "--store"]).arg(scratch.path("store"));
+        let mut process = Owned::spawn(&mut command);
+        assert_eq!(process.line(), url);
+        Coordinator { process, url: url.clone() }
+    };
+    let mut first = start();
+    let id = first.submit(&file);
+    eventually("an evaluation is complete", || first.job(&id)["evaluations"].as_u64() > Some(0));
+    first.process.kill();
+    drop(first);
+    let second = start();
+    second.client(&["watch", &id]).succeeded();
+    let out = scratch.path("out");
+    second.client(&["fetch", &id, "--out", out.to_str().unwrap()]).succeeded();
+    let fetched: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("result.json")).unwrap()).unwrap();
+    assert_eq!(run(&["identify", file.to_str().unwrap(), "--json"]).json(), fetched);
+}
+
+#[test]
+fn addresses_that_others_can_reach_need_the_explicit_word() {
+    let scratch = Scratch::new();
+    let store = scratch.path("store");
+    let arguments = ["coordinator", "--listen", "0.0.0.0:0", "--store", store.to_str().unwrap()];
+    let refused = run(&arguments);
+    assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{refused:?}");
+    assert!(refused.stderr.contains("--insecure"), "{refused:?}");
+    assert!(!store.exists());
+    let nowhere = ["coordinator", "--listen", "here", "--store", store.to_str().unwrap()];
+    let refused = run(&nowhere);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(!store.exists());
+}
+
+#[test]
+fn a_closed_pipe_is_success() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(10, 1));
+    let arguments = ["draw", file.to_str().unwrap(), "--index", "0"];
+    let mut child =
+        osteon().args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    // Too fast or too late for the pipe: success both times.
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = osteon().args(arguments).stdout(full).stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    std::io::stderr().flush().unwrap();
+}

@@ -1,0 +1,64 @@
+//! How long to wait before the next attempt to reach the coordinator.
+
+use std::hash::{BuildHasher as _, RandomState};
+use std::time::Duration;
+
+/// Wait after the first failure, ms, before jitter.
+const FIRST_MS: u64 = 100;
+/// Longest wait, ms, before jitter.
+const LONGEST_MS: u64 = 5000;
+
+/// Exponential backoff: each wait is twice the one before, up to a bound, and shortened by up to
+/// half at random so that the workers of a cluster do not come back all at once.
+#[derive(Debug, Default)]
+pub(crate) struct Backoff {
+    failures: u32,
+}
+
+impl Backoff {
+    /// The next wait.
+    pub(crate) fn next(&mut self) -> Duration {
+        self.next_with(RandomState::new().hash_one(self.failures))
+    }
+
+    /// Begins again with the shortest wait.
+    pub(crate) fn reset(&mut self) {
+        self.failures = 0;
+    }
+
+    fn next_with(&mut self, random: u64) -> Duration {
+        let full = FIRST_MS.saturating_mul(1 << self.failures.min(16)).min(LONGEST_MS);
+        self.failures = self.failures.saturating_add(1);
+        Duration::from_millis(full / 2 + random % (full / 2 + 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waits_double_up_to_the_bound() {
+        let waits = |random| {
+            let mut backoff = Backoff::default();
+            let mut next = || backoff.next_with(random).as_millis();
+            [next(), next(), next(), next(), next(), next(), next(), next()]
+        };
+        assert_eq!(waits(0), [50, 100, 200, 400, 800, 1600, 2500, 2500]);
+        assert_eq!(waits(u64::MAX)[0], 50 + u128::from(u64::MAX % 51));
+        for _ in 0..100 {
+            let mut backoff = Backoff { failures: u32::MAX };
+            let wait = backoff.next().as_millis();
+            assert!((2500..=5000).contains(&wait), "{wait} ms");
+        }
+    }
+
+    #[test]
+    fn a_success_begins_again() {
+        let mut backoff = Backoff::default();
+        backoff.next();
+        backoff.next();
+        backoff.reset();
+        assert_eq!(backoff.next_with(0).as_millis(), 50);
+    }
+}

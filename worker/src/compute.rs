@@ -1,0 +1,159 @@
+//! Realizations on the cores of this worker.
+//!
+//! Realization i of a batch is drawn by [`Ensemble`] from (point, seed, i), and solved by
+//! [`Solver::outcome`]; its bits depend on nothing else: not on the thread, the batch, or what was
+//! computed before. A drawn tensor that is not positive definite in floating point, or a point
+//! from which nothing can be drawn, is the failure `not_finite` of each realization concerned.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use osteon_common::case::Setup;
+use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_common::realization::Ensemble;
+use osteon_proto::batch::Work;
+use osteon_solver::{Solver, Workspace};
+use rayon::prelude::*;
+
+use crate::error::{PanickedCase, WorkerError};
+use crate::state::Computed;
+
+/// Most solvers, each with its tables, that a worker keeps.
+const SOLVERS_MAX: usize = 4;
+
+thread_local! {
+    /// Scratch memory of one thread of the pool.
+    static WORKSPACE: RefCell<Workspace> = RefCell::new(Workspace::default());
+}
+
+/// The cores of a worker.
+#[derive(Debug)]
+pub(crate) struct Cores {
+    pool: rayon::ThreadPool,
+    solvers: Arc<Solvers>,
+}
+
+/// Tells a computation to stop; looked at between realizations.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// Stops the computation.
+    pub(crate) fn raise(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    fn is_raised(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl Cores {
+    /// A pool of `threads` threads.
+    ///
+    /// # Errors
+    /// When the operating system gives none.
+    pub(crate) fn new(threads: u32) -> Result<Self, WorkerError> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads as usize)
+            .thread_name(|index| format!("realizations-{index}"))
+            .build()
+            .map_err(|source| WorkerError::Pool { threads, source })?;
+        Ok(Self { pool, solvers: Arc::default() })
+    }
+
+    /// Computes `work` on the pool and hands the end of it to `done`, on a thread of the pool.
+    /// Batches begin in the order of the calls.
+    pub(crate) fn start(
+        &self,
+        work: Work,
+        stop: StopFlag,
+        done: impl FnOnce(Computed) + Send + 'static,
+    ) {
+        let solvers = Arc::clone(&self.solvers);
+        self.pool.spawn_fifo(move || {
+            let start = Instant::now();
+            done(match compute(&work, &solvers, &stop) {
+                Ok(outcomes) => {
+                    Computed::Complete { outcomes, elapsed_s: start.elapsed().as_secs_f64() }
+                }
+                Err(Interrupted::Stopped) => Computed::Abandoned,
+                Err(Interrupted::Panicked { case, message }) => {
+                    Computed::Panicked { case, message }
+                }
+            });
+        });
+    }
+}
+
+/// Why there are no outcomes.
+enum Interrupted {
+    Stopped,
+    Panicked { case: Box<PanickedCase>, message: String },
+}
+
+/// The outcomes in index order.
+fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Outcome>, Interrupted> {
+    if stop.is_raised() {
+        return Err(Interrupted::Stopped);
+    }
+    let indices = work.first..work.first + u64::from(work.count);
+    let panicked = |index: u64, payload: Box<dyn std::any::Any + Send>| Interrupted::Panicked {
+        case: Box::new(PanickedCase { index, seed: work.seed, point: work.point }),
+        message: panic_message(payload.as_ref()),
+    };
+    let prepared = catch_unwind(AssertUnwindSafe(|| {
+        (solvers.get(&work.setup), Ensemble::new(&work.point, work.seed))
+    }));
+    let (solver, ensemble) = prepared.map_err(|payload| panicked(work.first, payload))?;
+    let Ok(ensemble) = ensemble else {
+        return Ok(indices.map(|_| Err(FailureKind::NotFinite)).collect());
+    };
+    indices
+        .into_par_iter()
+        .map(|index| {
+            if stop.is_raised() {
+                return Err(Interrupted::Stopped);
+            }
+            catch_unwind(AssertUnwindSafe(|| realization(&solver, &ensemble, index)))
+                .map_err(|payload| panicked(index, payload))
+        })
+        .collect()
+}
+
+fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> Outcome {
+    let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
+    WORKSPACE.with_borrow_mut(|workspace| solver.outcome(&bone, workspace))
+}
+
+fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").to_owned()
+}
+
+/// The solvers of the last few setups.
+#[derive(Debug, Default)]
+struct Solvers(Mutex<VecDeque<Arc<Solver>>>);
+
+impl Solvers {
+    /// The solver of `setup`; made once, even if several batches ask at a time.
+    fn get(&self, setup: &Setup) -> Arc<Solver> {
+        // A panic while the lock is held leaves the queue as it was: no half-made entry.
+        let mut solvers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(solver) = solvers.iter().find(|solver| solver.setup() == setup) {
+            return Arc::clone(solver);
+        }
+        let solver = Arc::new(Solver::new(setup));
+        solvers.truncate(SOLVERS_MAX - 1);
+        solvers.push_front(Arc::clone(&solver));
+        solver
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,78 @@
+use std::sync::mpsc;
+use std::time::Duration;
+
+use osteon_common::job::Sampling;
+use osteon_common::parameters::Point;
+
+use super::*;
+
+const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const DEADLINE: Duration = Duration::from_secs(60);
+
+fn work(point: Point, first: u64, count: u32) -> Work {
+    Work { setup: Setup::default(), point, seed: 5, sampling: Sampling::MonteCarlo, first, count }
+}
+
+fn outcomes(threads: u32, work: Work) -> Vec<Outcome> {
+    let (sender, receiver) = mpsc::channel();
+    let cores = Cores::new(threads).unwrap();
+    cores.start(work, StopFlag::default(), move |computed| sender.send(computed).unwrap());
+    match receiver.recv_timeout(DEADLINE).unwrap() {
+        Computed::Complete { outcomes, .. } => outcomes,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn outcomes_do_not_depend_on_threads_or_batches() {
+    let whole = outcomes(1, work(POINT, 0, 12));
+    assert_eq!(outcomes(3, work(POINT, 0, 12)), whole);
+    let parts = [(0, 5), (5, 1), (6, 6)];
+    let joined: Vec<_> =
+        parts.iter().flat_map(|&(first, count)| outcomes(2, work(POINT, first, count))).collect();
+    assert_eq!(joined, whole);
+}
+
+#[test]
+fn outcomes_are_those_of_the_solver_alone() {
+    let solver = Solver::new(&Setup::default());
+    let ensemble = Ensemble::new(&POINT, 5).unwrap();
+    let expected: Vec<_> = (3..7)
+        .map(|index| solver.outcome(&ensemble.bone(index).unwrap(), &mut Workspace::default()))
+        .collect();
+    assert_eq!(outcomes(2, work(POINT, 3, 4)), expected);
+}
+
+#[test]
+fn a_point_without_an_ensemble_fails_at_every_index() {
+    let mut inadmissible = POINT;
+    inadmissible.0[5] = 1.2;
+    assert_eq!(outcomes(2, work(inadmissible, 0, 3)), [Err(FailureKind::NotFinite); 3]);
+}
+
+#[test]
+fn a_raised_flag_ends_the_computation() {
+    let (sender, receiver) = mpsc::channel();
+    let cores = Cores::new(1).unwrap();
+    let stop = StopFlag::default();
+    stop.raise();
+    cores.start(work(POINT, 0, 65_536), stop, move |computed| sender.send(computed).unwrap());
+    assert_eq!(receiver.recv_timeout(DEADLINE).unwrap(), Computed::Abandoned);
+}
+
+#[test]
+fn few_solvers_are_kept_and_each_is_made_once() {
+    let solvers = Solvers::default();
+    let setup = |thickness: f64| {
+        let mut setup = Setup::default();
+        setup.layers.bone_thickness = thickness;
+        setup
+    };
+    let first = solvers.get(&setup(4e-3));
+    assert!(Arc::ptr_eq(&first, &solvers.get(&setup(4e-3))));
+    for i in 1..=SOLVERS_MAX {
+        solvers.get(&setup(4e-3 + 1e-4 * i as f64));
+    }
+    assert_eq!(solvers.0.lock().unwrap().len(), SOLVERS_MAX);
+    assert!(!Arc::ptr_eq(&first, &solvers.get(&setup(4e-3))));
+}

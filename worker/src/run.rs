@@ -1,0 +1,310 @@
+//! The one async file of the worker: moves bytes between coordinator, state and cores.
+
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::pin::{Pin, pin};
+use std::time::{Duration, Instant};
+
+use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
+use osteon_proto::endpoint::{self, Endpoint};
+use osteon_proto::v1::attach_request::Message as Request;
+use osteon_proto::v1::{AttachRequest, AttachResponse};
+use tokio::sync::mpsc;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Status, Streaming};
+use tracing::{info, trace, warn};
+
+use crate::backoff::Backoff;
+use crate::compute::{Cores, StopFlag};
+use crate::error::WorkerError;
+use crate::state::{
+    BATCHES_HELD_MAX, Computed, Detached, Effect, Event, Failure, Identity, State, Task,
+};
+
+/// Longest wait for a connection and for the answer to hello, s.
+const ATTACH_S_MAX: u64 = 10;
+/// How often the state looks at the time, ms.
+const TICK_MS: u64 = 100;
+/// Most messages that wait to be sent: an answer to every batch, and heartbeats between.
+const OUTBOX_MAX: usize = 2 * BATCHES_HELD_MAX;
+
+/// What a worker is told at its start.
+#[derive(Debug, Clone)]
+pub struct WorkerConfig {
+    /// Address of the coordinator.
+    pub endpoint: Endpoint,
+    /// Threads to compute on, 1 to [`WORKER_THREADS_MAX`].
+    pub threads: u32,
+    /// Ends the worker after this long without a coordinator; by default it tries without end.
+    pub give_up_after: Option<Duration>,
+    /// Drains and ends the worker after this long, e.g. shortly before a batch system would.
+    pub time_limit: Option<Duration>,
+}
+
+/// Serves a coordinator until `shutdown` completes or the time limit is over; then finishes or
+/// hands back what it holds. Losing the coordinator is no error: the worker attaches anew.
+///
+/// # Errors
+/// When the coordinator refuses the worker, is away for longer than allowed, sends what cannot be
+/// read, or the solver panics.
+pub async fn run(
+    config: WorkerConfig,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), WorkerError> {
+    if config.threads == 0 || config.threads > WORKER_THREADS_MAX {
+        return Err(WorkerError::Threads { threads: config.threads, max: WORKER_THREADS_MAX });
+    }
+    let (finished_sender, finished) = mpsc::channel(BATCHES_HELD_MAX);
+    let mut worker = Worker {
+        state: State::new(Identity {
+            threads: config.threads,
+            host: host_name(),
+            process: std::process::id(),
+        }),
+        cores: Cores::new(config.threads)?,
+        stops: BTreeMap::new(),
+        finished_sender,
+        finished,
+        started: Instant::now(),
+        last_attached: Instant::now(),
+        endpoint: config.endpoint.clone(),
+    };
+    let leave = async {
+        match config.time_limit {
+            Some(limit) => drop(timeout(limit, shutdown).await),
+            None => shutdown.await,
+        }
+    };
+    let leave = pin!(leave);
+    worker.serve(config.give_up_after, leave).await
+}
+
+struct Worker {
+    state: State,
+    cores: Cores,
+    /// Computations that have not ended, and how to stop them.
+    stops: BTreeMap<Task, StopFlag>,
+    finished_sender: mpsc::Sender<(Task, Computed)>,
+    finished: mpsc::Receiver<(Task, Computed)>,
+    started: Instant,
+    /// The last moment with a lease, or the start.
+    last_attached: Instant,
+    endpoint: Endpoint,
+}
+
+/// How an attachment ended.
+enum End {
+    /// The worker's work is done.
+    Left,
+    /// Try again.
+    Lost(String),
+}
+
+impl Worker {
+    async fn serve(
+        &mut self,
+        give_up_after: Option<Duration>,
+        mut leave: Pin<&mut impl Future<Output = ()>>,
+    ) -> Result<(), WorkerError> {
+        let mut backoff = Backoff::default();
+        loop {
+            let last = match self.attachment(leave.as_mut(), &mut backoff).await? {
+                End::Left => return Ok(()),
+                End::Lost(reason) => reason,
+            };
+            if let Some(End::Left) = self.apply(Event::Lost, None)? {
+                return Ok(());
+            }
+            let away = self.last_attached.elapsed();
+            let left = give_up_after.map(|limit| limit.saturating_sub(away));
+            if left == Some(Duration::ZERO) {
+                let (endpoint, seconds) = (self.endpoint.clone(), away.as_secs_f64().round());
+                return Err(WorkerError::GaveUp { endpoint, seconds, last });
+            }
+            let wait = backoff.next().min(left.unwrap_or(Duration::MAX));
+            warn!(endpoint = %self.endpoint, wait_ms = wait.as_millis() as u64, "no coordinator: {last}");
+            if timeout(wait, leave.as_mut()).await.is_ok() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// One attachment, from the connection to its end.
+    async fn attachment(
+        &mut self,
+        mut leave: Pin<&mut impl Future<Output = ()>>,
+        backoff: &mut Backoff,
+    ) -> Result<End, WorkerError> {
+        let (outbox, requests) = mpsc::channel(OUTBOX_MAX);
+        let endpoint = self.endpoint.clone();
+        let hello = self.state.attach();
+        let opened = tokio::select! {
+            () = leave.as_mut() => return Ok(End::Left),
+            opened = open(&endpoint, hello, &outbox, requests) => opened,
+        };
+        let mut responses = match opened {
+            Ok(responses) => responses,
+            Err(NotOpened::Unreachable(reason)) => return Ok(End::Lost(reason)),
+            Err(NotOpened::Status(status)) => return self.ended_with(&status),
+        };
+        let mut ticks = interval(Duration::from_millis(TICK_MS));
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let greeted_by = Instant::now() + Duration::from_secs(ATTACH_S_MAX);
+        let mut draining = false;
+        loop {
+            let was_attached = self.state.is_attached();
+            if was_attached {
+                self.last_attached = Instant::now();
+            }
+            let event = tokio::select! {
+                // In this order: what is finished is sent before anything else happens.
+                biased;
+                Some((task, computed)) = self.finished.recv() => Event::Computed(task, computed),
+                message = responses.message() => match message {
+                    Ok(Some(AttachResponse { message: Some(message) })) => Event::Message(Box::new(message)),
+                    Ok(Some(AttachResponse { message: None })) => continue,
+                    Ok(None) => return Ok(End::Lost("the coordinator closed the stream".to_owned())),
+                    Err(status) => return self.ended_with(&status),
+                },
+                () = leave.as_mut(), if !draining => {
+                    draining = true;
+                    info!("leaving: finishing the batches in hand");
+                    Event::Drain
+                }
+                _ = ticks.tick() => Event::Tick,
+            };
+            if let Some(end) = self.apply(event, Some(&outbox))? {
+                if matches!(end, End::Left) {
+                    close(outbox, &mut responses).await;
+                }
+                return Ok(end);
+            }
+            if !was_attached && self.state.is_attached() {
+                backoff.reset();
+                info!(endpoint = %self.endpoint, "attached");
+            }
+            if !self.state.is_attached() && Instant::now() > greeted_by {
+                return Ok(End::Lost("the coordinator does not answer".to_owned()));
+            }
+        }
+    }
+
+    /// Lets the state react to `event` and carries out what it wants.
+    fn apply(
+        &mut self,
+        event: Event,
+        outbox: Option<&mpsc::Sender<AttachRequest>>,
+    ) -> Result<Option<End>, WorkerError> {
+        if let Event::Computed(task, _) = &event {
+            self.stops.remove(task);
+        }
+        trace!(?event, "event");
+        let mut end = None;
+        for effect in self.state.react(self.started.elapsed(), event) {
+            match effect {
+                Effect::Send(message) => {
+                    let request = AttachRequest { message: Some(message) };
+                    if outbox.is_some_and(|outbox| outbox.try_send(request).is_err()) {
+                        end = Some(End::Lost("the coordinator takes no messages".to_owned()));
+                    }
+                }
+                Effect::Compute(task, work) => {
+                    let stop = StopFlag::default();
+                    self.stops.insert(task, stop.clone());
+                    let sender = self.finished_sender.clone();
+                    self.cores.start(*work, stop, move |computed| {
+                        // Fails only when the worker has ended and nobody waits.
+                        drop(sender.blocking_send((task, computed)));
+                    });
+                }
+                Effect::Abandon(task) => {
+                    if let Some(stop) = self.stops.get(&task) {
+                        stop.raise();
+                    }
+                }
+                Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),
+                Effect::Leave => return Ok(Some(End::Left)),
+                Effect::Fail(failure) => return Err(self.failed(failure)),
+            }
+        }
+        Ok(end)
+    }
+
+    /// What a status means: a refusal is final, everything else is a loss.
+    fn ended_with(&self, status: &Status) -> Result<End, WorkerError> {
+        let reason = status.message().to_owned();
+        match status.code() {
+            Code::FailedPrecondition
+            | Code::InvalidArgument
+            | Code::PermissionDenied
+            | Code::Unauthenticated
+            | Code::Unimplemented => {
+                Err(WorkerError::Refused { endpoint: self.endpoint.clone(), reason })
+            }
+            code => Ok(End::Lost(format!("{code}: {reason}"))),
+        }
+    }
+
+    fn failed(&self, failure: Failure) -> WorkerError {
+        match failure {
+            Failure::Malformed(source) => {
+                WorkerError::Malformed { endpoint: self.endpoint.clone(), source }
+            }
+            Failure::Panicked { case, message } => WorkerError::Panicked { case, message },
+        }
+    }
+}
+
+/// Why there is no stream.
+enum NotOpened {
+    Unreachable(String),
+    Status(Status),
+}
+
+/// Connects and says hello.
+async fn open(
+    endpoint: &Endpoint,
+    hello: Request,
+    outbox: &mpsc::Sender<AttachRequest>,
+    requests: mpsc::Receiver<AttachRequest>,
+) -> Result<Streaming<AttachResponse>, NotOpened> {
+    let limit = Duration::from_secs(ATTACH_S_MAX);
+    let channel = endpoint::connect(endpoint, limit)
+        .await
+        .map_err(|error| NotOpened::Unreachable(error.to_string()))?;
+    let unanswered = || NotOpened::Unreachable("the coordinator does not answer".to_owned());
+    // The outbox is empty: the hello always fits.
+    outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
+    let mut client = endpoint::workers_client(channel);
+    match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
+        Ok(Ok(response)) => Ok(response.into_inner()),
+        Ok(Err(status)) => Err(NotOpened::Status(status)),
+        Err(_) => Err(unanswered()),
+    }
+}
+
+/// Ends the stream after what was sent has gone: the coordinator closes its side in answer.
+async fn close(outbox: mpsc::Sender<AttachRequest>, responses: &mut Streaming<AttachResponse>) {
+    drop(outbox);
+    let drained = async { while let Ok(Some(_)) = responses.message().await {} };
+    drop(timeout(Duration::from_secs(1), drained).await);
+}
+
+fn detached(why: Detached) -> &'static str {
+    match why {
+        Detached::Silence => "the coordinator was silent for too long",
+        Detached::Overrun => "the coordinator sent too many batches, or one twice",
+        Detached::Protocol => "the coordinator sent a message out of turn",
+    }
+}
+
+/// Name of this host, for people.
+fn host_name() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let name: String = name.trim().chars().take(NAME_BYTES_MAX / 4).collect();
+    if name.is_empty() { "unknown".to_owned() } else { name }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,324 @@
+//! What a worker knows, and what it does on each event.
+//!
+//! Time is handed in as the span since the worker started; nothing here waits or reads a clock.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use osteon_common::outcome::Outcome;
+use osteon_common::version;
+use osteon_proto::batch::{self, Work};
+use osteon_proto::malformed::Malformed;
+use osteon_proto::realizations;
+use osteon_proto::v1;
+use osteon_proto::v1::attach_request::Message as Request;
+use osteon_proto::v1::attach_response::Message as Response;
+
+use crate::error::PanickedCase;
+
+/// Most batches that a worker holds; a coordinator that sends more has lost count.
+pub(crate) const BATCHES_HELD_MAX: usize = 1024;
+/// Longest wait for the batches in hand after the wish to leave; then they go back with the lease.
+pub(crate) const DRAIN_S_MAX: f64 = 10.0;
+/// Bounds of the spans a coordinator may ask for, s.
+const SPAN_S: (f64, f64) = (0.01, 3600.0);
+
+/// Who this worker is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Identity {
+    /// Threads it computes on.
+    pub(crate) threads: u32,
+    /// Host name, for people.
+    pub(crate) host: String,
+    /// Process id, for people.
+    pub(crate) process: u32,
+}
+
+/// One batch of one attachment. Batch numbers are unique for one life of a coordinator only, so
+/// an answer is told from a late one by the number of the attachment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Task {
+    /// Number of the attachment, grows with every one.
+    pub(crate) attachment: u64,
+    /// Number of the batch.
+    pub(crate) batch: u64,
+}
+
+/// How the computation of a batch ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Computed {
+    /// All outcomes, in index order.
+    Complete {
+        /// The outcomes.
+        outcomes: Vec<Outcome>,
+        /// Wall time, s.
+        elapsed_s: f64,
+    },
+    /// Given up before its end, as was asked for.
+    Abandoned,
+    /// The solver panicked.
+    Panicked {
+        /// On this realization.
+        case: Box<PanickedCase>,
+        /// With this message.
+        message: String,
+    },
+}
+
+/// Everything that can happen to a worker.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Event {
+    /// The coordinator sent a message.
+    Message(Box<Response>),
+    /// A computation ended.
+    Computed(Task, Computed),
+    /// The stream of the attachment ended.
+    Lost,
+    /// The worker shall leave.
+    Drain,
+    /// Time has passed.
+    Tick,
+}
+
+/// What is to be done about it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Effect {
+    /// Send to the coordinator.
+    Send(Request),
+    /// Begin a computation.
+    Compute(Task, Box<Work>),
+    /// Stop a computation.
+    Abandon(Task),
+    /// Close the stream and attach anew.
+    Detach(Detached),
+    /// End: nothing is left to do.
+    Leave,
+    /// End: something is wrong with the program.
+    Fail(Failure),
+}
+
+/// Why the worker closes a stream by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Detached {
+    /// The coordinator was silent for too long.
+    Silence,
+    /// More batches than [`BATCHES_HELD_MAX`], or one number twice.
+    Overrun,
+    /// A message that may not come at this time.
+    Protocol,
+}
+
+/// What no new attempt would mend.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Failure {
+    /// A batch that cannot be read.
+    Malformed(Malformed),
+    /// The solver panicked.
+    Panicked {
+        /// On this realization.
+        case: Box<PanickedCase>,
+        /// With this message.
+        message: String,
+    },
+}
+
+/// State of a worker.
+#[derive(Debug)]
+pub(crate) struct State {
+    identity: Identity,
+    attachments: u64,
+    link: Link,
+    held: BTreeSet<u64>,
+    /// When the wish to leave came.
+    draining_since: Option<Duration>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Link {
+    Down,
+    /// Hello is sent, welcome has not come.
+    Greeting,
+    Attached {
+        heartbeat: Duration,
+        expiry: Duration,
+        last_heard: Duration,
+        last_sent: Duration,
+    },
+}
+
+impl State {
+    /// A worker without a coordinator.
+    pub(crate) fn new(identity: Identity) -> Self {
+        Self {
+            identity,
+            attachments: 0,
+            link: Link::Down,
+            held: BTreeSet::new(),
+            draining_since: None,
+        }
+    }
+
+    /// Begins an attachment: the first message to send.
+    pub(crate) fn attach(&mut self) -> Request {
+        self.attachments += 1;
+        self.link = Link::Greeting;
+        Request::Hello(v1::WorkerHello {
+            version: version::VERSION.to_owned(),
+            fingerprint: version::fingerprint(),
+            threads: self.identity.threads,
+            host: self.identity.host.clone(),
+            process: self.identity.process,
+        })
+    }
+
+    /// Whether the coordinator has taken this worker.
+    pub(crate) fn is_attached(&self) -> bool {
+        matches!(self.link, Link::Attached { .. })
+    }
+
+    /// What to do about `event`, which happens at `now`.
+    pub(crate) fn react(&mut self, now: Duration, event: Event) -> Vec<Effect> {
+        let mut effects = match event {
+            Event::Message(message) => self.on_message(now, *message),
+            Event::Computed(task, computed) => self.on_computed(task, computed),
+            Event::Lost => self.on_lost(),
+            Event::Drain => self.on_drain(now),
+            Event::Tick => self.on_tick(now),
+        };
+        if let Link::Attached { last_sent, .. } = &mut self.link
+            && effects.iter().any(|effect| matches!(effect, Effect::Send(_)))
+        {
+            *last_sent = now;
+        }
+        if effects.iter().any(|effect| matches!(effect, Effect::Detach(_))) {
+            effects.extend(self.on_lost());
+        }
+        self.sanity_check();
+        effects
+    }
+
+    fn on_message(&mut self, now: Duration, message: Response) -> Vec<Effect> {
+        if let Link::Attached { last_heard, .. } = &mut self.link {
+            *last_heard = now;
+        }
+        match (self.link, message) {
+            (Link::Greeting, Response::Welcome(welcome)) => self.on_welcome(now, &welcome),
+            (Link::Attached { .. }, Response::Batch(message)) => self.on_batch(&message),
+            (Link::Attached { .. }, Response::Revoke(revoke)) => {
+                let held = self.held.remove(&revoke.batch);
+                let mut effects = Vec::new();
+                if held {
+                    effects.push(Effect::Abandon(self.task(revoke.batch)));
+                }
+                effects.extend(self.leave_if_idle());
+                effects
+            }
+            (Link::Attached { .. }, Response::Heartbeat(_)) | (Link::Down, _) => Vec::new(),
+            _ => vec![Effect::Detach(Detached::Protocol)],
+        }
+    }
+
+    fn on_welcome(&mut self, now: Duration, welcome: &v1::WorkerWelcome) -> Vec<Effect> {
+        let span = |seconds: f64| {
+            // A NaN becomes the lower bound.
+            Duration::from_secs_f64(seconds.max(SPAN_S.0).min(SPAN_S.1))
+        };
+        self.link = Link::Attached {
+            heartbeat: span(welcome.heartbeat_s),
+            expiry: span(welcome.expiry_s),
+            last_heard: now,
+            last_sent: now,
+        };
+        match self.draining_since {
+            Some(_) => vec![Effect::Leave],
+            None => Vec::new(),
+        }
+    }
+
+    fn on_batch(&mut self, message: &v1::Batch) -> Vec<Effect> {
+        let work = match batch::from_message(message) {
+            Ok(work) => work,
+            Err(malformed) => return vec![Effect::Fail(Failure::Malformed(malformed))],
+        };
+        if self.held.len() >= BATCHES_HELD_MAX || !self.held.insert(message.batch) {
+            return vec![Effect::Detach(Detached::Overrun)];
+        }
+        vec![Effect::Compute(self.task(message.batch), Box::new(work))]
+    }
+
+    fn on_computed(&mut self, task: Task, computed: Computed) -> Vec<Effect> {
+        if let Computed::Panicked { case, message } = computed {
+            return vec![Effect::Fail(Failure::Panicked { case, message })];
+        }
+        if task.attachment != self.attachments || !self.held.contains(&task.batch) {
+            // Revoked, or of a lease that is over: nobody waits for it.
+            return Vec::new();
+        }
+        let Computed::Complete { outcomes, elapsed_s } = computed else { return Vec::new() };
+        self.held.remove(&task.batch);
+        let (codes, velocities) = realizations::pack(&outcomes);
+        let result = v1::BatchResult { batch: task.batch, codes, velocities, elapsed_s };
+        let mut effects = vec![Effect::Send(Request::Result(result))];
+        effects.extend(self.leave_if_idle());
+        effects
+    }
+
+    fn on_lost(&mut self) -> Vec<Effect> {
+        self.link = Link::Down;
+        let held = std::mem::take(&mut self.held);
+        let mut effects: Vec<_> =
+            held.into_iter().map(|batch| Effect::Abandon(self.task(batch))).collect();
+        effects.extend(self.leave_if_idle());
+        effects
+    }
+
+    fn on_drain(&mut self, now: Duration) -> Vec<Effect> {
+        if self.draining_since.is_some() {
+            return Vec::new();
+        }
+        self.draining_since = Some(now);
+        let mut effects = Vec::new();
+        if self.is_attached() {
+            effects.push(Effect::Send(Request::Drain(v1::WorkerDrain {})));
+        }
+        effects.extend(self.leave_if_idle());
+        effects
+    }
+
+    fn on_tick(&mut self, now: Duration) -> Vec<Effect> {
+        let drained_for = self.draining_since.map(|since| now.saturating_sub(since));
+        if drained_for.is_some_and(|span| span >= Duration::from_secs_f64(DRAIN_S_MAX)) {
+            return vec![Effect::Leave];
+        }
+        match self.link {
+            Link::Attached { expiry, last_heard, .. }
+                if now.saturating_sub(last_heard) >= expiry =>
+            {
+                vec![Effect::Detach(Detached::Silence)]
+            }
+            // Half of what was asked for leaves room for a late tick.
+            Link::Attached { heartbeat, last_sent, .. }
+                if now.saturating_sub(last_sent) >= heartbeat / 2 =>
+            {
+                vec![Effect::Send(Request::Heartbeat(v1::Heartbeat {}))]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn leave_if_idle(&self) -> Option<Effect> {
+        (self.draining_since.is_some() && self.held.is_empty()).then_some(Effect::Leave)
+    }
+
+    fn task(&self, batch: u64) -> Task {
+        Task { attachment: self.attachments, batch }
+    }
+
+    fn sanity_check(&self) {
+        debug_assert!(self.held.is_empty() || self.is_attached(), "batches without a lease");
+        debug_assert!(self.held.len() <= BATCHES_HELD_MAX, "more batches than allowed");
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,301 @@
+use osteon_common::case::Setup;
+use osteon_common::job::Sampling;
+use osteon_common::outcome::FailureKind;
+use osteon_common::parameters::Point;
+
+use super::*;
+
+const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+
+/// A worker under test: every effect must be taken before the next event.
+struct Recorder {
+    state: State,
+    now: Duration,
+    effects: Vec<Effect>,
+}
+
+impl Recorder {
+    fn new() -> Self {
+        let identity = Identity { threads: 2, host: "host".to_owned(), process: 7 };
+        Self { state: State::new(identity), now: Duration::ZERO, effects: Vec::new() }
+    }
+
+    fn attached() -> Self {
+        let mut recorder = Self::new();
+        recorder.attach();
+        recorder
+    }
+
+    fn attach(&mut self) {
+        self.state.attach();
+        self.message(Response::Welcome(v1::WorkerWelcome {
+            worker: 1,
+            lease: 1,
+            heartbeat_s: 1.0,
+            expiry_s: 5.0,
+        }));
+        self.nothing_else();
+    }
+
+    fn event(&mut self, event: Event) {
+        self.nothing_else();
+        self.effects = self.state.react(self.now, event);
+    }
+
+    fn message(&mut self, message: Response) {
+        self.event(Event::Message(Box::new(message)));
+    }
+
+    fn batch(&mut self, number: u64) {
+        self.message(Response::Batch(batch::to_message(number, &work())));
+    }
+
+    fn complete(&mut self, attachment: u64, batch: u64) {
+        let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
+        let computed = Computed::Complete { outcomes, elapsed_s: 0.5 };
+        self.event(Event::Computed(Task { attachment, batch }, computed));
+    }
+
+    fn tick_at(&mut self, seconds: f64) {
+        self.now = Duration::from_secs_f64(seconds);
+        self.event(Event::Tick);
+    }
+
+    fn expect(&mut self, expected: &[Effect]) {
+        assert_eq!(self.effects, expected);
+        self.effects.clear();
+    }
+
+    fn nothing_else(&self) {
+        assert_eq!(self.effects, []);
+    }
+}
+
+fn work() -> Work {
+    Work {
+        setup: Setup::default(),
+        point: POINT,
+        seed: 1,
+        sampling: Sampling::MonteCarlo,
+        first: 10,
+        count: 2,
+    }
+}
+
+fn compute(attachment: u64, batch: u64) -> Effect {
+    Effect::Compute(Task { attachment, batch }, Box::new(work()))
+}
+
+fn abandon(attachment: u64, batch: u64) -> Effect {
+    Effect::Abandon(Task { attachment, batch })
+}
+
+fn answer(batch: u64) -> Effect {
+    let (codes, velocities) = (vec![0, 1], vec![3900.0, 0.0]);
+    Effect::Send(Request::Result(v1::BatchResult { batch, codes, velocities, elapsed_s: 0.5 }))
+}
+
+const HEARTBEAT: Effect = Effect::Send(Request::Heartbeat(v1::Heartbeat {}));
+const DRAIN: Effect = Effect::Send(Request::Drain(v1::WorkerDrain {}));
+
+#[test]
+fn hello_says_who_it_is() {
+    let Request::Hello(hello) = Recorder::new().state.attach() else { panic!("no hello") };
+    assert_eq!((hello.threads, hello.host.as_str(), hello.process), (2, "host", 7));
+    assert_eq!(hello.fingerprint, version::fingerprint());
+}
+
+#[test]
+fn a_batch_is_computed_and_answered() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.complete(1, 4);
+    worker.expect(&[answer(4)]);
+    worker.complete(1, 4);
+    worker.nothing_else();
+}
+
+#[test]
+fn a_revoked_batch_is_abandoned_and_never_answered() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.message(Response::Revoke(v1::BatchRevoke { batch: 4 }));
+    worker.expect(&[abandon(1, 4)]);
+    worker.complete(1, 4);
+    worker.nothing_else();
+    worker.message(Response::Revoke(v1::BatchRevoke { batch: 99 }));
+    worker.nothing_else();
+}
+
+#[test]
+fn an_answer_of_an_earlier_lease_is_told_from_a_current_one() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.event(Event::Lost);
+    worker.expect(&[abandon(1, 4)]);
+    worker.attach();
+    worker.batch(4);
+    worker.expect(&[compute(2, 4)]);
+    worker.complete(1, 4);
+    worker.nothing_else();
+    worker.complete(2, 4);
+    worker.expect(&[answer(4)]);
+}
+
+#[test]
+fn heartbeats_fill_silence() {
+    let mut worker = Recorder::attached();
+    worker.tick_at(0.4);
+    worker.nothing_else();
+    worker.tick_at(0.5);
+    worker.expect(&[HEARTBEAT]);
+    worker.tick_at(0.9);
+    worker.nothing_else();
+    worker.tick_at(1.0);
+    worker.expect(&[HEARTBEAT]);
+}
+
+#[test]
+fn a_silent_coordinator_is_left_with_all_batches() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.tick_at(4.9);
+    worker.expect(&[HEARTBEAT]);
+    worker.tick_at(5.0);
+    worker.expect(&[Effect::Detach(Detached::Silence), abandon(1, 4)]);
+    worker.tick_at(9.0);
+    worker.nothing_else();
+}
+
+#[test]
+fn any_message_is_a_sign_of_life() {
+    let mut worker = Recorder::attached();
+    worker.now = Duration::from_secs(4);
+    worker.message(Response::Heartbeat(v1::Heartbeat {}));
+    worker.nothing_else();
+    worker.tick_at(8.9);
+    worker.expect(&[HEARTBEAT]);
+    worker.tick_at(9.0);
+    worker.expect(&[Effect::Detach(Detached::Silence)]);
+}
+
+#[test]
+fn a_drained_worker_finishes_what_it_holds() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.batch(5);
+    worker.expect(&[compute(1, 5)]);
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN]);
+    worker.event(Event::Drain);
+    worker.nothing_else();
+    worker.complete(1, 5);
+    worker.expect(&[answer(5)]);
+    worker.complete(1, 4);
+    worker.expect(&[answer(4), Effect::Leave]);
+}
+
+#[test]
+fn an_idle_worker_leaves_at_once() {
+    let mut worker = Recorder::attached();
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN, Effect::Leave]);
+    let mut alone = Recorder::new();
+    alone.event(Event::Drain);
+    alone.expect(&[Effect::Leave]);
+}
+
+#[test]
+fn a_drain_has_an_end() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN]);
+    worker.now = Duration::from_secs(6);
+    worker.message(Response::Heartbeat(v1::Heartbeat {}));
+    worker.tick_at(9.9);
+    worker.expect(&[HEARTBEAT]);
+    worker.tick_at(10.0);
+    worker.expect(&[Effect::Leave]);
+}
+
+#[test]
+fn losing_the_coordinator_while_draining_is_leave_to_go() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN]);
+    worker.event(Event::Lost);
+    worker.expect(&[abandon(1, 4), Effect::Leave]);
+}
+
+#[test]
+fn more_batches_than_it_can_hold_end_the_lease() {
+    let mut worker = Recorder::attached();
+    for number in 0..BATCHES_HELD_MAX as u64 {
+        worker.batch(number);
+        worker.expect(&[compute(1, number)]);
+    }
+    worker.batch(BATCHES_HELD_MAX as u64);
+    assert_eq!(worker.effects[0], Effect::Detach(Detached::Overrun));
+    assert_eq!(worker.effects.len(), 1 + BATCHES_HELD_MAX);
+}
+
+#[test]
+fn one_number_twice_ends_the_lease() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.batch(4);
+    worker.expect(&[Effect::Detach(Detached::Overrun), abandon(1, 4)]);
+}
+
+#[test]
+fn what_cannot_be_read_or_computed_ends_the_worker() {
+    let mut worker = Recorder::attached();
+    worker.message(Response::Batch(v1::Batch { batch: 1, count: 1, ..Default::default() }));
+    worker.expect(&[Effect::Fail(Failure::Malformed(Malformed::IncompleteSetup))]);
+
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    let case = Box::new(PanickedCase { index: 11, seed: 1, point: POINT });
+    let (panicked, failed) = (case.clone(), case);
+    let message = || "index out of bounds".to_owned();
+    worker.event(Event::Computed(
+        Task { attachment: 1, batch: 4 },
+        Computed::Panicked { case: panicked, message: message() },
+    ));
+    worker.expect(&[Effect::Fail(Failure::Panicked { case: failed, message: message() })]);
+}
+
+#[test]
+fn messages_out_of_turn_end_the_lease() {
+    let mut worker = Recorder::new();
+    worker.state.attach();
+    worker.batch(1);
+    worker.expect(&[Effect::Detach(Detached::Protocol)]);
+    let mut worker = Recorder::attached();
+    worker.message(Response::Welcome(v1::WorkerWelcome::default()));
+    worker.expect(&[Effect::Detach(Detached::Protocol)]);
+}
+
+#[test]
+fn spans_beyond_reason_are_bounded() {
+    for (heartbeat_s, expiry_s) in [(f64::NAN, f64::INFINITY), (-1.0, 1e300)] {
+        let mut worker = Recorder::new();
+        worker.state.attach();
+        let welcome = v1::WorkerWelcome { worker: 1, lease: 1, heartbeat_s, expiry_s };
+        worker.message(Response::Welcome(welcome));
+        worker.nothing_else();
+        worker.tick_at(0.1);
+        worker.expect(&[HEARTBEAT]);
+    }
+}
