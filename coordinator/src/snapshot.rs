@@ -47,6 +47,8 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
         snapshot.status = status_to_message(end.ending.status).into();
         snapshot.reason = end.ending.reason.clone().unwrap_or_default();
         snapshot.evaluations = end.evaluations;
+        // An evaluation that counts is complete.
+        snapshot.realizations_done = if end.evaluations > 0 { realizations } else { 0 };
         snapshot.best_cost = end.best_cost;
         snapshot.best_mean = end.best_moments.map(|moments| moments.mean);
         snapshot.best_coefficient_of_variation =

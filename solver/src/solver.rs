@@ -126,7 +126,7 @@ impl Solver {
                 return Err(Failure {
                     kind: FailureKind::DirectWaveFirst,
                     detail: format!(
-                        "at receiver {} ({x} m from the source) the direct wave arrives after {:.3} µs, a wave \
+                        "at receiver {} ({x} m from the source) the direct wave arrives at {:.3} µs, a wave \
                          through the bone not before {:.3} µs",
                         r + 1,
                         direct * 1e6,

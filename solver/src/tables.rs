@@ -30,6 +30,8 @@ pub(crate) struct Frequency {
     pub(crate) s: Complex,
     /// ρ1 s², kg/m³/s².
     pub(crate) inertia: Complex,
+    /// F(s) times the taper.
+    pub(crate) pulse: Complex,
     /// Wavenumbers in ascending order, eight at a time.
     pub(crate) blocks: Vec<Block>,
 }
@@ -118,7 +120,8 @@ fn frequency(setup: &Setup, sampling: &Sampling, n: usize, amplitude: Complex) -
             block
         })
         .collect();
-    Frequency { s, inertia: (s * s).scale(setup.layers.coupling.density), blocks }
+    let inertia = (s * s).scale(setup.layers.coupling.density);
+    Frequency { s, inertia, pulse: amplitude, blocks }
 }
 
 /// What the fluids contribute at one (k, s).

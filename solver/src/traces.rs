@@ -5,10 +5,10 @@ use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::sampling::Sampling;
 use thiserror::Error;
 
+use crate::complex::Complex;
 use crate::direct;
 use crate::isa::Kernel;
 use crate::medium::Medium;
-use crate::pulse::Pulse;
 use crate::signal::Signal;
 use crate::solver::{Solver, Workspace};
 use crate::tables::Tables;
@@ -75,7 +75,7 @@ impl Solver {
     /// Pressure traces of one bone from 0 to `duration` (s), every `time_step` (s).
     ///
     /// All reflections of the outer faces are in them. The direct wave and its image in the
-    /// coupling's outer face are computed in closed form, the rest by the exact-layer method with a
+    /// coupling's outer face have a closed form; the rest comes from the exact-layer method with a
     /// sampling of its own: velocities are not touched by asking for traces.
     ///
     /// # Errors
@@ -101,10 +101,10 @@ impl Solver {
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
         let pressures: Vec<Vec<f64>> = (0..tables.receivers())
             .map(|r| {
-                let signal =
-                    Signal { sampling: &tables.sampling, spectrum: workspace.spectra.receiver(r) };
-                let fluid = self.fluid_waves(r);
-                times.iter().map(|&t| signal.at(t) + fluid(t)).collect()
+                let mut spectrum = workspace.spectra.receiver(r).to_vec();
+                self.add_fluid_waves(r, &tables, &mut spectrum);
+                let signal = Signal { sampling: &tables.sampling, spectrum: &spectrum };
+                times.iter().map(|&t| signal.at(t)).collect()
             })
             .collect();
         if pressures.iter().flatten().any(|p| !p.is_finite()) {
@@ -113,19 +113,19 @@ impl Solver {
         Ok(Traces { times, pressures })
     }
 
-    /// The direct wave and its image in the coupling's outer face at receiver `r`.
-    fn fluid_waves(&self, r: usize) -> impl Fn(f64) -> f64 {
+    /// Adds the direct wave and its image in the coupling's outer face at receiver `r`.
+    fn add_fluid_waves(&self, r: usize, tables: &Tables, spectrum: &mut [Complex]) {
         let setup = self.setup();
-        let coupling = setup.layers.coupling;
+        let coupling = &setup.layers.coupling;
         let (source, receivers) = (setup.probe.source, setup.probe.receivers);
-        let pulse = Pulse::new(setup.probe.amplitude, setup.probe.center_frequency);
         let x = receivers.x1(r as u32) - source.x1;
-        let travel = move |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
+        let travel = |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
-        move |t| {
-            direct::pressure(&pulse, coupling.density, direct, t)
-                - direct::pressure(&pulse, coupling.density, image, t)
+        for (value, frequency) in spectrum.iter_mut().zip(&tables.frequencies) {
+            let wave = direct::pressure(coupling.density, direct, frequency.s)
+                - direct::pressure(coupling.density, image, frequency.s);
+            *value = *value + wave * frequency.pulse;
         }
     }
 }

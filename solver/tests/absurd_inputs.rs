@@ -16,7 +16,7 @@ const PAIRS_MAX: f64 = 3e4;
 
 /// 10^exponent for an exponent between the given ones.
 fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
-    (from..to).prop_map(|exponent| libm::exp10(exponent))
+    (from..to).prop_map(libm::exp10)
 }
 
 fn fluid() -> impl Strategy<Value = Fluid> {

@@ -75,7 +75,7 @@ pub(super) async fn fetch(
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
-                Failure::failed(anyhow!("job {job} has not ended: {reason}"))
+                Failure::failed(anyhow!("{reason}"))
             }
             _ => Failure::from(error),
         })?;
