@@ -37,6 +37,14 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// A column of numbers of a CSV file.
+fn column(path: &Path, name: &str) -> Vec<f64> {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let at = lines.next().unwrap().split(',').position(|header| header == name).unwrap();
+    lines.map(|line| line.split(',').nth(at).unwrap().parse().unwrap()).collect()
+}
+
 #[test]
 fn the_readmes_commands_do_what_they_say() {
     let scratch = Scratch::new();
@@ -62,6 +70,13 @@ fn the_readmes_commands_do_what_they_say() {
         if let Some(file) = file {
             fs::write(scratch.path(file), &output.stdout).unwrap();
         }
+    }
+    // The example data are what their head says. (A better solver may move them by its accuracy.)
+    let drawn = column(&scratch.path("optimum/realizations.csv"), "velocity");
+    let data = column(&scratch.path("examples/data/velocities.csv"), "velocity");
+    assert_eq!(drawn.len(), data.len());
+    for (index, (drawn, data)) in drawn.iter().zip(&data).enumerate() {
+        assert!((drawn / data - 1.0).abs() < 1e-4, "index {index}: {drawn} against {data}");
     }
     // The identification of the first command matches the data's moments to its tolerance.
     let result = fs::read_to_string(scratch.path("quick/result.json")).unwrap();

@@ -1,7 +1,7 @@
 //! Velocity of the first arriving signal of a fluid / anisotropic solid / fluid plate: the map
 //! g_velo of the paper's Eq. (10).
 //!
-//! Exact layers in (frequency, wavenumber): the plate's admittance by doubling ([`plate`], no roots, no
+//! Exact layers in (frequency, wavenumber): the plate's admittance by doubling (`plate.rs`, no roots, no
 //! branches, no degenerate solids), the fluids in closed form, a cosine transform over wavenumbers and a
 //! damped Fourier series over frequencies, extrema of the resulting trigonometric polynomial, and one
 //! picked extremum for the whole array.

@@ -80,7 +80,7 @@ pub(crate) fn pick(
     for (r, window) in windows.iter().enumerate() {
         picks.push(*window.extrema.get(rank).ok_or_else(|| no_arrival(r, rank))?);
     }
-    if let Some(r) = picks.iter().position(|p| p.pressure * picks[0].pressure <= 0.0) {
+    if let Some(r) = picks.iter().position(|p| (p.pressure < 0.0) != (picks[0].pressure < 0.0)) {
         return Err(Failure {
             kind: FailureKind::InconsistentArrival,
             detail: format!(

@@ -56,7 +56,9 @@ fn sum_wavenumbers(
         re: Lanes::splat(frequency.inertia.re),
         im: Lanes::splat(frequency.inertia.im),
     };
-    for (b, block) in frequency.blocks.iter().enumerate() {
+    let mut scratch = None;
+    for b in 0..frequency.blocks {
+        let block = tables.block(frequency, b, &mut scratch);
         plate.prepare(medium, frequency.s, block.k.0[LANES - 1]);
         let impedance = plate.impedance(block.k, block.load);
         // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division.

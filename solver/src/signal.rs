@@ -10,7 +10,7 @@ use osteon_common::case::Setup;
 use osteon_common::sampling::{Sampling, direct_arrival, distances};
 
 use crate::complex::Complex;
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{ComplexLanes, LANES, Lanes};
 
 /// Grid points per period of the centre frequency on which extrema are bracketed.
 const POINTS_PER_CYCLE: f64 = 40.0;
@@ -29,14 +29,16 @@ pub(crate) struct Extremum {
     pub(crate) pressure: f64,
 }
 
-/// Weighted e^{iω_n t_j} on a grid of times, eight at a time.
+/// A grid of times, eight at a time: e^{iωt} at lane l of block b is `coarse` (the block's first
+/// time) times `fine` (the lane's delay).
 #[derive(Debug)]
 pub(crate) struct Grid {
     step: f64,
     blocks: usize,
-    /// 2 cos and -2 sin (1 and 0 for n = 0) of frequency n at block b: `[b * frequencies + n]`.
-    waves: Vec<[Lanes; 2]>,
-    frequencies: usize,
+    /// e^{iω_n t} at the first time of block b: `[b * frequencies + n]`.
+    coarse: Vec<Complex>,
+    /// e^{iω_n t} of the lanes' delays, doubled for n > 0: both signs of a frequency count.
+    fine: Vec<ComplexLanes>,
 }
 
 impl Grid {
@@ -45,29 +47,30 @@ impl Grid {
         let step = 1.0 / (POINTS_PER_CYCLE * setup.probe.center_frequency);
         let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
         let blocks = (last / step) as usize / LANES + 2;
-        let waves = (0..blocks)
+        let wave = |n: usize, j: usize| {
+            let (sin, cos) = libm::sincos(sampling.angular_frequency(n) * (j as f64 * step));
+            Complex::new(cos, sin)
+        };
+        let coarse = (0..blocks)
             .flat_map(|b| (0..frequencies).map(move |n| (b, n)))
-            .map(|(b, n)| {
-                let wave = |lane: usize| {
-                    let t = (b * LANES + lane) as f64 * step;
-                    libm::sincos(sampling.angular_frequency(n) * t)
-                };
-                [
-                    Lanes(std::array::from_fn(|lane| weight(n) * wave(lane).1)),
-                    Lanes(std::array::from_fn(|lane| -weight(n) * wave(lane).0)),
-                ]
+            .map(|(b, n)| wave(n, b * LANES))
+            .collect();
+        let fine = (0..frequencies)
+            .map(|n| ComplexLanes {
+                re: Lanes(std::array::from_fn(|lane| weight(n) * wave(n, lane).re)),
+                im: Lanes(std::array::from_fn(|lane| weight(n) * wave(n, lane).im)),
             })
             .collect();
-        Self { step, blocks, waves, frequencies }
+        Self { step, blocks, coarse, fine }
     }
 
-    /// Σ of the waves of block `b` with coefficients `c`.
+    /// Σ of the waves of block `b`, `delayed` their coefficients times `fine`.
     #[inline(always)]
-    fn sum(&self, b: usize, c: &[Complex]) -> Lanes {
-        let waves = &self.waves[b * self.frequencies..(b + 1) * self.frequencies];
+    fn sum(&self, b: usize, delayed: &[ComplexLanes]) -> Lanes {
+        let coarse = &self.coarse[b * self.fine.len()..(b + 1) * self.fine.len()];
         let mut sum = Lanes::ZERO;
-        for ([re, im], c) in waves.iter().zip(c) {
-            sum = im.mul_add(Lanes::splat(c.im), re.mul_add(Lanes::splat(c.re), sum));
+        for (wave, c) in delayed.iter().zip(coarse) {
+            sum = wave.im.mul_add(Lanes::splat(-c.im), wave.re.mul_add(Lanes::splat(c.re), sum));
         }
         sum
     }
@@ -97,13 +100,15 @@ impl Signal<'_> {
         grid: &Grid,
         from: f64,
         to: f64,
-        slopes: &mut Vec<Complex>,
+        slopes: &mut Vec<ComplexLanes>,
         extrema: &mut Vec<Extremum>,
     ) {
         extrema.clear();
         slopes.clear();
-        for (n, &c) in self.spectrum.iter().enumerate() {
-            slopes.push(self.differentiated(n, c));
+        for (n, (&c, &fine)) in self.spectrum.iter().zip(&grid.fine).enumerate() {
+            let slope = self.differentiated(n, c);
+            let slope = ComplexLanes { re: Lanes::splat(slope.re), im: Lanes::splat(slope.im) };
+            slopes.push(slope * fine);
         }
         let first = (from / grid.step) as usize / LANES;
         let last = ((to / grid.step) as usize / LANES + 1).min(grid.blocks - 1);

@@ -43,7 +43,7 @@ pub struct Workspace {
     pub(crate) plate: Plate,
     pub(crate) spectra: Spectra,
     windows: Vec<Window>,
-    slopes: Vec<Complex>,
+    slopes: Vec<ComplexLanes>,
 }
 
 /// A picked first arrival.
@@ -152,7 +152,8 @@ impl Solver {
             if sampling.pairs() > PAIRS_MARGIN * SAMPLING_PAIRS_MAX {
                 return None;
             }
-            let tables = Tables::new(&self.setup, sampling);
+            // A velocity does not depend on the pulse's amplitude, not even in its last bit.
+            let tables = Tables::new(&self.setup, sampling, 1.0);
             let grid = Grid::new(&self.setup, &sampling, tables.frequencies.len());
             Some(Box::new(Rung { tables, grid }))
         });

@@ -10,12 +10,15 @@ use crate::complex::Complex;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 
+/// Pairs beyond which blocks are computed when they are needed and not kept: 20 MB of tables.
+const KEPT_PAIRS_MAX: f64 = 3e5;
 /// Frequencies whose taper is below this are left out.
 const TAPER_MIN: f64 = 1e-9;
 
 /// Tables of one sampling.
 #[derive(Debug)]
 pub(crate) struct Tables {
+    setup: Setup,
     pub(crate) sampling: Sampling,
     pub(crate) frequencies: Vec<Frequency>,
     /// cos(k x) of wavenumber block b at receiver r, at `[b * receivers + r]`.
@@ -32,8 +35,12 @@ pub(crate) struct Frequency {
     pub(crate) inertia: Complex,
     /// F(s) times the taper.
     pub(crate) pulse: Complex,
-    /// Wavenumbers in ascending order, eight at a time.
-    pub(crate) blocks: Vec<Block>,
+    /// Number of the frequency.
+    n: usize,
+    /// Number of blocks of wavenumbers.
+    pub(crate) blocks: usize,
+    /// The blocks, unless there are too many to be kept.
+    kept: Vec<Block>,
 }
 
 /// Eight neighbouring wavenumbers of one frequency.
@@ -52,20 +59,29 @@ pub(crate) struct Block {
 }
 
 impl Tables {
-    pub(crate) fn new(setup: &Setup, sampling: Sampling) -> Self {
+    /// Tables for a pulse of the given amplitude.
+    pub(crate) fn new(setup: &Setup, sampling: Sampling, amplitude: f64) -> Self {
         let probe = &setup.probe;
-        let pulse = Pulse::new(probe.amplitude, probe.center_frequency);
+        let pulse = Pulse::new(amplitude, probe.center_frequency);
         let count =
             (0..sampling.frequencies()).take_while(|&n| sampling.taper(n) > TAPER_MIN).count();
         let spectrum = pulse.spectrum(sampling.damping, sampling.period, count);
+        let keep = sampling.pairs() <= KEPT_PAIRS_MAX;
         let frequencies: Vec<_> = spectrum
             .iter()
             .enumerate()
-            .map(|(n, &amplitude)| {
-                frequency(setup, &sampling, n, amplitude.scale(sampling.taper(n)))
+            .map(|(n, pulse)| {
+                let mut frequency =
+                    Frequency::new(setup, &sampling, n, pulse.scale(sampling.taper(n)));
+                if keep {
+                    frequency.kept = (0..frequency.blocks)
+                        .map(|b| frequency.block(setup, &sampling, b))
+                        .collect();
+                }
+                frequency
             })
             .collect();
-        let blocks = frequencies.iter().map(|f| f.blocks.len()).max().unwrap_or(0);
+        let blocks = frequencies.iter().map(|f| f.blocks).max().unwrap_or(0);
         let positions: Vec<f64> = distances(setup).collect();
         let cosines = (0..blocks)
             .flat_map(|b| positions.iter().map(move |&x| (b, x)))
@@ -76,7 +92,21 @@ impl Tables {
                 }))
             })
             .collect();
-        Self { sampling, frequencies, cosines, receivers: positions.len() }
+        Self { setup: *setup, sampling, frequencies, cosines, receivers: positions.len() }
+    }
+
+    /// Block `b` of a frequency, taken from the tables or made in `scratch`.
+    #[inline(always)]
+    pub(crate) fn block<'a>(
+        &'a self,
+        frequency: &'a Frequency,
+        b: usize,
+        scratch: &'a mut Option<Block>,
+    ) -> &'a Block {
+        match frequency.kept.get(b) {
+            Some(block) => block,
+            None => scratch.insert(frequency.block(&self.setup, &self.sampling, b)),
+        }
     }
 
     /// cos(k x) of wavenumber block `b`, one entry per receiver.
@@ -89,39 +119,41 @@ impl Tables {
     }
 }
 
-fn frequency(setup: &Setup, sampling: &Sampling, n: usize, amplitude: Complex) -> Frequency {
-    let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
-    let count = sampling.wavenumbers(n);
-    let blocks = (0..count.div_ceil(LANES))
-        .map(|b| {
-            let mut block = Block {
-                k: Lanes::ZERO,
-                g: ComplexLanes::ZERO,
-                load: ComplexLanes::ZERO,
-                weight: ComplexLanes::ZERO,
-                echo: ComplexLanes::ZERO,
+impl Frequency {
+    fn new(setup: &Setup, sampling: &Sampling, n: usize, pulse: Complex) -> Self {
+        let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
+        let inertia = (s * s).scale(setup.layers.coupling.density);
+        let blocks = sampling.wavenumbers(n).div_ceil(LANES);
+        Self { s, inertia, pulse, n, blocks, kept: Vec::new() }
+    }
+
+    fn block(&self, setup: &Setup, sampling: &Sampling, b: usize) -> Block {
+        let count = sampling.wavenumbers(self.n);
+        let mut block = Block {
+            k: Lanes::ZERO,
+            g: ComplexLanes::ZERO,
+            load: ComplexLanes::ZERO,
+            weight: ComplexLanes::ZERO,
+            echo: ComplexLanes::ZERO,
+        };
+        for lane in 0..LANES {
+            let m = b * LANES + lane;
+            let k = m.min(count - 1) as f64 * sampling.wavenumber_step;
+            let point = spectral_point(setup, sampling, self.s, k);
+            // The trapezoidal rule from k = 0 on, over (1/π) ∫ … cos(kx) dk.
+            let measure = match m {
+                0 => 0.5 * sampling.wavenumber_step / PI,
+                m if m < count => sampling.wavenumber_step / PI,
+                _ => 0.0,
             };
-            for lane in 0..LANES {
-                let m = b * LANES + lane;
-                let k = m.min(count - 1) as f64 * sampling.wavenumber_step;
-                let point = spectral_point(setup, sampling, s, k);
-                // The trapezoidal rule from k = 0 on, over (1/π) ∫ … cos(kx) dk.
-                let measure = match m {
-                    0 => 0.5 * sampling.wavenumber_step / PI,
-                    m if m < count => sampling.wavenumber_step / PI,
-                    _ => 0.0,
-                };
-                block.k.0[lane] = k;
-                set(&mut block.g, lane, point.g);
-                set(&mut block.load, lane, point.load);
-                set(&mut block.weight, lane, (point.factor * amplitude).scale(measure));
-                set(&mut block.echo, lane, point.echo);
-            }
-            block
-        })
-        .collect();
-    let inertia = (s * s).scale(setup.layers.coupling.density);
-    Frequency { s, inertia, pulse: amplitude, blocks }
+            block.k.0[lane] = k;
+            set(&mut block.g, lane, point.g);
+            set(&mut block.load, lane, point.load);
+            set(&mut block.weight, lane, (point.factor * self.pulse).scale(measure));
+            set(&mut block.echo, lane, point.echo);
+        }
+        block
+    }
 }
 
 /// What the fluids contribute at one (k, s).

@@ -93,7 +93,7 @@ impl Solver {
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Err(TraceError::TooLong { duration, pairs });
         }
-        let tables = Tables::new(self.setup(), sampling);
+        let tables = Tables::new(self.setup(), sampling, self.setup().probe.amplitude);
         let mut workspace = Workspace::default();
         workspace.plate.fill(&medium, self.setup().layers.bone_thickness);
         self.isa().run(FillSpectra { tables: &tables, medium: &medium, workspace: &mut workspace });
