@@ -104,18 +104,21 @@ impl Series {
     }
 }
 
+/// Rows of a polynomial: the powers of κ d up to the highest, in pairs of an even and an odd one.
+const ROWS: usize = ORDER + 2;
+
 /// Polynomials in κ d of one frequency.
 #[derive(Debug)]
 pub(crate) struct Polynomials {
-    displacement: [[Complex; 9]; ORDER + 1],
-    traction: [[Complex; 6]; ORDER],
+    displacement: [[Complex; 9]; ROWS],
+    traction: [[Complex; 6]; ROWS],
 }
 
 impl Default for Polynomials {
     fn default() -> Self {
         Self {
-            displacement: [[Complex::default(); 9]; ORDER + 1],
-            traction: [[Complex::default(); 6]; ORDER],
+            displacement: [[Complex::default(); 9]; ROWS],
+            traction: [[Complex::default(); 6]; ROWS],
         }
     }
 }
@@ -147,18 +150,20 @@ impl Polynomials {
 
 /// Horner's rule in κ² = -k² for the even and the odd powers; then the odd part times κ = -ik.
 #[inline(always)]
-fn evaluate<const N: usize>(coefficients: &[[Complex; N]], k: Lanes) -> Parts<N> {
+fn evaluate<const N: usize>(coefficients: &[[Complex; N]; ROWS], k: Lanes) -> Parts<N> {
     let square = -(k * k);
     let mut parts = Parts { even: [ComplexLanes::ZERO; N], odd: [ComplexLanes::ZERO; N] };
-    for (entry, (even, odd)) in parts.even.iter_mut().zip(&mut parts.odd).enumerate() {
-        let mut sums = [ComplexLanes::ZERO; 2];
-        for (m, row) in coefficients.iter().enumerate().rev() {
-            let sum = &mut sums[m % 2];
-            sum.re = sum.re.mul_add(square, Lanes::splat(row[entry].re));
-            sum.im = sum.im.mul_add(square, Lanes::splat(row[entry].im));
+    for entry in 0..N {
+        let (mut even, mut odd) = (ComplexLanes::ZERO, ComplexLanes::ZERO);
+        for pair in (0..ROWS / 2).rev() {
+            let (c, d) = (coefficients[2 * pair][entry], coefficients[2 * pair + 1][entry]);
+            even.re = even.re.mul_add(square, Lanes::splat(c.re));
+            even.im = even.im.mul_add(square, Lanes::splat(c.im));
+            odd.re = odd.re.mul_add(square, Lanes::splat(d.re));
+            odd.im = odd.im.mul_add(square, Lanes::splat(d.im));
         }
-        *even = sums[0];
-        *odd = ComplexLanes { re: sums[1].im * k, im: -(sums[1].re * k) };
+        parts.even[entry] = even;
+        parts.odd[entry] = ComplexLanes { re: odd.im * k, im: -(odd.re * k) };
     }
     parts
 }
