@@ -30,5 +30,7 @@ pub const WORKER_THREADS_MAX: u32 = 4096;
 pub const WORKERS_MAX: usize = 4096;
 /// Most jobs that wait or run at a time.
 pub const JOBS_MAX: usize = 10_000;
+/// Most jobs that are computed at a time, unless an operator chooses otherwise.
+pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;

@@ -27,7 +27,7 @@ pub const RUNGS: usize = 49;
 /// speeds in cortical bone.
 const NOMINAL_SPEED: f64 = 4000.0;
 /// Highest frequency over centre frequency at refinement 1.
-const BAND: f64 = 6.0;
+const BAND: f64 = 8.0;
 /// Plates thinner than this many millimetres at 1 MHz (m·Hz) need a wider band: the first extremum
 /// lies closer to the wave of the pulse's kink at t = 0, whose spectrum falls slowly.
 const THIN_PLATE: f64 = 2000.0;
@@ -36,7 +36,7 @@ const THIN_PLATE_MAX: f64 = 2.0;
 /// Where the taper starts, as a fraction of the band.
 const TAPER_START: f64 = 0.4;
 /// Band of traces over that of velocities: a trace is right to 1e-3 of its largest value.
-const TRACE_BAND: f64 = 2.0;
+const TRACE_BAND: f64 = 1.5;
 /// α T: what wraps round is weaker by exp(-this). More amplifies rounding and truncation, which
 /// grow as e^(αt), beyond what it gains.
 const WRAP_DAMPING: f64 = 12.0;
