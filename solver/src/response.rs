@@ -11,7 +11,8 @@ use crate::tables::{Frequency, Tables};
 pub(crate) struct Spectra {
     values: Vec<Complex>,
     frequencies: usize,
-    sums: Vec<ComplexLanes>,
+    /// What the cosines of one frequency's wavenumbers are weighted with.
+    responses: Vec<ComplexLanes>,
 }
 
 impl Spectra {
@@ -33,30 +34,34 @@ impl Spectra {
         self.values.clear();
         self.values.resize(receivers * self.frequencies, Complex::default());
         for (n, frequency) in tables.frequencies.iter().enumerate() {
-            self.sums.clear();
-            self.sums.resize(receivers, ComplexLanes::ZERO);
-            sum_wavenumbers(tables, frequency, medium, plate, &mut self.sums);
-            for (r, sum) in self.sums.iter().enumerate() {
+            fill_responses(tables, frequency, medium, plate, &mut self.responses);
+            for r in 0..receivers {
+                let mut sum = ComplexLanes::ZERO;
+                for (response, &cosine) in self.responses.iter().zip(tables.cosines(r)) {
+                    sum.re = response.re.mul_add(cosine, sum.re);
+                    sum.im = response.im.mul_add(cosine, sum.im);
+                }
                 self.values[r * self.frequencies + n] = Complex::new(sum.re.sum(), sum.im.sum());
             }
         }
     }
 }
 
-/// Adds the wavenumbers of one frequency to the sums of every receiver, lane by lane.
+/// The responses of one frequency's wavenumbers, in ascending order.
 #[inline(always)]
-fn sum_wavenumbers(
+fn fill_responses(
     tables: &Tables,
     frequency: &Frequency,
     medium: &Medium,
     plate: &mut Plate,
-    sums: &mut [ComplexLanes],
+    responses: &mut Vec<ComplexLanes>,
 ) {
     let inertia = ComplexLanes {
         re: Lanes::splat(frequency.inertia.re),
         im: Lanes::splat(frequency.inertia.im),
     };
     let mut scratch = None;
+    responses.clear();
     for b in 0..frequency.blocks {
         let block = tables.block(frequency, b, &mut scratch);
         plate.prepare(medium, frequency.s, block.k.0[LANES - 1]);
@@ -65,10 +70,6 @@ fn sum_wavenumbers(
         let gd = block.g * impedance;
         let numerator = gd - inertia;
         let denominator = numerator.mul_add(block.echo, gd + inertia);
-        let response = block.weight * numerator * denominator.recip();
-        for (sum, &cosine) in sums.iter_mut().zip(tables.cosines(b)) {
-            sum.re = response.re.mul_add(cosine, sum.re);
-            sum.im = response.im.mul_add(cosine, sum.im);
-        }
+        responses.push(block.weight * numerator * denominator.recip());
     }
 }

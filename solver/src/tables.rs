@@ -21,9 +21,11 @@ pub(crate) struct Tables {
     setup: Setup,
     pub(crate) sampling: Sampling,
     pub(crate) frequencies: Vec<Frequency>,
-    /// cos(k x) of wavenumber block b at receiver r, at `[b * receivers + r]`.
+    /// cos(k x) of wavenumber block b at receiver r, at `[r * blocks + b]`.
     cosines: Vec<Lanes>,
     receivers: usize,
+    /// Most blocks of a frequency.
+    blocks: usize,
 }
 
 /// One complex frequency.
@@ -83,8 +85,9 @@ impl Tables {
             .collect();
         let blocks = frequencies.iter().map(|f| f.blocks).max().unwrap_or(0);
         let positions: Vec<f64> = distances(setup).collect();
-        let cosines = (0..blocks)
-            .flat_map(|b| positions.iter().map(move |&x| (b, x)))
+        let cosines = positions
+            .iter()
+            .flat_map(|&x| (0..blocks).map(move |b| (b, x)))
             .map(|(b, x)| {
                 Lanes(std::array::from_fn(|lane| {
                     let k = (b * LANES + lane) as f64 * sampling.wavenumber_step;
@@ -92,7 +95,7 @@ impl Tables {
                 }))
             })
             .collect();
-        Self { setup: *setup, sampling, frequencies, cosines, receivers: positions.len() }
+        Self { setup: *setup, sampling, frequencies, cosines, receivers: positions.len(), blocks }
     }
 
     /// Block `b` of a frequency, taken from the tables or made in `scratch`.
@@ -109,9 +112,10 @@ impl Tables {
         }
     }
 
-    /// cos(k x) of wavenumber block `b`, one entry per receiver.
-    pub(crate) fn cosines(&self, b: usize) -> &[Lanes] {
-        &self.cosines[b * self.receivers..(b + 1) * self.receivers]
+    /// cos(k x) at receiver `r`, one entry per block of wavenumbers.
+    #[inline(always)]
+    pub(crate) fn cosines(&self, r: usize) -> &[Lanes] {
+        &self.cosines[r * self.blocks..(r + 1) * self.blocks]
     }
 
     pub(crate) fn receivers(&self) -> usize {
