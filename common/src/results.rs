@@ -75,7 +75,7 @@ pub struct JobResult {
     pub reason: Option<String>,
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
     pub digest: String,
-    /// The best evaluation (of a propagation: the only one), if any was complete.
+    /// The best feasible evaluation (of a propagation: the only one), if any was complete.
     pub best: Option<BestPoint>,
     /// The data's moments; `None` for a propagation.
     pub data: Option<Moments>,

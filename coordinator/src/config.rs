@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use osteon_common::limits::ACTIVE_JOBS_MAX;
+
 /// Settings of a coordinator. None of them changes a bit of any result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
@@ -20,6 +22,9 @@ pub struct Config {
     pub active_jobs_max: usize,
     /// How long a failed write to the store waits before it is tried again.
     pub store_retry: Duration,
+    /// When the store has refused a record for this long, [`crate::Coordinator::failed`] says so;
+    /// `None`: never. In either case the record is tried again until it is taken.
+    pub store_patience: Option<Duration>,
     /// Longest time that a shutdown waits for streams to end and for the store.
     pub shutdown_timeout: Duration,
 }
@@ -32,8 +37,9 @@ impl Default for Config {
             answer_timeout: Duration::from_secs(600),
             batch_target: Duration::from_millis(200),
             tick: Duration::from_millis(100),
-            active_jobs_max: 8,
+            active_jobs_max: ACTIVE_JOBS_MAX,
             store_retry: Duration::from_secs(2),
+            store_patience: None,
             shutdown_timeout: Duration::from_secs(5),
         }
     }

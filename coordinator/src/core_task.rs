@@ -9,6 +9,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use crate::config::Config;
 use crate::effect::{Answer, CloseReason, Effect, Refusal};
 use crate::event::{Event, Hello, Request};
+use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
 use crate::reactor::react;
 use crate::service_workers::{self, Outbound};
@@ -59,11 +60,17 @@ pub(crate) struct Core {
     outbound: BTreeMap<WorkerId, Outbound>,
     on_stop: Option<oneshot::Sender<()>>,
     stopped: bool,
+    failing: Failing,
     config: Config,
 }
 
 impl Core {
-    pub(crate) fn new(state: State, clock: Clock, commands: mpsc::Sender<Command>) -> Self {
+    pub(crate) fn new(
+        state: State,
+        clock: Clock,
+        commands: mpsc::Sender<Command>,
+        failing: Failing,
+    ) -> Self {
         let config = state.config;
         Self {
             state,
@@ -75,6 +82,7 @@ impl Core {
             outbound: BTreeMap::new(),
             on_stop: None,
             stopped: false,
+            failing,
             config,
         }
     }
@@ -171,6 +179,9 @@ impl Core {
                     }
                 }
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
+                Effect::Despair { error, waited } => {
+                    self.failing.tell(Failed::StoreRefuses { error, waited });
+                }
                 Effect::Stop => self.stop(),
             }
         }
@@ -183,7 +194,7 @@ impl Core {
         followups: &mut VecDeque<Event>,
     ) {
         if let Some(outbound) = self.outbound.get(&worker)
-            && outbound.try_send(Ok(message)).is_err()
+            && outbound.send(Ok(message)).is_err()
         {
             // What is in flight is bounded: only who does not read, or is gone, lets it pile up.
             followups.push_back(Event::Misbehaved { worker, reason: CloseReason::NotReading });
@@ -194,7 +205,7 @@ impl Core {
         tracing::info!(%worker, %reason, "a worker's stream is closed");
         if let Some(outbound) = self.outbound.remove(&worker) {
             // A full queue belongs to a worker that does not read; it sees the stream end.
-            let _ = outbound.try_send(Err(service_workers::status(reason)));
+            let _ = outbound.send(Err(service_workers::status(reason)));
         }
     }
 

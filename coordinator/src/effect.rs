@@ -1,5 +1,6 @@
 //! Everything that a coordinator does to the world: one closed list.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_proto::batch::Work;
@@ -9,6 +10,7 @@ use thiserror::Error;
 
 use crate::event::RecordKey;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::search::Summary;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 
 /// Something to do.
@@ -65,6 +67,13 @@ pub enum Effect {
         /// How it stands.
         snapshot: JobSnapshot,
     },
+    /// Say that the store takes nothing any more.
+    Despair {
+        /// What it said last.
+        error: String,
+        /// For how long it has refused a record.
+        waited: Duration,
+    },
     /// Nothing is left to do: everything stored, every stream closed.
     Stop,
 }
@@ -77,7 +86,12 @@ pub enum Record {
     /// A complete evaluation.
     Evaluation(EvaluationRecord),
     /// The end of a job.
-    End(EndRecord),
+    End {
+        /// How it ended.
+        end: EndRecord,
+        /// What its path came to.
+        summary: Arc<Summary>,
+    },
 }
 
 impl Record {
@@ -86,7 +100,7 @@ impl Record {
         match self {
             Self::Job(record) => (record.job, RecordKey::Job),
             Self::Evaluation(record) => (record.job, RecordKey::Evaluation(record.number)),
-            Self::End(record) => (record.job, RecordKey::End),
+            Self::End { end, .. } => (end.job, RecordKey::End),
         }
     }
 }

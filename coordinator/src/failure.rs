@@ -37,15 +37,6 @@ pub enum Failure {
         /// The point.
         point: Point,
     },
-    /// The store does not take a record of the job.
-    #[error(
-        "the store does not take the job's records: {error}; make room or repair it and start the \
-         coordinator again: the job continues from its last stored evaluation"
-    )]
-    Store {
-        /// What the store said last.
-        error: String,
-    },
     /// The stored evaluations are not those of the job's search.
     #[error(transparent)]
     Replay(#[from] ReplayError),

@@ -11,8 +11,10 @@ mod core_task;
 pub mod effect;
 pub mod evaluation;
 pub mod event;
+mod failing;
 pub mod failure;
 pub mod ids;
+pub mod leftover;
 pub mod listen;
 mod rate;
 pub mod reactor;
@@ -28,5 +30,6 @@ pub mod store;
 mod store_thread;
 
 pub use config::Config;
+pub use failing::Failed;
 pub use listen::{BindError, ListenAddress, Listener};
 pub use shell::{Coordinator, StartError, start};

@@ -38,6 +38,17 @@ pub struct Ending {
     pub reason: Option<String>,
 }
 
+/// What the path of a search comes to, its outcomes aside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
+    pub digest: String,
+    /// Number of the best evaluation, if a point was feasible.
+    pub best: Option<u64>,
+    /// Rows of the history, in order.
+    pub history: Vec<Evaluation>,
+}
+
 /// A stored evaluation of another search than this one.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
@@ -53,7 +64,7 @@ pub struct ReplayError {
     pub expected: Option<Box<[f64; 7]>>,
 }
 
-/// The lowest cost so far.
+/// The lowest finite cost so far; of a propagation its only evaluation.
 #[derive(Debug, Clone)]
 struct Best {
     row: Evaluation,
@@ -98,31 +109,25 @@ impl Search {
         search
     }
 
-    /// The search that stored evaluations, in their order, lead to.
+    /// Takes the outcomes of a stored evaluation.
     ///
     /// # Errors
-    /// When an evaluation is at another point than the search asks for.
-    pub fn replay(
-        specification: Arc<JobSpecification>,
-        evaluations: impl IntoIterator<Item = (Point, Arc<[Outcome]>)>,
-    ) -> Result<Self, ReplayError> {
-        let mut search = Self::new(specification);
-        for (point, outcomes) in evaluations {
-            let found = point.0;
-            let expected = match search.ask() {
-                Step::Evaluate(point) => Some(point.0),
-                Step::Done(_) => None,
-            };
-            if expected.map(|at| at.map(f64::to_bits)) != Some(found.map(f64::to_bits)) {
-                return Err(ReplayError {
-                    number: search.evaluations(),
-                    found: found.into(),
-                    expected: expected.map(Box::new),
-                });
-            }
-            search.tell(outcomes);
+    /// When it is at another point than the search asks for; nothing is changed then.
+    pub fn retell(&mut self, point: Point, outcomes: Arc<[Outcome]>) -> Result<(), ReplayError> {
+        let found = point.0;
+        let expected = match self.ask() {
+            Step::Evaluate(point) => Some(point.0),
+            Step::Done(_) => None,
+        };
+        if expected.map(|at| at.map(f64::to_bits)) != Some(found.map(f64::to_bits)) {
+            return Err(ReplayError {
+                number: self.evaluations(),
+                found: found.into(),
+                expected: expected.map(Box::new),
+            });
         }
-        Ok(search)
+        self.tell(outcomes);
+        Ok(())
     }
 
     /// The next point, or how the job ends. Asking changes nothing.
@@ -163,7 +168,8 @@ impl Search {
             failures: FailureCounts::of(&outcomes),
         };
         self.history.push(row);
-        if self.best.as_ref().is_none_or(|best| row.cost < best.row.cost) {
+        let feasible = row.cost.is_none_or(f64::is_finite);
+        if feasible && self.best.as_ref().is_none_or(|best| row.cost < best.row.cost) {
             self.best = Some(Best { row, outcomes });
         }
         self.refuse_inadmissible();
@@ -179,41 +185,25 @@ impl Search {
         &self.history
     }
 
-    /// The row with the lowest cost; of equal ones the first; of a propagation the only one.
+    /// The row with the lowest finite cost, if a point was feasible; of equal ones the first. Of
+    /// a propagation the only one.
     pub fn best(&self) -> Option<&Evaluation> {
         self.best.as_ref().map(|best| &best.row)
     }
 
-    /// The best row, if its point is feasible.
-    pub fn best_feasible(&self) -> Option<&Evaluation> {
-        self.best().filter(|row| row.cost.is_none_or(f64::is_finite))
+    /// What the path comes to so far.
+    pub fn summary(&self) -> Summary {
+        Summary {
+            digest: self.digest.finish(),
+            best: self.best().map(|row| row.number),
+            history: self.history.clone(),
+        }
     }
 
     /// What the job leaves, given how it ended, computed by `version` of the program.
     pub fn result(&self, ending: &Ending, version: &str) -> JobResult {
-        let specification = &self.specification;
-        JobResult {
-            status: ending.status,
-            reason: ending.reason.clone(),
-            digest: self.digest.finish(),
-            best: self.best.as_ref().map(|best| BestPoint {
-                point: best.row.point,
-                cost: best.row.cost,
-                velocity: statistics::estimate(&best.outcomes),
-                failures: best.row.failures,
-                outcomes: best.outcomes.to_vec(),
-            }),
-            data: match &self.plan {
-                Plan::Identification { data, .. } => Some(*data),
-                Plan::Propagation { .. } => None,
-            },
-            evaluations: self.evaluations(),
-            realizations: specification.monte_carlo.realizations,
-            seed: specification.monte_carlo.seed,
-            solver: specification.setup.solver,
-            picking: specification.setup.picking,
-            version: version.to_owned(),
-        }
+        let outcomes = self.best.as_ref().map(|best| &*best.outcomes);
+        self.summary().result(&self.specification, ending, version, outcomes)
     }
 
     /// Refuses points until the simplex is done or asks for an admissible one.
@@ -231,7 +221,7 @@ impl Search {
     fn ending(&self, stop: Stop) -> Ending {
         let (status, reason) = match stop {
             Stop::CostReached | Stop::Settled => (Status::Converged, None),
-            Stop::EvaluationsUsedUp if self.best_feasible().is_none() => {
+            Stop::EvaluationsUsedUp if self.best().is_none() => {
                 (Status::Failed, Some(self.no_feasible_point()))
             }
             Stop::EvaluationsUsedUp => (Status::MaxEvaluations, None),
@@ -280,6 +270,47 @@ impl Search {
             kinds.join(", "),
             self.specification.monte_carlo.max_failed_fraction
         )
+    }
+}
+
+impl Summary {
+    /// The summary of a path without an evaluation.
+    pub fn empty() -> Self {
+        Self { digest: PathDigest::new().finish(), best: None, history: Vec::new() }
+    }
+
+    /// What a job with this path leaves, given how it ended, the version of the program that
+    /// computed it, and the outcomes of the best evaluation.
+    pub fn result(
+        &self,
+        specification: &JobSpecification,
+        ending: &Ending,
+        version: &str,
+        outcomes: Option<&[Outcome]>,
+    ) -> JobResult {
+        let row = self.history.iter().find(|row| Some(row.number) == self.best);
+        JobResult {
+            status: ending.status,
+            reason: ending.reason.clone(),
+            digest: self.digest.clone(),
+            best: row.zip(outcomes).map(|(row, outcomes)| BestPoint {
+                point: row.point,
+                cost: row.cost,
+                velocity: statistics::estimate(outcomes),
+                failures: row.failures,
+                outcomes: outcomes.to_vec(),
+            }),
+            data: match (specification.kind, &specification.data) {
+                (JobKind::Identification, Some(data)) => Some(data_moments(data)),
+                (JobKind::Propagation | JobKind::Identification, _) => None,
+            },
+            evaluations: self.history.len() as u64,
+            realizations: specification.monte_carlo.realizations,
+            seed: specification.monte_carlo.seed,
+            solver: specification.setup.solver,
+            picking: specification.setup.picking,
+            version: version.to_owned(),
+        }
     }
 }
 

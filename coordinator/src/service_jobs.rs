@@ -20,7 +20,8 @@ use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
 use crate::event;
 use crate::ids::JobId;
-use crate::store_thread::{Command, Leftover};
+use crate::leftover::Leftover;
+use crate::store_thread::Command;
 
 /// Most jobs of one page.
 const PAGE_JOBS_MAX: u32 = 1000;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use futures::{Stream, StreamExt as _};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::realizations;
@@ -13,7 +14,7 @@ use osteon_proto::v1::workers_server::Workers;
 use osteon_proto::v1::{
     AttachRequest, AttachResponse, BatchRevoke, Heartbeat, WorkerHello, WorkerWelcome,
 };
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status, Streaming};
 
@@ -28,8 +29,30 @@ const OUTBOUND_MAX: usize = 64;
 /// A new stream must say hello within this time.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Where messages to one worker go.
-pub(crate) type Outbound = mpsc::Sender<Result<AttachResponse, Status>>;
+/// What goes to a worker.
+type Outgoing = Result<AttachResponse, Status>;
+
+/// Where messages to one worker go. Its stream ends when this is dropped, be it ever so full.
+#[derive(Debug)]
+pub(crate) struct Outbound {
+    messages: mpsc::Sender<Outgoing>,
+    /// Never sent on: its end is the message.
+    _open: oneshot::Sender<()>,
+}
+
+impl Outbound {
+    /// Queues a message.
+    ///
+    /// # Errors
+    /// When the queue is full or the worker is gone.
+    pub(crate) fn send(&self, message: Outgoing) -> Result<(), NotReading> {
+        self.messages.try_send(message).map_err(|_| NotReading)
+    }
+}
+
+/// A worker takes no message.
+#[derive(Debug)]
+pub(crate) struct NotReading;
 
 /// The service of workers.
 pub(crate) struct WorkersService {
@@ -52,52 +75,65 @@ impl Workers for WorkersService {
         request: tonic::Request<Streaming<AttachRequest>>,
     ) -> Result<tonic::Response<Self::AttachStream>, Status> {
         let worker = WorkerId(self.next_worker.fetch_add(1, Ordering::Relaxed));
-        let (outbound, stream) = mpsc::channel(OUTBOUND_MAX);
-        let messages = self.messages.clone();
-        tokio::spawn(async move {
-            let ended = tokio::select! {
-                () = forward(worker, request.into_inner(), &messages, &outbound) => outbound,
-                // The coordinator closed the stream, or the worker is gone.
-                () = outbound.closed() => outbound.clone(),
-            };
-            drop(ended);
-            // Without its core the coordinator is gone, and the stream means nothing.
-            let _ = messages.send(Message::Event(Event::StreamEnded { worker })).await;
-        });
-        Ok(tonic::Response::new(ReceiverStream::new(stream)))
+        Ok(tonic::Response::new(attach(worker, request.into_inner(), self.messages.clone())))
     }
+}
+
+/// Serves one worker in a task of its own; what the worker gets.
+fn attach(
+    worker: WorkerId,
+    incoming: impl Stream<Item = Result<AttachRequest, Status>> + Send + Unpin + 'static,
+    messages: mpsc::Sender<Message>,
+) -> ReceiverStream<Outgoing> {
+    let (outgoing, stream) = mpsc::channel(OUTBOUND_MAX);
+    tokio::spawn(async move {
+        let (open, closed) = oneshot::channel();
+        let outbound = Outbound { messages: outgoing.clone(), _open: open };
+        tokio::select! {
+            () = forward(worker, incoming, &messages, outbound) => {}
+            // The coordinator has dropped the other end: it closed the stream.
+            _ = closed => {}
+            // The worker is gone.
+            () = outgoing.closed() => {}
+        }
+        drop(outgoing);
+        // Without its core the coordinator is gone, and the stream means nothing.
+        let _ = messages.send(Message::Event(Event::StreamEnded { worker })).await;
+    });
+    ReceiverStream::new(stream)
 }
 
 /// Turns what a worker sends into events, until its stream ends.
 async fn forward(
     worker: WorkerId,
-    mut stream: Streaming<AttachRequest>,
+    mut incoming: impl Stream<Item = Result<AttachRequest, Status>> + Unpin,
     messages: &mpsc::Sender<Message>,
-    outbound: &Outbound,
+    outbound: Outbound,
 ) {
-    let hello = match tokio::time::timeout(HELLO_TIMEOUT, stream.message()).await {
-        Ok(Ok(Some(AttachRequest { message: Some(Request::Hello(hello)) }))) => hello,
-        Ok(Ok(Some(_))) => {
+    let hello = match tokio::time::timeout(HELLO_TIMEOUT, incoming.next()).await {
+        Ok(Some(Ok(AttachRequest { message: Some(Request::Hello(hello)) }))) => hello,
+        Ok(Some(Ok(_))) => {
             let status = Status::invalid_argument("the first message of a worker must be `hello`");
-            let _ = outbound.send(Err(status)).await;
+            // The worker may have gone.
+            let _ = outbound.send(Err(status));
             return;
         }
-        Ok(Ok(None) | Err(_)) => return,
+        Ok(None | Some(Err(_))) => return,
         Err(_) => {
             let status = Status::deadline_exceeded("no `hello` within 10 s");
-            let _ = outbound.send(Err(status)).await;
+            let _ = outbound.send(Err(status));
             return;
         }
     };
-    let attach = Message::Attach { worker, hello: introduce(hello), outbound: outbound.clone() };
+    let attach = Message::Attach { worker, hello: introduce(hello), outbound };
     if messages.send(attach).await.is_err() {
         return;
     }
     loop {
-        let event = match stream.message().await {
-            Ok(Some(message)) => event(worker, message),
-            Ok(None) => return,
-            Err(status) => {
+        let event = match incoming.next().await {
+            Some(Ok(message)) => event(worker, message),
+            None => return,
+            Some(Err(status)) => {
                 tracing::debug!(%worker, %status, "a worker's stream broke");
                 return;
             }
@@ -182,4 +218,61 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
 
 fn respond(message: Response) -> AttachResponse {
     AttachResponse { message: Some(message) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A worker that says hello, then neither speaks nor reads.
+    async fn attached() -> (Outbound, mpsc::Receiver<Message>, ReceiverStream<Outgoing>) {
+        let hello = AttachRequest { message: Some(Request::Hello(WorkerHello::default())) };
+        let incoming = futures::stream::iter([Ok(hello)]).chain(futures::stream::pending());
+        let (sender, mut messages) = mpsc::channel(4);
+        let stream = attach(WorkerId(7), incoming, sender);
+        match messages.recv().await {
+            Some(Message::Attach { worker: WorkerId(7), outbound, .. }) => {
+                (outbound, messages, stream)
+            }
+            _ => panic!("not attached"),
+        }
+    }
+
+    async fn check_ended(mut messages: mpsc::Receiver<Message>) {
+        let last = tokio::time::timeout(HELLO_TIMEOUT, messages.recv()).await.unwrap();
+        let ended = Event::StreamEnded { worker: WorkerId(7) };
+        assert!(matches!(last, Some(Message::Event(event)) if event == ended));
+    }
+
+    #[tokio::test]
+    async fn the_stream_of_a_worker_that_does_not_read_ends_when_it_is_closed() {
+        let (outbound, messages, stream) = attached().await;
+        for _ in 0..OUTBOUND_MAX {
+            outbound.send(Ok(heartbeat())).unwrap();
+        }
+        // The status finds no place.
+        outbound.send(Err(status(&CloseReason::NotReading))).unwrap_err();
+        drop(outbound);
+        let read = tokio::time::timeout(HELLO_TIMEOUT, stream.count()).await;
+        assert_eq!(read.unwrap(), OUTBOUND_MAX);
+        check_ended(messages).await;
+    }
+
+    #[tokio::test]
+    async fn a_worker_that_reads_learns_why_its_stream_ends() {
+        let (outbound, messages, mut stream) = attached().await;
+        outbound.send(Err(status(&CloseReason::Draining))).unwrap();
+        drop(outbound);
+        assert_eq!(stream.next().await.unwrap().unwrap_err().code(), Code::Unavailable);
+        let after = tokio::time::timeout(HELLO_TIMEOUT, stream.next()).await;
+        assert!(after.unwrap().is_none());
+        check_ended(messages).await;
+    }
+
+    #[tokio::test]
+    async fn a_worker_that_goes_is_noticed() {
+        let (_outbound, messages, stream) = attached().await;
+        drop(stream);
+        check_ended(messages).await;
+    }
 }

@@ -18,6 +18,7 @@ use tonic::transport::server::Router;
 
 use crate::config::Config;
 use crate::core_task::{Clock, Core, Message};
+use crate::failing::{Failed, Failing, Guard};
 use crate::listen::{Listener, Socket};
 use crate::reactor::{RestoreError, RestoredJob};
 use crate::service_jobs::JobsService;
@@ -63,6 +64,7 @@ pub enum StartError {
 #[derive(Debug)]
 pub struct Coordinator {
     url: String,
+    failing: Failing,
     messages: mpsc::Sender<Message>,
     stop_serving: oneshot::Sender<()>,
     server: tokio::task::JoinHandle<()>,
@@ -86,19 +88,23 @@ pub async fn start(
     let clock = Clock::new();
     let (state, effects) = State::restore(config, restored, clock.now());
 
+    let failing = Failing::new();
     let (messages, inbox) = mpsc::channel(EVENTS_MAX);
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
-    let (commands, store) =
-        store_thread::start(store, events).map_err(|source| StartError::Thread { source })?;
+    let (commands, store) = store_thread::start(store, events, failing.guard(Failed::Store))
+        .map_err(|source| StartError::Thread { source })?;
     let router = services(&messages, &commands).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let server = tokio::spawn(serve(router, listener.socket, stopped));
-    let core = Core::new(state, clock, commands);
-    let core = tokio::spawn(core.run(effects, inbox, from_store, config.tick));
+    let server = serve(router, listener.socket, stopped);
+    let server = tokio::spawn(guarded(failing.guard(Failed::Server), server));
+    let guard = failing.guard(Failed::Core);
+    let core = Core::new(state, clock, commands, failing.clone());
+    let core = core.run(effects, inbox, from_store, config.tick);
+    let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "the coordinator listens");
     let shutdown_timeout = config.shutdown_timeout;
-    Ok(Coordinator { url, messages, stop_serving, server, core, store, shutdown_timeout })
+    Ok(Coordinator { url, failing, messages, stop_serving, server, core, store, shutdown_timeout })
 }
 
 impl Coordinator {
@@ -107,10 +113,18 @@ impl Coordinator {
         &self.url
     }
 
+    /// Waits, for ever if all is well, until a part of the coordinator has ended unasked, or the
+    /// store has refused a record for [`Config::store_patience`]. Then nothing goes on any more:
+    /// shut it down, and say why.
+    pub fn failed(&self) -> impl Future<Output = Failed> + Send + use<> {
+        self.failing.first()
+    }
+
     /// Stops: no new batch, every stream closed, everything complete stored. Waits for that no
     /// longer than [`Config::shutdown_timeout`]; what is not stored then is computed again by the
     /// next coordinator on the same store.
     pub async fn shutdown(self) {
+        self.failing.disarm();
         let stop = async {
             let (reply, stopped) = oneshot::channel();
             if self.messages.send(Message::Shutdown(reply)).await.is_ok() {
@@ -135,6 +149,11 @@ impl Coordinator {
         let joined = tokio::task::spawn_blocking(move || store.join());
         let _ = tokio::time::timeout(self.shutdown_timeout, joined).await;
     }
+}
+
+async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
+    part.await;
+    drop(guard);
 }
 
 /// The services of one port.

@@ -62,7 +62,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
 
 fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot) {
     if let Some(search) = &job.search {
-        let best = search.best_feasible();
+        let best = search.best();
         let moments = best.and_then(|row| row.moments);
         snapshot.evaluations = search.evaluations();
         snapshot.best_cost = best.and_then(|row| row.cost);

@@ -91,7 +91,6 @@ pub(crate) enum Stage {
 pub(crate) struct Trouble {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
-    pub(crate) retries: u32,
     pub(crate) error: String,
 }
 

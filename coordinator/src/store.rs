@@ -4,6 +4,7 @@
 //! the record is durable, and putting the same record again is no error, so that a write whose
 //! answer was lost can be repeated.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use osteon_common::results::{Evaluation, Moments};
 use thiserror::Error;
 
 use crate::ids::JobId;
-use crate::search::Ending;
+use crate::search::{Ending, Summary};
 
 pub mod memory;
 pub mod sqlite;
@@ -31,6 +32,8 @@ pub struct JobRecord {
     pub specification: Arc<JobSpecification>,
     /// When it was accepted, since the Unix epoch.
     pub accepted: Duration,
+    /// Fingerprint of the numerics that its stored evaluations were computed with.
+    pub fingerprint: String,
 }
 
 /// A complete evaluation.
@@ -123,6 +126,20 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// An older version wrote it.
+    #[error(
+        "{} has format {found} of an older version of osteon, this program writes format {known}; \
+         finish its jobs with the version that wrote it, or choose another directory",
+        path.display()
+    )]
+    Older {
+        /// The file.
+        path: PathBuf,
+        /// Format of the file.
+        found: i64,
+        /// Only format known.
+        known: i64,
+    },
     /// A newer version wrote it.
     #[error(
         "{} has format {found}, this program writes format {known}; use a newer version of osteon, \
@@ -165,6 +182,9 @@ pub enum DamagedRecord {
     /// The end.
     #[error("the end")]
     End,
+    /// What its path came to.
+    #[error("the summary")]
+    Summary,
 }
 
 /// A durable place for jobs.
@@ -175,11 +195,24 @@ pub trait Store: Send {
     /// When the store cannot be read.
     fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError>;
 
-    /// The evaluations of a job, in the order of their numbers.
+    /// Shows `visit` the evaluations of a job from number `first` on, in the order of their
+    /// numbers, until it breaks. One is in memory at a time.
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn evaluations(&mut self, job: JobId) -> Result<Vec<EvaluationRecord>, StoreError>;
+    fn evaluations(
+        &mut self,
+        job: JobId,
+        first: u64,
+        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
+    ) -> Result<(), StoreError>;
+
+    /// Forgets the evaluations of a job, which from now on is computed with the numerics of
+    /// `fingerprint`: both or neither.
+    ///
+    /// # Errors
+    /// When that is not durable.
+    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError>;
 
     /// Makes a job durable.
     ///
@@ -193,9 +226,15 @@ pub trait Store: Send {
     /// When it is not durable.
     fn put_evaluation(&mut self, record: &EvaluationRecord) -> Result<(), StoreError>;
 
-    /// Makes the end of a job durable.
+    /// Makes the end of a job and what its path came to durable: both or neither.
     ///
     /// # Errors
-    /// When it is not durable.
-    fn finish_job(&mut self, record: &EndRecord) -> Result<(), StoreError>;
+    /// When they are not durable.
+    fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError>;
+
+    /// What the path of an ended job came to.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError>;
 }

@@ -3,16 +3,13 @@
 
 use std::thread::{self, JoinHandle};
 
-use osteon_common::job::JobSpecification;
 use osteon_common::limits::JOBS_MAX;
-use osteon_common::results::{Evaluation, JobResult};
-use thiserror::Error;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::effect::Record;
 use crate::event::Event;
-use crate::reactor::RestoreError;
-use crate::search::{ReplayError, Search};
+use crate::failing::Guard;
+use crate::leftover::{self, Leftover, ReadError};
 use crate::store::{EndRecord, JobRecord, Store};
 
 /// Commands that may wait: a record for every job, and some readers.
@@ -26,29 +23,15 @@ pub(crate) enum Command {
     Read { record: JobRecord, end: EndRecord, reply: oneshot::Sender<Result<Leftover, ReadError>> },
 }
 
-/// What an ended job left.
-pub(crate) struct Leftover {
-    pub(crate) specification: JobSpecification,
-    pub(crate) result: JobResult,
-    pub(crate) history: Vec<Evaluation>,
-}
-
-/// Why what a job left cannot be read.
-#[derive(Debug, Error)]
-pub(crate) enum ReadError {
-    #[error(transparent)]
-    Restore(#[from] RestoreError),
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-}
-
 /// Starts the thread. It ends when every sender of commands is gone.
 pub(crate) fn start(
     mut store: Box<dyn Store>,
     events: mpsc::Sender<Event>,
+    guard: Guard,
 ) -> std::io::Result<(mpsc::Sender<Command>, JoinHandle<()>)> {
     let (sender, mut commands) = mpsc::channel(COMMANDS_MAX);
     let serve = move || {
+        let _guard = guard;
         while let Some(command) = commands.blocking_recv() {
             match command {
                 Command::Put(record) => {
@@ -57,7 +40,7 @@ pub(crate) fn start(
                 }
                 Command::Read { record, end, reply } => {
                     // The reader may have gone.
-                    let _ = reply.send(read(store.as_mut(), &record, &end));
+                    let _ = reply.send(leftover::read(store.as_mut(), &record, &end));
                 }
             }
         }
@@ -71,7 +54,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
     let done = match record {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation(record) => store.put_evaluation(record),
-        Record::End(record) => store.finish_job(record),
+        Record::End { end, summary } => store.finish_job(end, summary),
     };
     match done {
         Ok(()) => Event::Stored { job, key },
@@ -80,16 +63,4 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
             Event::StoreFailed { job, key, error: error.to_string() }
         }
     }
-}
-
-/// What a job left follows from its evaluations: they are told to a fresh search.
-fn read(store: &mut dyn Store, record: &JobRecord, end: &EndRecord) -> Result<Leftover, ReadError> {
-    let evaluations = store.evaluations(record.job).map_err(RestoreError::from)?;
-    let told = evaluations.into_iter().map(|stored| (stored.point, stored.outcomes));
-    let search = Search::replay(record.specification.clone(), told)?;
-    Ok(Leftover {
-        specification: (*record.specification).clone(),
-        result: search.result(&end.ending, &end.version),
-        history: search.history().to_vec(),
-    })
 }

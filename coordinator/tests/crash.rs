@@ -16,11 +16,12 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, Token, WorkerId};
+use osteon_coordinator::leftover;
 use osteon_coordinator::reactor::{RestoredJob, react};
-use osteon_coordinator::search::Search;
+use osteon_coordinator::search::{Search, Step};
 use osteon_coordinator::state::State;
-use osteon_coordinator::store::Store;
 use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::store::{EvaluationRecord, Store};
 
 /// When a process dies, counted in writes since the beginning of the job.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,30 @@ fn killed_at_any_write_it_goes_on_to_the_same_result() {
         let beyond = Some(Death::Before(writes + 1));
         assert!(live(directory.path(), &specification, beyond), "a write too many");
     }
+}
+
+/// A version of the program with other numerics has begun the job: none of its outcomes is left
+/// in the result.
+#[test]
+fn evaluations_of_other_numerics_are_computed_again() {
+    let specification = fake::identification(20, 6, 5);
+    let directory = tempfile::tempdir().unwrap();
+    assert!(!live(directory.path(), &specification, Some(Death::After(4))));
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.begin_again(JobId(1), "osteon 0.0.0 numerics 0").unwrap();
+    let mut search = Search::new(Arc::new(specification.clone()));
+    for number in 0..3 {
+        let Step::Evaluate(point) = search.ask() else { panic!("done") };
+        let outcomes: Arc<[_]> = [Ok(4000.0 + number as f64); 20].into();
+        let record = EvaluationRecord { job: JobId(1), number, point, outcomes: outcomes.clone() };
+        store.put_evaluation(&record).unwrap();
+        search.tell(outcomes);
+    }
+    drop(store);
+    assert!(live(directory.path(), &specification, None));
+    assert_eq!(result(directory.path()), format!("{:?}", fake::plain_run(&specification)));
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.jobs().unwrap()[0].record.fingerprint, version::fingerprint());
 }
 
 /// One life of a coordinator with one worker; whether it got to the end of the job.
@@ -90,7 +115,7 @@ fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>
                 match &record {
                     Record::Job(record) => store.put_job(record).unwrap(),
                     Record::Evaluation(record) => store.put_evaluation(record).unwrap(),
-                    Record::End(record) => store.finish_job(record).unwrap(),
+                    Record::End { end, summary } => store.finish_job(end, summary).unwrap(),
                 }
                 if death == Some(Death::After(writes)) {
                     return false;
@@ -110,9 +135,6 @@ fn result(directory: &Path) -> String {
     let mut store = SqliteStore::open(directory).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!(jobs.len(), 1);
-    let evaluations = store.evaluations(JobId(1)).unwrap();
-    let told = evaluations.into_iter().map(|stored| (stored.point, stored.outcomes));
-    let search = Search::replay(jobs[0].record.specification.clone(), told).unwrap();
-    let ending = jobs[0].end.clone().unwrap().ending;
-    format!("{:?}", search.result(&ending, version::VERSION))
+    let left = leftover::read(&mut store, &jobs[0].record, jobs[0].end.as_ref().unwrap());
+    format!("{:?}", left.unwrap().result)
 }

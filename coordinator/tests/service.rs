@@ -4,13 +4,18 @@
 
 mod fake;
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use osteon_common::version;
-use osteon_coordinator::store::Store;
+use osteon_coordinator::ids::JobId;
+use osteon_coordinator::search::Summary;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
-use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_coordinator::store::{
+    EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+};
+use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
@@ -197,8 +202,7 @@ async fn a_restarted_coordinator_goes_on() {
     check_leftover(&mut jobs, &job, &specification).await;
     let listed = jobs.list(ListRequest::default()).await.unwrap().into_inner();
     assert_eq!(listed.jobs.len(), 1);
-    let wanted = JobSnapshot { workers: 0, ..last };
-    assert_eq!(listed.jobs[0], JobSnapshot { realizations_done: 0, ..wanted });
+    assert_eq!(listed.jobs[0], JobSnapshot { workers: 0, ..last });
     drop(jobs);
     third.shutdown().await;
 }
@@ -256,6 +260,92 @@ async fn a_worker_with_other_numerics_is_refused() {
     let refused = stream.message().await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition);
     assert!(refused.message().contains("osteon 0.0.0 numerics 0"), "{refused}");
+    coordinator.shutdown().await;
+}
+
+/// A store that takes jobs, and then nothing, or dies.
+#[derive(Clone)]
+struct BrokenStore {
+    sound: MemoryStore,
+    dies: bool,
+}
+
+impl Store for BrokenStore {
+    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
+        self.sound.jobs()
+    }
+
+    fn evaluations(
+        &mut self,
+        job: JobId,
+        first: u64,
+        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
+    ) -> Result<(), StoreError> {
+        self.sound.evaluations(job, first, visit)
+    }
+
+    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        self.sound.begin_again(job, fingerprint)
+    }
+
+    fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
+        self.sound.put_job(record)
+    }
+
+    fn put_evaluation(&mut self, _: &EvaluationRecord) -> Result<(), StoreError> {
+        assert!(!self.dies, "a store that this test breaks");
+        let source = std::io::Error::other("the disk is full");
+        Err(StoreError::Directory { path: "store".into(), source })
+    }
+
+    fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
+        self.sound.finish_job(end, summary)
+    }
+
+    fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
+        self.sound.summary(job)
+    }
+}
+
+/// A coordinator whose store takes no evaluation, and its job, once it has said that it failed.
+async fn failed(dies: bool) -> (Coordinator, MemoryStore, String, Failed) {
+    let sound = MemoryStore::new();
+    let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
+    let config = Config {
+        tick: Duration::from_millis(10),
+        store_retry: Duration::from_millis(10),
+        store_patience: Some(Duration::from_millis(50)),
+        shutdown_timeout: Duration::from_millis(200),
+        ..Config::default()
+    };
+    let store = BrokenStore { sound: sound.clone(), dies };
+    let coordinator = start(listener, Box::new(store), config).await.unwrap();
+    let specification = fake::identification(10, 3, 1);
+    let job = submit(&mut client(&coordinator).await, &specification, "").await.unwrap();
+    let worker = tokio::spawn(work(channel(&coordinator).await, usize::MAX));
+    let failed = tokio::time::timeout(TIMEOUT, coordinator.failed()).await.unwrap();
+    worker.abort();
+    (coordinator, sound, job, failed)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_that_refuses_is_told_and_leaves_the_job_unfinished() {
+    let (coordinator, mut sound, job, failed) = failed(false).await;
+    assert!(failed.to_string().contains("the disk is full"), "{failed}");
+    let mut client = client(&coordinator).await;
+    let unfinished = fetch(&mut client, &job).await.unwrap_err();
+    assert_eq!(unfinished.code(), Code::FailedPrecondition, "{unfinished}");
+    let snapshot = client.get(GetRequest { job }).await.unwrap().into_inner().snapshot.unwrap();
+    assert!(snapshot.waiting_for.contains("the disk is full"), "{snapshot:?}");
+    drop(client);
+    coordinator.shutdown().await;
+    assert_eq!(sound.jobs().unwrap()[0].end, None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_whose_thread_dies_is_told() {
+    let (coordinator, _, _, failed) = failed(true).await;
+    assert_eq!(failed, Failed::Store);
     coordinator.shutdown().await;
 }
 

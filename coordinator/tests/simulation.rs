@@ -1,6 +1,8 @@
 //! Coordinator, workers and store in one thread under a false clock. One seed decides order,
-//! delays, deaths, stalls, answers that come late, twice or malformed, refusals of the store and
-//! restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes.
+//! delays, deaths, stalls, answers that come late, twice, malformed or contradict each other,
+//! refusals and long outages of the store, cancellations, clean stops and restarts of the
+//! coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
+//! cancelled, or failed because of a contradiction, what the loop has found by then.
 //!
 //! `OSTEON_SIMULATION_SEED=N` runs one seed, for a look at a failure.
 
@@ -35,7 +37,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     }
     // A simulation in which nothing goes wrong tests nothing.
     if seeds.end - seeds.start == SCHEDULES {
-        let world::Counts { lost, revoked, closed, late, restarts, refusals } = seen;
+        let world::Counts { lost, revoked, closed, late, restarts, refusals, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -45,6 +47,15 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("refusals of the store", refusals),
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
+        }
+        let world::Counts { stops, cancelled, exposed, outages, .. } = seen;
+        for (name, count) in [
+            ("clean stops", stops),
+            ("jobs cancelled", cancelled),
+            ("jobs with contradicting answers", exposed),
+            ("outages of the store", outages),
+        ] {
+            assert!(count > SCHEDULES / 20, "{name}: {count}");
         }
     }
 }

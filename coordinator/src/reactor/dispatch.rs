@@ -3,8 +3,9 @@
 //! Workers are served in the order of how little they hold, jobs in turn, batch by batch. A batch
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
-//! its share allows, no batch is smaller than the worker's threads. A worker that has nothing to
-//! do gets a copy of the batch that is out longest.
+//! its share allows, no batch is smaller than the worker's threads, be it longer than the target
+//! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
+//! longest. While a realization waits to be computed alone, one worker is not refilled.
 
 use std::ops::Bound;
 use std::time::Duration;
@@ -20,7 +21,8 @@ use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Stage, State, Worke
 /// Realizations for each thread in a worker's first batch of a job: enough to measure its rate,
 /// little enough to be soon answered.
 const FIRST_BATCH_PER_THREAD: u32 = 4;
-/// A batch holds at most one in so many of a worker's share of what remains.
+/// A batch holds at most one in so many of a worker's share of what remains, and more only to
+/// give each of the worker's threads one realization; never more than the share.
 const SHARE_DIVISOR: f64 = 4.0;
 
 /// Hands out batches while there is credit and work, then copies.
@@ -39,12 +41,26 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
 /// The worker with credit that holds least; of equal ones the first.
 fn next_worker(state: &State) -> Option<WorkerId> {
     let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
-    let with_credit = state.workers.iter().filter(|(_, worker)| {
-        !worker.draining
-            && worker.in_flight.len() < BATCHES_IN_FLIGHT_MAX
-            && !worker.in_flight.iter().any(exclusive)
-    });
-    with_credit.min_by_key(|(id, worker)| (worker.in_flight.len(), **id)).map(|(id, _)| *id)
+    let free = state
+        .workers
+        .iter()
+        .filter(|(_, worker)| !worker.draining && !worker.in_flight.iter().any(exclusive))
+        .map(|(id, worker)| (worker.in_flight.len(), *id));
+    let mut least = free.clone().min()?;
+    // Suspects go to a worker that holds nothing: the next to be so is not refilled until then.
+    if least.0 > 0 && suspects_wait(state) {
+        least = free.filter(|worker| *worker != least).min()?;
+    }
+    let (held, worker) = least;
+    (held < BATCHES_IN_FLIGHT_MAX).then_some(worker)
+}
+
+/// Whether a realization that was alone on a lost worker is to be handed out.
+fn suspects_wait(state: &State) -> bool {
+    state.active.iter().any(|id| match state.jobs.get(id).map(|job| &job.stage) {
+        Some(Stage::Computing(evaluation)) => !evaluation.quarantine.is_empty(),
+        _ => false,
+    })
 }
 
 /// Gives an idle worker a realization that was alone on a lost worker, and nothing else.
@@ -106,7 +122,10 @@ fn next_job(state: &State) -> Option<JobId> {
     state.active.range(after).find(has_work).or_else(|| state.active.iter().find(has_work)).copied()
 }
 
-/// Realizations of `job`, of which `queued` are left, that `attached` should get at once.
+/// Realizations of `job`, of which `queued` are left, that `attached` should get at once: what it
+/// computes in the target time, at most a quarter of its share. Both limits give way to one
+/// realization for each thread (a realization may take longer than the target, and a share may
+/// hold fewer than four for each thread), the share itself does not.
 pub(super) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u64) -> u64 {
     let per_thread = mean_rate_per_thread(state, job);
     let weight = |worker: &Worker| {
@@ -121,7 +140,7 @@ pub(super) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u
         None => f64::from(FIRST_BATCH_PER_THREAD) * threads,
     };
     // `as` saturates, and takes NaN for 0.
-    (target.min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
+    (target.max(threads).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
 }
 
 /// Mean rate of one thread at `job` over the workers that are measured; 1 if none is.

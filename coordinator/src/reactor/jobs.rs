@@ -1,5 +1,6 @@
 //! A job's way from acceptance to its end.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::Status;
@@ -10,13 +11,10 @@ use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Ending, Search, Step};
+use crate::search::{Ending, Search, Step, Summary};
 use crate::snapshot;
 use crate::state::{Job, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord};
-
-/// Writes of one record that may fail before its job fails.
-const STORE_RETRIES_MAX: u32 = 30;
 
 /// A record is durable: the job goes on.
 pub(super) fn stored(
@@ -53,7 +51,8 @@ pub(super) fn stored(
     state.changed.insert(id);
 }
 
-/// A record could not be stored: a submission is refused, anything else is tried again later.
+/// A record could not be stored: a submission is refused, anything else is tried again, for as
+/// long as it takes: what is not durable has not happened, and a job ends in no other way.
 pub(super) fn store_failed(
     state: &mut State,
     id: JobId,
@@ -75,12 +74,12 @@ pub(super) fn store_failed(
         state.jobs.remove(&id);
         return;
     }
-    let (since, retries) =
-        job.trouble.as_ref().map_or((now, 0), |trouble| (trouble.since, trouble.retries + 1));
-    job.trouble = Some(Trouble { since, retry_at, retries, error: error.clone() });
+    let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
+    job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
     state.changed.insert(id);
-    if retries >= STORE_RETRIES_MAX {
-        give_up_storing(state, id, error, now, effects);
+    let waited = now.saturating_sub(since);
+    if state.config.store_patience.is_some_and(|patience| waited >= patience) {
+        effects.push(Effect::Despair { error, waited });
     }
 }
 
@@ -88,7 +87,7 @@ pub(super) fn store_failed(
 pub(super) fn store_again(job: &mut Job, effects: &mut Effects) {
     let record = match &job.stage {
         Stage::Storing(record) => Record::Evaluation(record.clone()),
-        Stage::Finishing(record) => Record::End(record.clone()),
+        Stage::Finishing(end) => Record::End { end: end.clone(), summary: job.summary() },
         Stage::Accepting | Stage::Waiting | Stage::Computing(_) | Stage::Ended(_) => return,
     };
     effects.push(Effect::Store(record));
@@ -177,7 +176,8 @@ fn finish(state: &mut State, id: JobId, ending: Ending, now: Duration, effects: 
         return;
     };
     let record = job.end(ending, now);
-    effects.push(Effect::Store(Record::End(record.clone())));
+    let summary = job.summary();
+    effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
     leave(state, id, now, effects);
 }
@@ -214,25 +214,6 @@ fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
     }
 }
 
-/// Ends a job in memory only: a later start of the coordinator takes it up again.
-fn give_up_storing(
-    state: &mut State,
-    id: JobId,
-    error: String,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let Some(job) = state.jobs.get_mut(&id) else {
-        return;
-    };
-    let reason = Some(Failure::Store { error }.to_string());
-    let ending = Ending { status: Status::Failed, reason };
-    let record = job.end(ending, now);
-    job.stage = Stage::Finishing(record);
-    ended(state, id, now, effects);
-    leave(state, id, now, effects);
-}
-
 fn cancelled() -> Ending {
     Ending { status: Status::Cancelled, reason: None }
 }
@@ -248,10 +229,15 @@ impl Job {
         }
     }
 
+    /// What its path has come to.
+    fn summary(&self) -> Arc<Summary> {
+        Arc::new(self.search.as_ref().map_or_else(Summary::empty, Search::summary))
+    }
+
     /// The record of the job's end.
     fn end(&self, ending: Ending, now: Duration) -> EndRecord {
         let search = self.search.as_ref();
-        let best = search.and_then(Search::best_feasible);
+        let best = search.and_then(Search::best);
         EndRecord::new(self.record.job, ending, now, search.map_or(0, Search::evaluations), best)
     }
 }

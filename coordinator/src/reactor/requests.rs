@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::JOBS_MAX;
+use osteon_common::version;
 
 use super::{Effects, jobs};
 use crate::effect::{Answer, Effect, Record, Refusal};
@@ -64,7 +65,8 @@ fn submit(
         state.requests.insert(request_id.clone(), id);
     }
     let search = Search::new(specification.clone());
-    let record = JobRecord { job: id, request_id, specification, accepted: now };
+    let fingerprint = version::fingerprint();
+    let record = JobRecord { job: id, request_id, specification, accepted: now, fingerprint };
     effects.push(Effect::Store(Record::Job(record.clone())));
     let mut job = Job::new(record, Stage::Accepting, Some(search), now);
     job.tokens.push(token);

@@ -1,7 +1,9 @@
 //! A state from what the store holds: unfinished jobs are replayed and go on.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
+use osteon_common::version;
 use thiserror::Error;
 
 use super::{Effects, jobs};
@@ -11,7 +13,7 @@ use crate::failure::Failure;
 use crate::ids::JobId;
 use crate::search::{ReplayError, Search};
 use crate::state::{Job, Stage, State};
-use crate::store::{EvaluationRecord, Store, StoreError, StoredJob};
+use crate::store::{JobRecord, Store, StoreError, StoredJob};
 
 /// A job out of the store, its search replayed if it has not ended.
 #[derive(Debug)]
@@ -39,16 +41,19 @@ pub enum RestoreError {
 impl RestoredJob {
     /// All jobs of a store. Blocks.
     ///
+    /// A job that has not ended and whose evaluations were computed with other numerics than this
+    /// program's begins again: results of two numerics never mix.
+    ///
     /// # Errors
-    /// When the store cannot be read, or an evaluation is missing in it.
+    /// When the store cannot be read or does not take that, or an evaluation is missing in it.
     pub fn load(store: &mut dyn Store) -> Result<Vec<Self>, RestoreError> {
         let mut restored = Vec::new();
-        for stored in store.jobs()? {
+        for mut stored in store.jobs()? {
             let search = if stored.end.is_some() {
                 Ok(None)
             } else {
-                let evaluations = store.evaluations(stored.record.job)?;
-                replay(&stored, evaluations)?.map(Some)
+                keep_numerics(store, &mut stored.record)?;
+                replay(store, &stored.record)?.map(Some)
             };
             restored.push(Self { stored, search });
         }
@@ -56,22 +61,49 @@ impl RestoredJob {
     }
 }
 
-/// The search of a stored job that its `evaluations` lead to.
+/// Makes a job begin again if its numerics are not this program's.
+fn keep_numerics(store: &mut dyn Store, record: &mut JobRecord) -> Result<(), StoreError> {
+    let fingerprint = version::fingerprint();
+    if record.fingerprint != fingerprint {
+        tracing::warn!(
+            job = %record.job,
+            stored = %record.fingerprint,
+            now = %fingerprint,
+            "the job was begun with other numerics; its evaluations are computed again"
+        );
+        store.begin_again(record.job, &fingerprint)?;
+        record.fingerprint = fingerprint;
+    }
+    Ok(())
+}
+
+/// The search of a stored job that its evaluations lead to. One of them is in memory at a time,
+/// and the best.
 ///
 /// # Errors
-/// When an evaluation is missing; inside, when they belong to another search.
-pub(crate) fn replay(
-    stored: &StoredJob,
-    evaluations: Vec<EvaluationRecord>,
+/// When the store cannot be read or an evaluation is missing; inside, when they belong to another
+/// search.
+fn replay(
+    store: &mut dyn Store,
+    record: &JobRecord,
 ) -> Result<Result<Search, ReplayError>, RestoreError> {
-    let job = stored.record.job;
-    for (missing, record) in (0..).zip(&evaluations) {
-        if record.number != missing {
-            return Err(RestoreError::Gap { job, missing });
+    let job = record.job;
+    let mut search = Search::new(record.specification.clone());
+    let mut told = Ok(());
+    let mut gap = None;
+    store.evaluations(job, 0, &mut |stored| {
+        let missing = search.evaluations();
+        if stored.number != missing {
+            gap = Some(RestoreError::Gap { job, missing });
+            return ControlFlow::Break(());
         }
+        told = search.retell(stored.point, stored.outcomes);
+        if told.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    })?;
+    match gap {
+        Some(gap) => Err(gap),
+        None => Ok(told.map(|()| search)),
     }
-    let told = evaluations.into_iter().map(|record| (record.point, record.outcomes));
-    Ok(Search::replay(stored.record.specification.clone(), told))
 }
 
 impl State {

@@ -161,12 +161,13 @@ fn described(effect: &Effect) -> String {
         Effect::Store(Record::Evaluation(record)) => {
             format!("store job {} evaluation {}", record.job, record.number)
         }
-        Effect::Store(Record::End(record)) => {
-            let reason = record.ending.reason.as_deref().unwrap_or_default();
-            format!("store job {} end: {} {reason}", record.job, record.ending.status.name())
+        Effect::Store(Record::End { end, .. }) => {
+            let reason = end.ending.reason.as_deref().unwrap_or_default();
+            format!("store job {} end: {} {reason}", end.job, end.ending.status.name())
         }
         Effect::Answer { token, answer } => format!("answer {token}: {}", answered(answer)),
         Effect::Publish { job, .. } => format!("publish {job}"),
+        Effect::Despair { error, waited } => format!("despair after {waited:?}: {error}"),
         Effect::Stop => "stop".to_owned(),
     }
 }

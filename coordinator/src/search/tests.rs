@@ -90,8 +90,10 @@ fn a_replay_of_any_part_of_the_path_goes_on_the_same_way() {
     let specification = specification(40);
     let (full, told) = run(&specification);
     for length in 0..=told.len() {
-        let part = told[..length].iter().cloned();
-        let mut search = Search::replay(Arc::new(specification.clone()), part).unwrap();
+        let mut search = Search::new(Arc::new(specification.clone()));
+        for (point, outcomes) in &told[..length] {
+            search.retell(*point, outcomes.clone()).unwrap();
+        }
         assert_eq!(search.evaluations(), length as u64);
         for (point, outcomes) in &told[length..] {
             assert_eq!(search.ask(), Step::Evaluate(*point));
@@ -109,8 +111,9 @@ fn a_replay_of_another_path_is_refused() {
     let specification = specification(40);
     let (_, mut told) = run(&specification);
     told[3].0.0[1] += 1.0;
-    let error = Search::replay(Arc::new(specification), told).unwrap_err();
-    assert_eq!(error.number, 3);
+    let mut search = Search::new(Arc::new(specification));
+    let mut retold = told.into_iter().map(|(point, outcomes)| search.retell(point, outcomes));
+    assert_eq!(retold.find_map(Result::err).unwrap().number, 3);
 }
 
 #[test]
@@ -137,8 +140,19 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     assert!(reason.contains("among the 3 evaluated"), "{reason}");
     assert!(reason.contains("1 of 4 realizations failed (1 no_arrival)"), "{reason}");
     assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
-    assert!(search.best_feasible().is_none());
-    assert_eq!(search.best().unwrap().number, 0);
+    // What failed everywhere has no best point, nothing that data could have determined.
+    assert_eq!(search.best(), None);
+    assert_eq!(search.result(&ending(&search), "1").best, None);
+}
+
+#[test]
+fn an_infeasible_point_is_not_best_even_while_nothing_else_is_known() {
+    let mut search = Search::new(Arc::new(specification(400)));
+    search.tell([Err(FailureKind::NoArrival); 4].into());
+    assert_eq!(search.best(), None);
+    let Step::Evaluate(point) = search.ask() else { panic!("done") };
+    search.tell(outcomes(&point));
+    assert_eq!(search.best().unwrap().number, 1);
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! A store that lasts as long as its handles: for runs that keep nothing, and for tests.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
 use crate::ids::JobId;
+use crate::search::Summary;
 
 /// A store in memory. Clones share their content, as two openings of one file would.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +16,7 @@ pub struct MemoryStore(Arc<Mutex<Content>>);
 struct Content {
     jobs: BTreeMap<JobId, StoredJob>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
+    summaries: BTreeMap<JobId, Summary>,
 }
 
 impl MemoryStore {
@@ -23,7 +26,7 @@ impl MemoryStore {
     }
 
     fn content(&self) -> MutexGuard<'_, Content> {
-        // Every change is one insertion: there is no half-done state that a panic could leave.
+        // No change panics half-way.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -33,10 +36,28 @@ impl Store for MemoryStore {
         Ok(self.content().jobs.values().cloned().collect())
     }
 
-    fn evaluations(&mut self, job: JobId) -> Result<Vec<EvaluationRecord>, StoreError> {
+    fn evaluations(
+        &mut self,
+        job: JobId,
+        first: u64,
+        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
+    ) -> Result<(), StoreError> {
         let content = self.content();
-        let all = content.evaluations.range((job, 0)..=(job, u64::MAX));
-        Ok(all.map(|(_, record)| record.clone()).collect())
+        for (_, record) in content.evaluations.range((job, first)..=(job, u64::MAX)) {
+            if visit(record.clone()).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        let mut content = self.content();
+        content.evaluations.retain(|(of, _), _| *of != job);
+        if let Some(stored) = content.jobs.get_mut(&job) {
+            fingerprint.clone_into(&mut stored.record.fingerprint);
+        }
+        Ok(())
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -50,10 +71,16 @@ impl Store for MemoryStore {
         Ok(())
     }
 
-    fn finish_job(&mut self, record: &EndRecord) -> Result<(), StoreError> {
-        if let Some(job) = self.content().jobs.get_mut(&record.job) {
-            job.end = Some(record.clone());
+    fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
+        let mut content = self.content();
+        content.summaries.insert(end.job, summary.clone());
+        if let Some(job) = content.jobs.get_mut(&end.job) {
+            job.end = Some(end.clone());
         }
         Ok(())
+    }
+
+    fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
+        Ok(self.content().summaries.get(&job).cloned())
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! Write-ahead log with an exclusive lock, set first: no shared memory is needed and a second
 //! coordinator is refused. `synchronous = FULL`: a record that is reported is on the disk. Each
-//! specification and each evaluation is one blob with a BLAKE3 checksum.
+//! row has a BLAKE3 checksum of its other columns.
 
+use std::cmp::Ordering;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,10 +20,12 @@ use rusqlite::{Connection, ErrorCode, OptionalExtension as _, Row, params};
 
 use super::{DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
 use crate::ids::JobId;
-use crate::search::Ending;
+use crate::search::{Ending, Summary};
+
+mod summary;
 
 /// Format that this program writes.
-const FORMAT: i64 = 1;
+const FORMAT: i64 = 2;
 /// Name of the file in the store's directory.
 const FILE: &str = "osteon.sqlite";
 /// How long to wait for a coordinator that is just ending.
@@ -35,6 +39,7 @@ const SCHEMA: &str = "
         request_id TEXT NOT NULL,
         accepted_ns INTEGER NOT NULL,    -- since the Unix epoch
         specification BLOB NOT NULL,     -- osteon.v1.JobSpecification
+        fingerprint TEXT NOT NULL,       -- of the numerics of its evaluations
         checksum BLOB NOT NULL
     );
     CREATE TABLE evaluation (
@@ -54,7 +59,15 @@ const SCHEMA: &str = "
         evaluations INTEGER NOT NULL,
         best_cost REAL,
         best_mean REAL,
-        best_coefficient_of_variation REAL
+        best_coefficient_of_variation REAL,
+        checksum BLOB NOT NULL
+    );
+    CREATE TABLE summary (               -- what an ended job's path came to
+        job INTEGER PRIMARY KEY REFERENCES job(id),
+        digest TEXT NOT NULL,
+        best INTEGER,                    -- number of the best evaluation
+        history BLOB NOT NULL,           -- osteon.v1.HistoryBlock
+        checksum BLOB NOT NULL
     );
 ";
 
@@ -69,8 +82,8 @@ impl SqliteStore {
     /// Opens the store in `directory`, making both if need be.
     ///
     /// # Errors
-    /// When the directory cannot be made, another coordinator has the store open, a newer version
-    /// of osteon wrote it, or SQLite refuses.
+    /// When the directory cannot be made, another coordinator has the store open, a version of
+    /// osteon with another format wrote it, or SQLite refuses.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         fs::create_dir_all(directory)
             .map_err(|source| StoreError::Directory { path: directory.to_owned(), source })?;
@@ -81,10 +94,11 @@ impl SqliteStore {
         let found: i64 = connection
             .query_row("SELECT version FROM format", [], |row| row.get(0))
             .map_err(refused)?;
-        if found > FORMAT {
-            return Err(StoreError::Newer { path, found, known: FORMAT });
+        match found.cmp(&FORMAT) {
+            Ordering::Less => Err(StoreError::Older { path, found, known: FORMAT }),
+            Ordering::Equal => Ok(Self { connection, path }),
+            Ordering::Greater => Err(StoreError::Newer { path, found, known: FORMAT }),
         }
-        Ok(Self { connection, path })
     }
 
     fn refused(&self, source: rusqlite::Error) -> StoreError {
@@ -97,26 +111,28 @@ impl SqliteStore {
 
     fn end(&self, job: JobId) -> Result<Option<EndRecord>, StoreError> {
         let sql = "SELECT status, reason, version, ended_ns, evaluations, best_cost, best_mean,
-                   best_coefficient_of_variation FROM ending WHERE job = ?1";
+                   best_coefficient_of_variation, checksum FROM ending WHERE job = ?1";
         let read = |row: &Row<'_>| {
             let status: String = row.get(0)?;
             let status = Status::ALL.into_iter().find(|known| known.name() == status);
             let (mean, variation): (Option<f64>, Option<f64>) = (row.get(6)?, row.get(7)?);
-            let reason = row.get(1)?;
-            Ok(match status {
-                None => None,
-                Some(status) => Some(EndRecord {
-                    job,
-                    ending: Ending { status, reason },
-                    version: row.get(2)?,
-                    ended: Duration::from_nanos(row.get(3)?),
-                    evaluations: row.get(4)?,
-                    best_cost: row.get(5)?,
-                    best_moments: mean.zip(variation).map(|(mean, coefficient_of_variation)| {
-                        Moments { mean, coefficient_of_variation }
-                    }),
+            let (reason, checksum): (_, Vec<u8>) = (row.get(1)?, row.get(8)?);
+            let Some(status) = status else {
+                return Ok(None);
+            };
+            let end = EndRecord {
+                job,
+                ending: Ending { status, reason },
+                version: row.get(2)?,
+                ended: Duration::from_nanos(row.get(3)?),
+                evaluations: row.get(4)?,
+                best_cost: row.get(5)?,
+                best_moments: mean.zip(variation).map(|(mean, coefficient_of_variation)| Moments {
+                    mean,
+                    coefficient_of_variation,
                 }),
-            })
+            };
+            Ok((checksum == end_checksum(&end)).then_some(end))
         };
         let found = self.connection.query_row(sql, params![job.0], read).optional();
         match found.map_err(|source| self.refused(source))? {
@@ -142,15 +158,17 @@ impl SqliteStore {
 impl Store for SqliteStore {
     fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
         let sql =
-            "SELECT id, request_id, accepted_ns, specification, checksum FROM job ORDER BY id";
-        type JobRow = (u64, String, u64, Vec<u8>, Vec<u8>);
+            "SELECT id, request_id, accepted_ns, specification, fingerprint, checksum FROM job
+             ORDER BY id";
+        type JobRow = (u64, String, u64, Vec<u8>, String, Vec<u8>);
         let rows: Vec<JobRow> = self.rows(sql, [], |row| {
-            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?))
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?, row.get(5)?))
         })?;
         rows.into_iter()
-            .map(|(id, request_id, accepted_ns, encoded, checksum)| {
+            .map(|(id, request_id, accepted_ns, encoded, fingerprint, checksum)| {
                 let job = JobId(id);
-                let intact = checksum == job_checksum(job, &encoded);
+                let intact =
+                    checksum == job_checksum(job, &request_id, accepted_ns, &encoded, &fingerprint);
                 let specification = intact
                     .then(|| v1::JobSpecification::decode(encoded.as_slice()).ok())
                     .flatten()
@@ -161,41 +179,62 @@ impl Store for SqliteStore {
                     request_id,
                     specification: Arc::new(specification),
                     accepted: Duration::from_nanos(accepted_ns),
+                    fingerprint,
                 };
                 Ok(StoredJob { record, end: self.end(job)? })
             })
             .collect()
     }
 
-    fn evaluations(&mut self, job: JobId) -> Result<Vec<EvaluationRecord>, StoreError> {
+    fn evaluations(
+        &mut self,
+        job: JobId,
+        first: u64,
+        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
+    ) -> Result<(), StoreError> {
         let sql = "SELECT number, point, outcomes, checksum FROM evaluation
-                   WHERE job = ?1 ORDER BY number";
-        type EvaluationRow = (u64, Vec<u8>, Vec<u8>, Vec<u8>);
-        let rows: Vec<EvaluationRow> = self.rows(sql, params![job.0], |row| {
-            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
-        })?;
-        rows.into_iter()
-            .map(|(number, point, outcomes, checksum)| {
-                let intact = checksum == evaluation_checksum(job, number, &point, &outcomes);
-                intact
-                    .then(|| unpack(&point).zip(unpack_outcomes(&outcomes)))
-                    .flatten()
-                    .map(|(point, outcomes)| EvaluationRecord { job, number, point, outcomes })
-                    .ok_or_else(|| self.damaged(job, DamagedRecord::Evaluation(number)))
-            })
-            .collect()
+                   WHERE job = ?1 AND number >= ?2 ORDER BY number";
+        let refused = |source| self.refused(source);
+        let mut statement = self.connection.prepare(sql).map_err(refused)?;
+        let mut rows = statement.query(params![job.0, first]).map_err(refused)?;
+        while let Some(row) = rows.next().map_err(refused)? {
+            let (number, record) = evaluation(job, row).map_err(refused)?;
+            let damaged = || self.damaged(job, DamagedRecord::Evaluation(number));
+            if visit(record.ok_or_else(damaged)?).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        let begin_again = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
+            transaction.execute("DELETE FROM evaluation WHERE job = ?1", params![job.0])?;
+            let checksum: Vec<u8> = transaction.query_row(
+                "SELECT request_id, accepted_ns, specification FROM job WHERE id = ?1",
+                params![job.0],
+                |row| {
+                    let (request_id, encoded): (String, Vec<u8>) = (row.get(0)?, row.get(2)?);
+                    Ok(job_checksum(job, &request_id, row.get(1)?, &encoded, fingerprint))
+                },
+            )?;
+            transaction.execute(
+                "UPDATE job SET fingerprint = ?2, checksum = ?3 WHERE id = ?1",
+                params![job.0, fingerprint, checksum],
+            )?;
+            transaction.commit()
+        };
+        begin_again().map_err(|source| self.refused(source))
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
         let encoded = specification::to_message(&record.specification).encode_to_vec();
-        let sql = "INSERT OR IGNORE INTO job VALUES (?1, ?2, ?3, ?4, ?5)";
-        let values = params![
-            record.job.0,
-            record.request_id,
-            nanoseconds(record.accepted),
-            encoded,
-            job_checksum(record.job, &encoded)
-        ];
+        let JobRecord { job, request_id, accepted, fingerprint, .. } = record;
+        let accepted = nanoseconds(*accepted);
+        let checksum = job_checksum(*job, request_id, accepted, &encoded, fingerprint);
+        let sql = "INSERT OR IGNORE INTO job VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+        let values = params![job.0, request_id, accepted, encoded, fingerprint, checksum];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
@@ -210,8 +249,8 @@ impl Store for SqliteStore {
         Ok(())
     }
 
-    fn finish_job(&mut self, record: &EndRecord) -> Result<(), StoreError> {
-        let sql = "INSERT OR REPLACE INTO ending VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+    fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
+        let sql = "INSERT OR REPLACE INTO ending VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
         let values = params![
             record.job.0,
             record.ending.status.name(),
@@ -222,9 +261,23 @@ impl Store for SqliteStore {
             record.best_cost,
             record.best_moments.map(|moments| moments.mean),
             record.best_moments.map(|moments| moments.coefficient_of_variation),
+            end_checksum(record),
         ];
-        self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        Ok(())
+        let finish = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
+            transaction.execute(sql, values)?;
+            summary::put(&transaction, record.job, summary)?;
+            transaction.commit()
+        };
+        finish().map_err(|source| self.refused(source))
+    }
+
+    fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
+        match summary::get(&self.connection, job).map_err(|source| self.refused(source))? {
+            Some(None) => Err(self.damaged(job, DamagedRecord::Summary)),
+            Some(summary) => Ok(summary),
+            None => Ok(None),
+        }
     }
 }
 
@@ -258,20 +311,63 @@ fn refusal(path: &Path, source: rusqlite::Error) -> StoreError {
     }
 }
 
-fn nanoseconds(time: Duration) -> i64 {
-    i64::try_from(time.as_nanos()).unwrap_or(i64::MAX)
+/// The evaluation of a row, and its number; `None` if it is damaged.
+fn evaluation(job: JobId, row: &Row<'_>) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
+    let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
+    let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
+    let intact = checksum == evaluation_checksum(job, number, point, outcomes);
+    let unpacked = intact.then(|| unpack(point).zip(unpack_outcomes(outcomes))).flatten();
+    let record =
+        unpacked.map(|(point, outcomes)| EvaluationRecord { job, number, point, outcomes });
+    Ok((number, record))
 }
 
-fn job_checksum(job: JobId, specification: &[u8]) -> Vec<u8> {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&job.0.to_le_bytes()).update(specification);
-    hasher.finalize().as_bytes().to_vec()
+/// Nanoseconds as the file holds them: SQLite knows signed integers only.
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).map_or(i64::MAX as u64, |ns| ns.min(i64::MAX as u64))
+}
+
+fn job_checksum(
+    job: JobId,
+    request_id: &str,
+    accepted_ns: u64,
+    specification: &[u8],
+    fingerprint: &str,
+) -> Vec<u8> {
+    let (job, accepted) = (job.0.to_le_bytes(), accepted_ns.to_le_bytes());
+    checksum(&[&job, request_id.as_bytes(), &accepted, specification, fingerprint.as_bytes()])
 }
 
 fn evaluation_checksum(job: JobId, number: u64, point: &[u8], outcomes: &[u8]) -> Vec<u8> {
+    checksum(&[&job.0.to_le_bytes(), &number.to_le_bytes(), point, outcomes])
+}
+
+fn end_checksum(end: &EndRecord) -> Vec<u8> {
+    let EndRecord { job, ending, version, ended, evaluations, best_cost, best_moments } = end;
+    let optional = |value: Option<f64>| value.map(|value| value.to_le_bytes().to_vec());
+    let (mean, variation) = (
+        best_moments.map(|moments| moments.mean),
+        best_moments.map(|moments| moments.coefficient_of_variation),
+    );
+    let reason = ending.reason.as_ref().map(|reason| reason.as_bytes().to_vec());
+    let numbers = [job.0, nanoseconds(*ended), *evaluations].map(u64::to_le_bytes);
+    let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
+    fields.extend([ending.status.name().as_bytes(), version.as_bytes()]);
+    // What is absent has no field, and a field of one byte says that it is present.
+    let optional = [reason, optional(*best_cost), optional(mean), optional(variation)];
+    for value in &optional {
+        fields.push(if value.is_some() { &[1] } else { &[0] });
+        fields.extend(value.as_deref());
+    }
+    checksum(&fields)
+}
+
+/// BLAKE3 over fields, each after its length.
+fn checksum(fields: &[&[u8]]) -> Vec<u8> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update(&job.0.to_le_bytes()).update(&number.to_le_bytes());
-    hasher.update(point).update(outcomes);
+    for field in fields {
+        hasher.update(&(field.len() as u64).to_le_bytes()).update(field);
+    }
     hasher.finalize().as_bytes().to_vec()
 }
 

@@ -6,6 +6,10 @@ use std::sync::Arc;
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_common::parameters::Point;
+use osteon_common::results::JobResult;
+use osteon_common::version::VERSION;
+use osteon_coordinator::search::{Search as Driven, Step};
 use osteon_proto::batch::Work;
 
 /// Starts and bounds of the seven parameters.
@@ -76,28 +80,27 @@ pub(crate) fn mix(number: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Result and history of a specification, computed in one loop without any coordinator.
-pub(crate) fn plain_run(specification: &JobSpecification) -> osteon_common::results::JobResult {
-    use osteon_coordinator::search::{Search, Step};
-    let mut search = Search::new(Arc::new(specification.clone()));
+/// Result of a specification, computed in one loop without any coordinator.
+pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
+    let mut search = Driven::new(Arc::new(specification.clone()));
     loop {
         match search.ask() {
-            Step::Evaluate(point) => {
-                let work = |first| Work {
-                    setup: specification.setup,
-                    point,
-                    seed: specification.monte_carlo.seed,
-                    sampling: specification.monte_carlo.sampling,
-                    first,
-                    count: 1,
-                };
-                let all = (0..specification.monte_carlo.realizations)
-                    .map(|index| outcome(&work(index), index));
-                search.tell(all.collect());
-            }
-            Step::Done(ending) => {
-                return search.result(&ending, osteon_common::version::VERSION);
-            }
+            Step::Evaluate(point) => search.tell(all_outcomes(specification, point)),
+            Step::Done(ending) => return search.result(&ending, VERSION),
         }
     }
+}
+
+/// All outcomes at one point.
+pub(crate) fn all_outcomes(specification: &JobSpecification, point: Point) -> Arc<[Outcome]> {
+    let work = |first| Work {
+        setup: specification.setup,
+        point,
+        seed: specification.monte_carlo.seed,
+        sampling: specification.monte_carlo.sampling,
+        first,
+        count: 1,
+    };
+    let indices = 0..specification.monte_carlo.realizations;
+    indices.map(|index| outcome(&work(index), index)).collect()
 }

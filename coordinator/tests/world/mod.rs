@@ -1,24 +1,26 @@
 //! The world around a simulated coordinator.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::version;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Answer, Effect, Record};
+use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
 use osteon_coordinator::reactor::{RestoredJob, react};
 use osteon_coordinator::sanity::sanity_check;
-use osteon_coordinator::search::Search;
 use osteon_coordinator::state::{BATCHES_IN_FLIGHT_MAX, State};
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::{Store, StoredJob};
 use osteon_proto::batch::Work;
 
 use crate::fake;
+
+mod check;
 
 const TICK: Duration = Duration::from_millis(100);
 /// No schedule takes longer than this, in its own time.
@@ -35,6 +37,14 @@ pub(crate) struct Counts {
     pub(crate) late: u64,
     pub(crate) restarts: u64,
     pub(crate) refusals: u64,
+    /// Clean ends of the coordinator.
+    pub(crate) stops: u64,
+    /// Jobs that were cancelled before their end.
+    pub(crate) cancelled: u64,
+    /// Jobs that failed because two answers differed.
+    pub(crate) exposed: u64,
+    /// Times without any write.
+    pub(crate) outages: u64,
 }
 
 impl Counts {
@@ -45,6 +55,10 @@ impl Counts {
         self.late += other.late;
         self.restarts += other.restarts;
         self.refusals += other.refusals;
+        self.stops += other.stops;
+        self.cancelled += other.cancelled;
+        self.exposed += other.exposed;
+        self.outages += other.outages;
     }
 }
 
@@ -57,6 +71,8 @@ enum Happening {
     Arrive,
     /// A worker's message arrives.
     Message(WorkerId, Event),
+    /// A worker answers a batch that is settled again, and differently.
+    Lie(WorkerId, BatchId, Work),
     /// A worker's stream breaks.
     Break(WorkerId),
     /// A record reaches the disk, or does not.
@@ -65,12 +81,20 @@ enum Happening {
     Report(Event),
     /// The coordinator is killed and starts again.
     Restart,
+    /// The coordinator is told to stop; when it has, it starts again.
+    Drain,
+    /// A client wants its job ended, until it hears that it has.
+    Cancel(usize),
 }
 
 struct Client {
     specification: Arc<JobSpecification>,
     request_id: String,
     job: Option<JobId>,
+    /// It will want its job ended at some time.
+    cancels: bool,
+    /// It has not heard yet that its job has ended.
+    wants_end: bool,
 }
 
 #[derive(Default)]
@@ -90,6 +114,13 @@ pub(crate) struct World {
     store: MemoryStore,
     clients: Vec<Client>,
     submissions: BTreeMap<Token, usize>,
+    cancellations: BTreeMap<Token, usize>,
+    /// When the store takes nothing.
+    outage: Range<Duration>,
+    /// Workers lie now and then.
+    liars: bool,
+    /// One has.
+    lied: bool,
     workers: BTreeMap<WorkerId, Worker>,
     lost_alone: BTreeMap<(u64, u64), u32>,
     number: u64,
@@ -125,18 +156,16 @@ impl World {
             store_retry: Duration::from_millis(300),
             ..Config::default()
         };
-        let clients: Vec<Client> = (0..1 + draw(3))
-            .map(|number| {
-                let specification = match draw(4) {
-                    0 => fake::propagation(1 + draw(60), seed),
-                    _ => fake::identification(1 + draw(40), 2 + draw(12), seed),
-                };
-                let request_id = format!("request {number}");
-                Client { specification: Arc::new(specification), request_id, job: None }
-            })
-            .collect();
+        let clients = clients(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
+        let drain = (draw(3) == 0).then(|| draw(3000));
+        // Long: a client has given up by then, and so have many programs.
+        let outage = (draw(8) == 0).then(|| (draw(1000), 10_000 + draw(60_000)));
+        let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
+            Duration::from_millis(from)..Duration::from_millis(from + length)
+        });
+        let liars = draw(8) == 0;
         let mut world = Self {
             random,
             now: Duration::ZERO,
@@ -146,20 +175,30 @@ impl World {
             store: MemoryStore::new(),
             clients,
             submissions: BTreeMap::new(),
+            cancellations: BTreeMap::new(),
+            counts: Counts { outages: u64::from(!outage.is_empty()), ..Counts::default() },
+            outage,
+            liars,
+            lied: false,
             workers: BTreeMap::new(),
             lost_alone: BTreeMap::new(),
             number: 1,
-            counts: Counts::default(),
         };
         world.agenda.insert((TICK, 0), Happening::Tick);
         for client in 0..world.clients.len() {
             world.within(500, Happening::Submit(client));
+            if world.clients[client].cancels {
+                world.within(3000, Happening::Cancel(client));
+            }
         }
         for _ in 0..workers {
             world.within(500, Happening::Arrive);
         }
         for at in restarts {
             world.after(at, Happening::Restart);
+        }
+        if let Some(at) = drain {
+            world.after(at, Happening::Drain);
         }
         world
     }
@@ -214,7 +253,13 @@ impl World {
             }
             Happening::Write(record) => self.write(&record),
             Happening::Report(event) => self.react(event),
-            Happening::Restart => self.restart(),
+            Happening::Restart => {
+                self.counts.restarts += 1;
+                self.restart();
+            }
+            Happening::Drain => self.react(Event::Drain),
+            Happening::Lie(worker, batch, work) => self.lie(worker, batch, &work),
+            Happening::Cancel(client) => self.cancel(client),
         }
     }
 
@@ -318,7 +363,7 @@ impl World {
 
     fn write(&mut self, record: &Record) {
         let (job, key) = record.key();
-        let event = if self.draw(30) == 0 {
+        let event = if self.draw(30) == 0 || self.outage.contains(&self.now) {
             self.counts.refusals += 1;
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
@@ -328,9 +373,41 @@ impl World {
         self.within(5, Happening::Report(event));
     }
 
+    /// The coordinator has stopped by itself, and starts again.
+    fn stopped(&mut self) {
+        self.counts.stops += 1;
+        assert!(self.workers.is_empty(), "it stopped with workers attached");
+        let unstored = |happening: &Happening| matches!(happening, Happening::Write(_));
+        // Only what the store has refused may be left.
+        let left = self.agenda.values().any(unstored);
+        assert!(!left || self.counts.refusals > 0, "it stopped with a record on its way");
+        self.restart();
+    }
+
+    fn cancel(&mut self, client: usize) {
+        if !self.clients[client].wants_end {
+            return;
+        }
+        if let Some(job) = self.clients[client].job {
+            let token = Token(self.number());
+            self.cancellations.insert(token, client);
+            self.react(Event::Requested { token, request: Request::Cancel(job) });
+        }
+        self.within(2000, Happening::Cancel(client));
+    }
+
+    fn lie(&mut self, worker: WorkerId, batch: BatchId, work: &Work) {
+        let speaks = |worker: &Worker| !worker.stalled && !worker.holds.contains_key(&batch);
+        if self.workers.get(&worker).is_some_and(speaks) {
+            let mut outcomes = fake::outcomes(work);
+            outcomes[0] = Ok(1.0);
+            self.lied = true;
+            self.message(worker, Event::Answered { worker, batch, outcomes, elapsed_s: 0.01 });
+        }
+    }
+
     /// Kills the coordinator: what was on its way to the disk may or may not have reached it.
     fn restart(&mut self) {
-        self.counts.restarts += 1;
         let agenda = std::mem::take(&mut self.agenda);
         for (at, happening) in agenda {
             match happening {
@@ -339,7 +416,10 @@ impl World {
                         put(&mut self.store, &record);
                     }
                 }
-                Happening::Message(..) | Happening::Break(_) | Happening::Report(_) => {}
+                Happening::Message(..)
+                | Happening::Lie(..)
+                | Happening::Break(_)
+                | Happening::Report(_) => {}
                 stays => {
                     self.agenda.insert(at, stays);
                 }
@@ -350,6 +430,7 @@ impl World {
         }
         self.workers.clear();
         self.submissions.clear();
+        self.cancellations.clear();
         let restored = RestoredJob::load(&mut self.store).unwrap();
         let (state, effects) = State::restore(self.config, restored, self.now);
         self.state = state;
@@ -385,7 +466,8 @@ impl World {
                 Effect::Store(record) => self.within(20, Happening::Write(record)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
                 Effect::Publish { .. } => {}
-                Effect::Stop => panic!("nobody asked the coordinator to stop"),
+                Effect::Despair { .. } => panic!("nobody lacks patience"),
+                Effect::Stop => self.stopped(),
             }
         }
     }
@@ -413,39 +495,34 @@ impl World {
                 self.within(50, Happening::Message(worker, Event::WorkerDrains { worker }));
                 self.within(100, Happening::Message(worker, right));
             }
+            15..17 if self.liars => {
+                self.within(100, Happening::Message(worker, right));
+                self.within(300, Happening::Lie(worker, batch, work));
+            }
             _ => self.within(150, Happening::Message(worker, right)),
         }
     }
+}
 
-    fn answered(&mut self, token: Token, answer: &Answer) {
-        let Some(client) = self.submissions.remove(&token) else {
-            return;
-        };
-        match answer {
-            Answer::Submitted(job) => {
-                let stored = self.store.clone().jobs().unwrap();
-                assert!(stored.iter().any(|stored| stored.record.job == *job), "not durable");
-                let known = self.clients[client].job.get_or_insert(*job);
-                assert_eq!(known, job, "one request, two jobs");
+/// One to three clients with small jobs.
+fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
+    (0..1 + draw(3))
+        .map(|number| {
+            let specification = match draw(4) {
+                0 => fake::propagation(1 + draw(60), seed),
+                _ => fake::identification(1 + draw(40), 2 + draw(12), seed),
+            };
+            let request_id = format!("request {number}");
+            let cancels = draw(6) == 0;
+            Client {
+                specification: Arc::new(specification),
+                request_id,
+                job: None,
+                cancels,
+                wants_end: cancels,
             }
-            Answer::Refused(_) => {}
-            other => panic!("{other:?} to a submission"),
-        }
-    }
-
-    fn check_results(&mut self) {
-        let stored = self.store.jobs().unwrap();
-        assert_eq!(stored.len(), self.clients.len(), "a job too many");
-        for StoredJob { record, end } in stored {
-            let evaluations = self.store.evaluations(record.job).unwrap();
-            let told = evaluations.into_iter().map(|stored| (stored.point, stored.outcomes));
-            let search = Search::replay(record.specification.clone(), told).unwrap();
-            let result = search.result(&end.unwrap().ending, version::VERSION);
-            // As text: an unknown standard error is NaN, which equals nothing.
-            let expected = fake::plain_run(&record.specification);
-            assert_eq!(format!("{result:?}"), format!("{expected:?}"));
-        }
-    }
+        })
+        .collect()
 }
 
 fn answer(worker: WorkerId, batch: BatchId, work: &Work) -> Event {
@@ -456,7 +533,7 @@ fn put(store: &mut MemoryStore, record: &Record) {
     match record {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation(record) => store.put_evaluation(record),
-        Record::End(record) => store.finish_job(record),
+        Record::End { end, summary } => store.finish_job(end, summary),
     }
     .unwrap();
 }

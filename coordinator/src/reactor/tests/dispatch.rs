@@ -22,7 +22,11 @@ fn batches_take_the_target_time_and_leave_work_for_the_others() {
     check_size(&[64], &[None], 10_000, 256);
     // Measured: 200 ms.
     check_size(&[2], &[Some(5000.0)], 10_000, 1000);
-    check_size(&[2], &[Some(0.1)], 10_000, 1);
+    check_size(&[1], &[Some(0.1)], 10_000, 1);
+    // Slow realizations: one for each thread, or threads stand idle.
+    check_size(&[8], &[Some(8.0 / 0.3)], 10_000, 8);
+    check_size(&[2], &[Some(0.1)], 10_000, 2);
+    check_size(&[8, 8], &[Some(1.0), Some(1.0)], 6, 3);
     // Never more than a message may carry.
     check_size(&[2], &[Some(1e12)], 10_000_000, 65_536);
     // A quarter of the share of what remains; shares follow the rates.
@@ -50,6 +54,17 @@ fn each_worker_holds_two_batches_and_no_more() {
     );
     // 8 in 0.04 s are 200 a second, 40 in 200 ms.
     rig.check(answer_in(0.04, 1, 1, 0, 8), &["send 1: batch 5 = 24+40"]);
+}
+
+#[test]
+fn slow_realizations_keep_every_thread_of_a_worker_busy() {
+    let mut rig = Rig::with(1000, &[8]);
+    // 32 on 8 threads, 0.3 s each.
+    rig.now += Duration::from_millis(1200);
+    rig.check(answer_in(1.2, 1, 1, 0, 32), &["send 1: batch 3 = 64+8"]);
+    rig.check(answer_in(1.2, 1, 2, 32, 32), &["send 1: batch 4 = 72+8"]);
+    rig.now += Duration::from_millis(300);
+    rig.check(answer_in(0.3, 1, 3, 64, 8), &["send 1: batch 5 = 80+8"]);
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn a_job_that_cannot_be_stored_is_not_accepted() {
 }
 
 #[test]
-fn another_record_is_written_again_until_it_is_durable_or_the_job_fails() {
+fn another_record_is_written_again_until_it_is_durable() {
     let mut rig = Rig::with(1, &[1]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     let (failed, retry) = (|| store_failed(1, RecordKey::Evaluation(0)), Duration::from_secs(2));
@@ -77,13 +77,40 @@ fn another_record_is_written_again_until_it_is_durable_or_the_job_fails() {
     );
     rig.check_after(retry / 2, &["store job 1 evaluation 0"]);
     rig.check_after(Duration::ZERO, &[]);
-    for _ in 0..29 {
+    for _ in 0..1000 {
         rig.hear(1);
         rig.check(failed(), &[]);
         rig.check_after(retry, &["store job 1 evaluation 0"]);
     }
-    rig.check(failed(), &[]);
-    rig.check(request(1, Request::Get(JobId(1))), &["answer 1: Ended Failed"]);
+    rig.check(request(1, Request::Get(JobId(1))), &["answer 1: Running Unspecified"]);
+    rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
+}
+
+#[test]
+fn an_end_that_is_not_durable_is_none() {
+    let mut rig = Rig::with(8, &[]);
+    rig.check(request(7, Request::Cancel(JobId(1))), &["store job 1 end: cancelled "]);
+    for _ in 0..1000 {
+        rig.check(store_failed(1, RecordKey::End), &[]);
+        rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
+    }
+    let refusal = "answer 8: job 1 has not ended; wait for it with `osteon watch 1`";
+    rig.check(request(8, Request::Fetch(JobId(1))), &[refusal]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+}
+
+#[test]
+fn a_store_that_refuses_for_too_long_is_despaired_of_and_tried_on() {
+    let mut rig = Rig::with(8, &[]);
+    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    rig.event(request(7, Request::Cancel(JobId(1))));
+    for _ in 0..2 {
+        rig.check(store_failed(1, RecordKey::End), &[]);
+        rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
+    }
+    rig.check(store_failed(1, RecordKey::End), &["despair after 4s: the disk is full"]);
+    rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
 }
 
 #[test]

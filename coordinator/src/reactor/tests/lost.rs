@@ -57,6 +57,26 @@ fn a_worker_that_announced_its_end_is_no_sign_against_its_realizations() {
 }
 
 #[test]
+fn a_suspect_is_not_starved_by_the_queue_of_another_job() {
+    let mut rig = Rig::new();
+    rig.accept(propagation(1));
+    rig.accept(propagation(1000));
+    for worker in 1..4 {
+        rig.event(hello(worker, 1));
+    }
+    // Worker 1 is lost, and with it realization 0 of job 1 and the first four of job 2. Worker 2
+    // is not refilled, worker 3 is.
+    rig.check(end_of_stream(1), &[]);
+    rig.check(answer(2, 3, 4, 4), &[]);
+    rig.check(answer(3, 5, 12, 4), &["send 3: batch 7 = 0+2"]);
+    rig.check(answer(2, 4, 8, 4), &["send 2: batch 8 = 0+1"]);
+    rig.check(
+        answer(2, 8, 0, 1),
+        &["store job 1 evaluation 0", "send 2: batch 9 = 2+2", "send 2: batch 10 = 20+8"],
+    );
+}
+
+#[test]
 fn a_suspect_is_never_copied() {
     let mut rig = Rig::with(1, &[1]);
     rig.event(end_of_stream(1));

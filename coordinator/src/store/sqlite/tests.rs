@@ -2,7 +2,7 @@
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::FailureKind;
+use osteon_common::outcome::{FailureCounts, FailureKind};
 
 use super::*;
 
@@ -24,6 +24,7 @@ fn job(id: u64) -> JobRecord {
         request_id: format!("request {id}"),
         specification: Arc::new(specification),
         accepted: Duration::from_nanos(1_763_000_000_123_456_789),
+        fingerprint: "osteon 1.2.3 numerics 4".to_owned(),
     }
 }
 
@@ -48,6 +49,26 @@ fn end(job: u64) -> EndRecord {
     }
 }
 
+fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord>, StoreError> {
+    let mut all = Vec::new();
+    store.evaluations(JobId(job), 0, &mut |record| {
+        all.push(record);
+        ControlFlow::Continue(())
+    })?;
+    Ok(all)
+}
+
+fn summary(job: u64) -> Summary {
+    let row = |number| osteon_common::results::Evaluation {
+        number,
+        point: evaluation(job, number).point,
+        moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
+        cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
+        failures: FailureCounts::of(&evaluation(job, number).outcomes),
+    };
+    Summary { digest: format!("{job:064x}"), best: Some(1), history: (0..2).map(row).collect() }
+}
+
 #[test]
 fn what_is_put_is_there_after_a_reopening() {
     let directory = tempfile::tempdir().unwrap();
@@ -59,16 +80,18 @@ fn what_is_put_is_there_after_a_reopening() {
         store.put_evaluation(&evaluation(2, 0)).unwrap();
         store.put_evaluation(&evaluation(1, 1)).unwrap();
         store.put_evaluation(&evaluation(1, 0)).unwrap();
-        store.finish_job(&end(1)).unwrap();
+        store.finish_job(&end(1), &summary(1)).unwrap();
     }
     drop(store);
     let mut store = SqliteStore::open(&directory.path().join("made/on/the/way")).unwrap();
     let expected =
         [StoredJob { record: job(1), end: Some(end(1)) }, StoredJob { record: job(2), end: None }];
     assert_eq!(store.jobs().unwrap(), expected);
-    assert_eq!(store.evaluations(JobId(1)).unwrap(), [evaluation(1, 0), evaluation(1, 1)]);
-    assert_eq!(store.evaluations(JobId(2)).unwrap(), [evaluation(2, 0)]);
-    assert_eq!(store.evaluations(JobId(3)).unwrap(), []);
+    assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0), evaluation(1, 1)]);
+    assert_eq!(evaluations(&mut store, 2).unwrap(), [evaluation(2, 0)]);
+    assert_eq!(evaluations(&mut store, 3).unwrap(), []);
+    assert_eq!(store.summary(JobId(1)).unwrap(), Some(summary(1)));
+    assert_eq!(store.summary(JobId(2)).unwrap(), None);
 }
 
 #[test]
@@ -80,13 +103,53 @@ fn a_second_coordinator_is_refused() {
 }
 
 #[test]
-fn a_newer_format_is_refused() {
+fn another_format_is_refused() {
+    for (version, expected) in [
+        (1, "has format 1 of an older version of osteon, this program writes format 2; finish"),
+        (3, "has format 3, this program writes format 2; use a newer version of osteon"),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(directory.path()).unwrap();
+        store.connection.execute("UPDATE format SET version = ?1", [version]).unwrap();
+        drop(store);
+        let error = SqliteStore::open(directory.path()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn evaluations_are_shown_until_the_visitor_breaks() {
     let directory = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(directory.path()).unwrap();
-    store.connection.execute("UPDATE format SET version = 2", []).unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    for number in 0..4 {
+        store.put_evaluation(&evaluation(1, number)).unwrap();
+    }
+    let mut shown = Vec::new();
+    let mut visit = |record: EvaluationRecord| {
+        shown.push(record.number);
+        if shown.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    store.evaluations(JobId(1), 1, &mut visit).unwrap();
+    assert_eq!(shown, [1, 2]);
+}
+
+#[test]
+fn a_job_that_begins_again_has_no_evaluation_and_new_numerics() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for id in [1, 2] {
+        store.put_job(&job(id)).unwrap();
+        store.put_evaluation(&evaluation(id, 0)).unwrap();
+    }
+    store.begin_again(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
     drop(store);
-    let error = SqliteStore::open(directory.path()).unwrap_err();
-    assert!(matches!(error, StoreError::Newer { found: 2, known: 1, .. }), "{error}");
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    let again = JobRecord { fingerprint: "osteon 2.0.0 numerics 5".to_owned(), ..job(1) };
+    let stored = |record| StoredJob { record, end: None };
+    assert_eq!(store.jobs().unwrap(), [again, job(2)].map(stored));
+    assert_eq!(evaluations(&mut store, 1).unwrap(), []);
+    assert_eq!(evaluations(&mut store, 2).unwrap(), [evaluation(2, 0)]);
 }
 
 #[test]
@@ -94,19 +157,38 @@ fn every_damaged_record_is_named() {
     for (sql, record) in [
         ("UPDATE job SET specification = x'00'", DamagedRecord::Specification),
         ("UPDATE job SET checksum = x''", DamagedRecord::Specification),
+        ("UPDATE job SET request_id = 'other'", DamagedRecord::Specification),
+        ("UPDATE job SET accepted_ns = 1", DamagedRecord::Specification),
+        ("UPDATE job SET fingerprint = 'other'", DamagedRecord::Specification),
         ("UPDATE evaluation SET outcomes = zeroblob(27)", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET point = zeroblob(56)", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET number = 8", DamagedRecord::Evaluation(8)),
         ("UPDATE ending SET status = 'done'", DamagedRecord::End),
+        ("UPDATE ending SET status = 'converged'", DamagedRecord::End),
+        ("UPDATE ending SET reason = NULL", DamagedRecord::End),
+        ("UPDATE ending SET reason = ''", DamagedRecord::End),
+        ("UPDATE ending SET version = '1.2.4'", DamagedRecord::End),
+        ("UPDATE ending SET ended_ns = 1", DamagedRecord::End),
+        ("UPDATE ending SET evaluations = 3", DamagedRecord::End),
+        ("UPDATE ending SET best_cost = 0.0", DamagedRecord::End),
+        ("UPDATE ending SET best_mean = 3901.0", DamagedRecord::End),
+        ("UPDATE ending SET best_coefficient_of_variation = 0.2", DamagedRecord::End),
+        ("UPDATE ending SET checksum = x''", DamagedRecord::End),
+        ("UPDATE summary SET digest = ''", DamagedRecord::Summary),
+        ("UPDATE summary SET best = 0", DamagedRecord::Summary),
+        ("UPDATE summary SET best = NULL", DamagedRecord::Summary),
+        ("UPDATE summary SET history = x''", DamagedRecord::Summary),
+        ("UPDATE summary SET checksum = x''", DamagedRecord::Summary),
     ] {
         let directory = tempfile::tempdir().unwrap();
         let mut store = SqliteStore::open(directory.path()).unwrap();
         store.put_job(&job(1)).unwrap();
         store.put_evaluation(&evaluation(1, 7)).unwrap();
-        store.finish_job(&end(1)).unwrap();
+        store.finish_job(&end(1), &summary(1)).unwrap();
         store.connection.execute(sql, []).unwrap();
         let jobs = store.jobs().map(|_| ());
-        let error = jobs.and_then(|()| store.evaluations(JobId(1)).map(|_| ())).unwrap_err();
+        let read = jobs.and_then(|()| evaluations(&mut store, 1).map(|_| ()));
+        let error = read.and_then(|()| store.summary(JobId(1)).map(|_| ())).unwrap_err();
         assert!(
             matches!(&error, StoreError::Damaged { record: found, .. } if *found == record),
             "{sql}: {error}"

@@ -1,0 +1,148 @@
+//! A coordinator that cannot go on: whoever runs it is told, once.
+
+use std::time::Duration;
+
+use thiserror::Error;
+use tokio::sync::watch;
+
+/// Why a running coordinator cannot go on.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Failed {
+    /// The task that owns the jobs ended unasked.
+    #[error("the coordinator's core ended unasked; {START_AGAIN}")]
+    Core,
+    /// The server of its port ended unasked.
+    #[error("the coordinator's server ended unasked; {START_AGAIN}")]
+    Server,
+    /// The thread that writes the store ended unasked.
+    #[error("the thread of the coordinator's store ended unasked; {START_AGAIN}")]
+    Store,
+    /// The store takes no record any more.
+    #[error(
+        "the store has refused a record for {} s: {error}; make room or repair it, then \
+         {START_AGAIN}",
+        waited.as_secs()
+    )]
+    StoreRefuses {
+        /// What the store said last.
+        error: String,
+        /// For how long.
+        waited: Duration,
+    },
+}
+
+const START_AGAIN: &str = "start it again: every job continues from its last stored evaluation";
+
+#[derive(Debug)]
+enum Health {
+    Well,
+    /// Somebody wants it to end: that parts of it end is no failure any more.
+    Stopping,
+    Failed(Failed),
+}
+
+/// Where the parts of a coordinator tell that it cannot go on.
+#[derive(Debug, Clone)]
+pub(crate) struct Failing(watch::Sender<Health>);
+
+/// Held by a part of a coordinator for as long as it lives; tells of its end, by panic or not.
+#[derive(Debug)]
+pub(crate) struct Guard {
+    part: Failed,
+    failing: Failing,
+}
+
+impl Failing {
+    pub(crate) fn new() -> Self {
+        Self(watch::Sender::new(Health::Well))
+    }
+
+    /// The coordinator cannot go on.
+    pub(crate) fn tell(&self, failed: Failed) {
+        self.leave_well(Health::Failed(failed));
+    }
+
+    /// The coordinator is about to be stopped.
+    pub(crate) fn disarm(&self) {
+        self.leave_well(Health::Stopping);
+    }
+
+    pub(crate) fn guard(&self, part: Failed) -> Guard {
+        Guard { part, failing: self.clone() }
+    }
+
+    /// The first that was told; never if there is none.
+    pub(crate) fn first(&self) -> impl Future<Output = Failed> + Send + use<> {
+        let mut health = self.0.subscribe();
+        async move {
+            let failed = |health: &Health| matches!(health, Health::Failed(_));
+            if let Ok(known) = health.wait_for(failed).await
+                && let Health::Failed(failed) = &*known
+            {
+                return failed.clone();
+            }
+            // Nobody is left who could tell.
+            std::future::pending().await
+        }
+    }
+
+    fn leave_well(&self, next: Health) {
+        self.0.send_if_modified(|health| {
+            // The first failure is the cause of the others.
+            let well = matches!(health, Health::Well);
+            if well {
+                *health = next;
+            }
+            well
+        });
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        self.failing.tell(self.part.clone());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::task::Poll;
+
+    use super::*;
+
+    async fn check(what: impl FnOnce(&Failing), expected: Option<Failed>) {
+        let failing = Failing::new();
+        let mut first = std::pin::pin!(failing.first());
+        what(&failing);
+        let told = futures::poll!(&mut first);
+        assert_eq!(told, expected.map_or(Poll::Pending, Poll::Ready));
+    }
+
+    #[tokio::test]
+    async fn the_first_failure_is_told_and_no_stop() {
+        check(|_| {}, None).await;
+        check(|failing| drop(failing.guard(Failed::Core)), Some(Failed::Core)).await;
+        let both = |failing: &Failing| {
+            drop(failing.guard(Failed::Store));
+            drop(failing.guard(Failed::Core));
+        };
+        check(both, Some(Failed::Store)).await;
+        let stopped = |failing: &Failing| {
+            failing.disarm();
+            drop(failing.guard(Failed::Core));
+        };
+        check(stopped, None).await;
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_told() {
+        let failing = Failing::new();
+        let guard = failing.guard(Failed::Server);
+        let panics = async move {
+            let _guard = guard;
+            panic!("a part of the coordinator that this test breaks");
+        };
+        assert!(tokio::spawn(panics).await.is_err());
+        assert_eq!(failing.first().await, Failed::Server);
+    }
+}

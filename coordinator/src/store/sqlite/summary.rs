@@ -1,0 +1,46 @@
+//! The table of summaries.
+
+use osteon_proto::{results, v1};
+use prost::Message as _;
+use rusqlite::{Connection, OptionalExtension as _, params};
+
+use super::checksum;
+use crate::ids::JobId;
+use crate::search::Summary;
+
+/// Writes a summary.
+pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {
+    let rows = summary.history.iter().map(results::evaluation_to_message).collect();
+    let history = v1::HistoryBlock { rows }.encode_to_vec();
+    let checksum = summary_checksum(job, &summary.digest, summary.best, &history);
+    let sql = "INSERT OR REPLACE INTO summary VALUES (?1, ?2, ?3, ?4, ?5)";
+    let values = params![job.0, summary.digest, summary.best, history, checksum];
+    connection.execute(sql, values).map(drop)
+}
+
+/// The summary of a job, if there is one; inside, `None` if it is damaged.
+pub(super) fn get(
+    connection: &Connection,
+    job: JobId,
+) -> rusqlite::Result<Option<Option<Summary>>> {
+    let sql = "SELECT digest, best, history, checksum FROM summary WHERE job = ?1";
+    let read = |row: &rusqlite::Row<'_>| {
+        let (digest, best): (String, Option<u64>) = (row.get(0)?, row.get(1)?);
+        let (history, checksum) = (row.get_ref(2)?.as_blob()?, row.get_ref(3)?.as_blob()?);
+        let intact = checksum == summary_checksum(job, &digest, best, history);
+        let history = intact.then(|| rows(history)).flatten();
+        Ok(history.map(|history| Summary { digest, best, history }))
+    };
+    connection.query_row(sql, params![job.0], read).optional()
+}
+
+fn rows(encoded: &[u8]) -> Option<Vec<osteon_common::results::Evaluation>> {
+    let block = v1::HistoryBlock::decode(encoded).ok()?;
+    block.rows.iter().map(|row| results::evaluation_from_message(row).ok()).collect()
+}
+
+fn summary_checksum(job: JobId, digest: &str, best: Option<u64>, history: &[u8]) -> Vec<u8> {
+    let best = best.map(u64::to_le_bytes);
+    let best = best.as_ref().map_or(&[] as &[u8], <[u8; 8]>::as_slice);
+    checksum(&[&job.0.to_le_bytes(), digest.as_bytes(), best, history])
+}

@@ -1,0 +1,82 @@
+//! What clients hear, and what jobs leave.
+
+use std::sync::Arc;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::results::{JobResult, Status};
+use osteon_common::version::VERSION;
+use osteon_coordinator::effect::Answer;
+use osteon_coordinator::ids::{JobId, Token};
+use osteon_coordinator::leftover;
+use osteon_coordinator::search::{Ending, Search, Step};
+use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
+use osteon_proto::v1::JobState;
+
+use super::World;
+use crate::fake;
+
+impl World {
+    pub(super) fn answered(&mut self, token: Token, answer: &Answer) {
+        if let Some(client) = self.submissions.remove(&token) {
+            match answer {
+                Answer::Submitted(job) => {
+                    assert!(self.stored(*job).is_some(), "not durable");
+                    let known = self.clients[client].job.get_or_insert(*job);
+                    assert_eq!(known, job, "one request, two jobs");
+                }
+                Answer::Refused(_) => {}
+                other => panic!("{other:?} to a submission"),
+            }
+        } else if let Some(client) = self.cancellations.remove(&token) {
+            let Answer::Snapshot(snapshot) = answer else {
+                panic!("{answer:?} to a cancellation");
+            };
+            assert_eq!(snapshot.state(), JobState::Ended);
+            let job = self.clients[client].job.unwrap();
+            assert!(self.stored(job).unwrap().end.is_some(), "not durable");
+            self.clients[client].wants_end = false;
+        }
+    }
+
+    pub(super) fn check_results(&mut self) {
+        let stored = self.store.jobs().unwrap();
+        assert_eq!(stored.len(), self.clients.len(), "a job too many");
+        for StoredJob { record, end } in stored {
+            self.check_result(&record, &end.unwrap());
+        }
+    }
+
+    fn check_result(&mut self, record: &JobRecord, end: &EndRecord) {
+        let left = leftover::read(&mut self.store, record, end).unwrap();
+        let reason = end.ending.reason.as_deref().unwrap_or_default();
+        let expected = if end.ending.status == Status::Cancelled {
+            let client = self.clients.iter().find(|client| client.request_id == record.request_id);
+            assert!(client.unwrap().cancels, "nobody cancelled");
+            self.counts.cancelled += 1;
+            broken_run(&record.specification, left.history.len(), &end.ending)
+        } else if reason.starts_with("integrity error") {
+            assert!(self.lied, "nobody lied");
+            self.counts.exposed += 1;
+            broken_run(&record.specification, left.history.len(), &end.ending)
+        } else {
+            fake::plain_run(&record.specification)
+        };
+        // As text: an unknown standard error is NaN, which equals nothing.
+        assert_eq!(format!("{:?}", left.result), format!("{expected:?}"));
+    }
+
+    fn stored(&self, job: JobId) -> Option<StoredJob> {
+        self.store.clone().jobs().unwrap().into_iter().find(|stored| stored.record.job == job)
+    }
+}
+
+/// What the loop has found when it is broken off after so many evaluations.
+fn broken_run(specification: &JobSpecification, evaluations: usize, ending: &Ending) -> JobResult {
+    let mut search = Search::new(Arc::new(specification.clone()));
+    for _ in 0..evaluations {
+        if let Step::Evaluate(point) = search.ask() {
+            search.tell(fake::all_outcomes(specification, point));
+        }
+    }
+    search.result(ending, VERSION)
+}
