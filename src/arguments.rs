@@ -117,9 +117,9 @@ pub(crate) struct CoordinatorArguments {
 /// Of `worker`.
 #[derive(Debug, Args)]
 pub(crate) struct WorkerArguments {
-    /// The coordinator: http://HOST:PORT or unix:PATH
-    #[arg(long, value_name = "URL", env = "OSTEON_COORDINATOR")]
-    pub(crate) coordinator: Endpoint,
+    /// The coordinator: http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
+    #[arg(long, value_name = "URL")]
+    pub(crate) coordinator: Option<Endpoint>,
     /// Threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
@@ -134,9 +134,9 @@ pub(crate) struct WorkerArguments {
 /// Of every command that speaks to a coordinator.
 #[derive(Debug, Args)]
 pub(crate) struct ClientArguments {
-    /// The coordinator: http://HOST:PORT or unix:PATH
-    #[arg(long, value_name = "URL", env = "OSTEON_COORDINATOR")]
-    pub(crate) coordinator: Endpoint,
+    /// The coordinator: http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
+    #[arg(long, value_name = "URL")]
+    pub(crate) coordinator: Option<Endpoint>,
 }
 
 /// Of `submit`.

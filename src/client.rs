@@ -44,6 +44,14 @@ pub(crate) enum ClientError {
         /// What the transport says.
         reason: String,
     },
+    /// It says that it cannot do it now.
+    #[error("the coordinator at {endpoint} cannot do it now: {reason}")]
+    Unavailable {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// Why it cannot.
+        reason: String,
+    },
     /// It refuses the specification.
     #[error("the coordinator refuses the job:{}", indented(.0))]
     Violations(Violations),
@@ -161,7 +169,10 @@ impl Client {
             };
             let gone = matches!(
                 error,
-                ClientError::Lost { .. } | ClientError::Connect(_) | ClientError::Unanswered { .. }
+                ClientError::Lost { .. }
+                    | ClientError::Unavailable { .. }
+                    | ClientError::Connect(_)
+                    | ClientError::Unanswered { .. }
             );
             let since = *lost_since.get_or_insert_with(Instant::now);
             if !gone || since.elapsed() >= answer_limit() {
@@ -261,14 +272,15 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
         return ClientError::Violations(violations);
     }
     let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
+    // What the coordinator itself answers has no source: that is an error of the transport.
+    let answered = std::error::Error::source(status).is_none();
     match status.code() {
+        Code::Unavailable if answered => ClientError::Unavailable { endpoint, reason },
         Code::Unavailable | Code::Unknown | Code::Cancelled | Code::DeadlineExceeded => {
             ClientError::Lost { endpoint, reason }
         }
         // tonic reports a broken HTTP/2 connection so.
-        Code::Internal if std::error::Error::source(status).is_some() => {
-            ClientError::Lost { endpoint, reason }
-        }
+        Code::Internal if !answered => ClientError::Lost { endpoint, reason },
         code => ClientError::Refused { endpoint, code, reason },
     }
 }
@@ -327,5 +339,29 @@ impl Parts {
             result: results::from_message(&result, self.outcomes)?,
             history: self.history,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    #[test]
+    fn an_answer_is_told_from_a_loss() {
+        let endpoint: Endpoint = "unix:a".parse().unwrap();
+        let shown = |status: &Status| refused(&endpoint, status).to_string();
+        let answered = Status::unavailable("the store is full");
+        assert_eq!(
+            shown(&answered),
+            "the coordinator at unix:a cannot do it now: the store is full"
+        );
+        for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
+            broken.set_source(Arc::new(std::io::Error::other("reset")));
+            assert_eq!(shown(&broken), "lost the coordinator at unix:a: reset");
+        }
+        let refusal = shown(&Status::already_exists("taken"));
+        assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
     }
 }

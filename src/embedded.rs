@@ -5,6 +5,7 @@ mod workers;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
+use std::time::Duration;
 
 use anyhow::Context as _;
 use osteon_coordinator::store::Store;
@@ -19,6 +20,8 @@ use crate::ending::Failure;
 
 /// Longest directory of temporary files that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;
+/// A run ends when its store has taken nothing for this long, s; the same command continues it.
+const STORE_PATIENCE_S: u64 = 10;
 
 /// Where the coordinator keeps its jobs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,9 +65,12 @@ impl Embedded {
         &self.endpoint
     }
 
-    /// Completes when the workers cannot go on.
-    pub(crate) async fn workers_failed(&mut self) -> Failure {
-        self.workers.failed().await
+    /// Completes when the workers or the coordinator cannot go on.
+    pub(crate) async fn failed(&mut self) -> Failure {
+        tokio::select! {
+            failure = self.workers.failed() => failure,
+            failed = self.coordinator.failed() => Failure::failed(failed),
+        }
     }
 
     /// Ends and reaps the workers, then the coordinator.
@@ -81,7 +87,9 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
         StorePlace::Memory => Box::new(MemoryStore::new()),
         StorePlace::Directory(path) => Box::new(SqliteStore::open(&path).map_err(Failure::failed)?),
     };
-    osteon_coordinator::start(listener, store, Config::default()).await.map_err(Failure::failed)
+    let store_patience = Some(Duration::from_secs(STORE_PATIENCE_S));
+    let config = Config { store_patience, ..Config::default() };
+    osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
 }
 
 /// A directory that only this user can enter.

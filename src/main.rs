@@ -13,6 +13,7 @@ mod progress;
 mod resolved;
 mod results_directory;
 mod signals;
+mod verdict;
 
 use std::io::Write as _;
 use std::process::ExitCode;

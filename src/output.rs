@@ -22,8 +22,6 @@ pub(crate) struct ShownResult<'a> {
     pub(crate) specification: &'a JobSpecification,
     /// The text of `result.json`.
     pub(crate) json: &'a str,
-    /// Why the job failed, where a coordinator said so.
-    pub(crate) reason: Option<&'a str>,
     /// Where the files are, if they are kept.
     pub(crate) directory: Option<&'a Path>,
 }

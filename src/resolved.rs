@@ -1,20 +1,25 @@
 //! What the command line means: environment and defaults resolved, files not yet read.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_proto::endpoint::Endpoint;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, ClientArguments, Command, CoordinatorArguments, DrawArguments, RunArguments,
-    SimulateArguments, SubmitArguments, WorkerArguments,
+    Arguments, Command, CoordinatorArguments, DrawArguments, RunArguments, SimulateArguments,
+    SubmitArguments, WorkerArguments,
 };
 use crate::ending::Failure;
 
 /// Worker processes of a run on this machine, unless given.
 const WORKERS_DEFAULT: u32 = 2;
+
+/// Where the environment names the coordinator.
+const VARIABLE: &str = "OSTEON_COORDINATOR";
 
 /// Format of what goes to stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,32 +125,41 @@ impl Resolved {
     pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, Failure> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let cores = u32::try_from(cores).unwrap_or(1);
-        let environment = std::env::var("OSTEON_COORDINATOR").ok();
+        let environment = environment(std::env::var_os(VARIABLE))?;
+        let coordinator = |flag| resolve_coordinator(flag, environment.as_deref());
         Ok(match arguments.command {
             Command::Identify(run) => {
-                Self::Run(resolve_run(JobKind::Identification, run, cores, environment)?)
+                Self::Run(resolve_run(JobKind::Identification, run, cores, environment.as_deref())?)
             }
             Command::Propagate(run) => {
-                Self::Run(resolve_run(JobKind::Propagation, run, cores, environment)?)
+                Self::Run(resolve_run(JobKind::Propagation, run, cores, environment.as_deref())?)
             }
             Command::Simulate(arguments) => Self::Simulate(arguments),
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => Self::Worker(resolve_worker(arguments, cores)),
-            Command::Submit(arguments) => resolve_submit(arguments),
+            Command::Worker(arguments) => {
+                let endpoint = coordinator(arguments.coordinator.clone())?;
+                Self::Worker(resolve_worker(&arguments, endpoint, cores))
+            }
+            Command::Submit(arguments) => {
+                let endpoint = coordinator(arguments.client.coordinator.clone())?;
+                resolve_submit(arguments, endpoint)
+            }
             Command::Jobs(arguments) => Self::Jobs {
-                coordinator: arguments.client.coordinator,
+                coordinator: coordinator(arguments.client.coordinator)?,
                 format: format(arguments.json),
             },
-            Command::Watch(arguments) => {
-                Self::Watch { job: arguments.job, coordinator: arguments.client.coordinator }
-            }
-            Command::Cancel(arguments) => {
-                Self::Cancel { job: arguments.job, coordinator: arguments.client.coordinator }
-            }
+            Command::Watch(arguments) => Self::Watch {
+                job: arguments.job,
+                coordinator: coordinator(arguments.client.coordinator)?,
+            },
+            Command::Cancel(arguments) => Self::Cancel {
+                job: arguments.job,
+                coordinator: coordinator(arguments.client.coordinator)?,
+            },
             Command::Fetch(arguments) => Self::Fetch {
                 job: arguments.job,
-                coordinator: arguments.client.coordinator,
+                coordinator: coordinator(arguments.client.coordinator)?,
                 out: arguments.out,
             },
         })
@@ -165,20 +179,45 @@ pub(crate) fn format(json: bool) -> Format {
     if json { Format::Json } else { Format::Text }
 }
 
+/// The address in the environment; an empty one counts as none.
+fn environment(value: Option<OsString>) -> Result<Option<String>, Failure> {
+    let text = value.map(OsString::into_string).transpose();
+    let text =
+        text.map_err(|value| Failure::bad_input(anyhow!("in {VARIABLE}: {value:?} is no text")))?;
+    Ok(text.filter(|url| !url.is_empty()))
+}
+
+/// The coordinator that a command cannot do without.
+fn resolve_coordinator(
+    flag: Option<Endpoint>,
+    environment: Option<&str>,
+) -> Result<Endpoint, Failure> {
+    match (flag, environment) {
+        (Some(endpoint), _) => Ok(endpoint),
+        (None, Some(url)) => parse_environment(url),
+        (None, None) => Err(Failure::bad_input(anyhow!(
+            "no coordinator is given; use --coordinator URL or set {VARIABLE}"
+        ))),
+    }
+}
+
+fn parse_environment(url: &str) -> Result<Endpoint, Failure> {
+    url.parse::<Endpoint>().map_err(|error| {
+        Failure::bad_input(anyhow::Error::new(error).context(format!("in {VARIABLE}")))
+    })
+}
+
 fn resolve_run(
     kind: JobKind,
     arguments: RunArguments,
     cores: u32,
-    environment: Option<String>,
+    environment: Option<&str>,
 ) -> Result<Run, Failure> {
     let RunArguments { job, workers, threads, coordinator, out, json } = arguments;
     let here = workers.is_some() || threads.is_some();
-    let environment = environment.filter(|url| !url.is_empty());
     let there = match (coordinator, environment) {
         (Some(endpoint), _) => Some(endpoint),
-        (None, Some(url)) if !here => Some(url.parse::<Endpoint>().map_err(|error| {
-            Failure::bad_input(anyhow::Error::new(error).context("in OSTEON_COORDINATOR"))
-        })?),
+        (None, Some(url)) if !here => Some(parse_environment(url)?),
         _ => None,
     };
     let place = there.map_or_else(
@@ -191,18 +230,17 @@ fn resolve_run(
     Ok(Run { kind, job, place, out, format: format(json) })
 }
 
-fn resolve_worker(arguments: WorkerArguments, cores: u32) -> WorkerConfig {
+fn resolve_worker(arguments: &WorkerArguments, endpoint: Endpoint, cores: u32) -> WorkerConfig {
     WorkerConfig {
-        endpoint: arguments.coordinator,
+        endpoint,
         threads: arguments.threads.unwrap_or(cores),
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
     }
 }
 
-fn resolve_submit(arguments: SubmitArguments) -> Resolved {
-    let SubmitArguments { job, client, propagate, request_id, json } = arguments;
-    let ClientArguments { coordinator } = client;
+fn resolve_submit(arguments: SubmitArguments, coordinator: Endpoint) -> Resolved {
+    let SubmitArguments { job, client: _, propagate, request_id, json } = arguments;
     Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
@@ -224,7 +262,8 @@ mod tests {
         let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
             panic!("{line} is no run");
         };
-        let environment = environment.map(str::to_owned);
+        let environment = super::environment(environment.map(OsString::from)).unwrap();
+        let environment = environment.as_deref();
         resolve_run(JobKind::Identification, arguments, cores, environment).unwrap()
     }
 
@@ -267,10 +306,28 @@ mod tests {
             panic!("no run");
         };
         let failure =
-            resolve_run(JobKind::Identification, arguments, 2, Some("nowhere".to_owned()))
-                .unwrap_err();
+            resolve_run(JobKind::Identification, arguments, 2, Some("nowhere")).unwrap_err();
         assert_eq!(failure.exit_code(), 2);
         assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
         assert!(failure.to_string().contains("`nowhere`"), "{failure}");
+    }
+
+    #[test]
+    fn a_client_needs_a_coordinator_and_an_empty_variable_is_none() {
+        let resolved = |flag: Option<&str>, variable: Option<&str>| {
+            let environment = super::environment(variable.map(OsString::from))?;
+            let flag = flag.map(|url| url.parse().unwrap());
+            resolve_coordinator(flag, environment.as_deref()).map(|endpoint| endpoint.to_string())
+        };
+        assert_eq!(resolved(Some("unix:a"), Some("unix:b")).unwrap(), "unix:a");
+        assert_eq!(resolved(Some("unix:a"), Some("")).unwrap(), "unix:a");
+        assert_eq!(resolved(None, Some("unix:b")).unwrap(), "unix:b");
+        for (variable, expected) in
+            [(None, "--coordinator URL"), (Some(""), "--coordinator URL"), (Some("b"), "`b`")]
+        {
+            let failure = resolved(None, variable).unwrap_err();
+            assert_eq!(failure.exit_code(), 2);
+            assert!(failure.to_string().contains(expected), "{failure}");
+        }
     }
 }

@@ -1,18 +1,23 @@
 //! The directory of a run: what stands in it, and in which order it is written.
 //!
 //! `job.toml` is written first, when the job is accepted, and `result.json` last, by rename: a
-//! directory with a `result.json` is complete.
+//! directory with a `result.json` is complete. What serves to continue (`store`, `.request`) goes
+//! only after that, and only when there is nothing to continue: the result is not that of a
+//! cancelled job.
 
 use std::fs::{self, File, TryLockError};
 use std::io::Write as _;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::results::Status;
 use osteon_common::{job_file, results_csv, results_json};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
+use crate::verdict;
 
 const JOB: &str = "job.toml";
 const RESULT: &str = "result.json";
@@ -21,12 +26,14 @@ const REALIZATIONS: &str = "realizations.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
 const STORE: &str = "store";
+/// Most attempts to lock a directory whose lock is removed by one run after another.
+const LOCK_ATTEMPTS_MAX: u32 = 100;
 
 /// A directory of results, held by this process alone.
 #[derive(Debug)]
 pub(crate) struct ResultsDirectory {
     path: PathBuf,
-    /// Held until the end.
+    /// Held until the end, when its file is removed.
     _lock: File,
 }
 
@@ -39,12 +46,12 @@ pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
 }
 
 impl ResultsDirectory {
-    /// The text of `result.json` if `path` holds the finished run of `specification`; `None` if
-    /// there is no run, or one that did not end.
+    /// The text of `result.json` if `path` holds a result of `specification`, be it that of a
+    /// cancelled job; `None` if there is no run, or one that did not end.
     ///
     /// # Errors
     /// Bad input when another specification was run there; failed when it cannot be read.
-    pub(crate) fn finished(
+    pub(crate) fn stored(
         path: &Path,
         specification: &JobSpecification,
     ) -> Result<Option<String>, Failure> {
@@ -64,7 +71,20 @@ impl ResultsDirectory {
         Ok(result)
     }
 
-    /// Makes the directory, if there is none, and holds it.
+    /// As [`stored`](Self::stored), of runs that have ended by themselves only: what a run shows
+    /// again instead of running.
+    ///
+    /// # Errors
+    /// As [`stored`](Self::stored).
+    pub(crate) fn finished(
+        path: &Path,
+        specification: &JobSpecification,
+    ) -> Result<Option<String>, Failure> {
+        Ok(Self::stored(path, specification)?.filter(|json| !verdict::is_cancelled(json)))
+    }
+
+    /// Makes the directory, if there is none, and holds it. What was stored there before may
+    /// have changed by then.
     ///
     /// # Errors
     /// When another process holds it, or it cannot be written.
@@ -76,18 +96,21 @@ impl ResultsDirectory {
         fs::create_dir_all(path)
             .with_context(|| format!("cannot create the directory {}", path.display()))?;
         let lock_path = path.join(LOCK);
-        let lock = File::create(&lock_path)
-            .with_context(|| format!("cannot write {}", lock_path.display()))?;
-        match lock.try_lock() {
-            Ok(()) => Ok(Self { path: path.to_owned(), _lock: lock }),
-            Err(TryLockError::WouldBlock) => {
-                bail!("another osteon is running in {}", path.display())
-            }
-            Err(TryLockError::Error(error)) => {
-                Err(anyhow::Error::new(error)
-                    .context(format!("cannot lock {}", lock_path.display())))
+        for _ in 0..LOCK_ATTEMPTS_MAX {
+            let lock = File::create(&lock_path)
+                .with_context(|| format!("cannot write {}", lock_path.display()))?;
+            match lock.try_lock() {
+                // A run that ended meanwhile has removed the file: its lock locks nothing.
+                Ok(()) if !is_at(&lock, &lock_path) => {}
+                Ok(()) => return Ok(Self { path: path.to_owned(), _lock: lock }),
+                Err(TryLockError::WouldBlock) => break,
+                Err(TryLockError::Error(error)) => {
+                    return Err(anyhow::Error::new(error)
+                        .context(format!("cannot lock {}", lock_path.display())));
+                }
             }
         }
+        bail!("another osteon is running in {}", path.display())
     }
 
     /// Where a store of this run is kept until it has ended.
@@ -108,6 +131,13 @@ impl ResultsDirectory {
         Ok(id)
     }
 
+    /// Makes the next [`request_id`](Self::request_id) a new one: the job of the present one has
+    /// nothing more to give.
+    pub(crate) fn forget_request(&self) {
+        // A leftover does no harm but to show the same end again.
+        drop(fs::remove_file(self.path.join(REQUEST)));
+    }
+
     /// Writes `job.toml`: from now on the directory belongs to this specification.
     pub(crate) fn write_job(&self, specification: &JobSpecification) -> Result<(), Failure> {
         write(&self.path.join(JOB), &job_file::to_toml(specification)).map_err(Failure::Failed)
@@ -121,6 +151,7 @@ impl ResultsDirectory {
     ) -> Result<String, Failure> {
         let text = result_json(kind, fetched);
         let write_all = || -> anyhow::Result<()> {
+            remove_if_there(&self.path.join(RESULT))?;
             write(&self.path.join(JOB), &job_file::to_toml(&fetched.specification))?;
             if kind == JobKind::Identification {
                 write(&self.path.join(HISTORY), &results_csv::history(&fetched.history))?;
@@ -131,35 +162,62 @@ impl ResultsDirectory {
             write(&self.path.join(RESULT), &text)
         };
         write_all().map_err(Failure::Failed)?;
-        // What served only to continue is not needed any more; a leftover does no harm.
-        for name in [REQUEST, LOCK] {
-            drop(fs::remove_file(self.path.join(name)));
+        if fetched.result.status != Status::Cancelled {
+            // What served only to continue is not needed any more; a leftover does no harm.
+            self.forget_request();
+            drop(fs::remove_dir_all(self.store()));
         }
-        drop(fs::remove_dir_all(self.store()));
         Ok(text)
     }
 }
 
+impl Drop for ResultsDirectory {
+    fn drop(&mut self) {
+        // Last of all, and still locked; a leftover does no harm.
+        drop(fs::remove_file(self.path.join(LOCK)));
+    }
+}
+
+/// Whether `file` is what stands at `path`.
+fn is_at(file: &File, path: &Path) -> bool {
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(ours), Ok(there)) => (ours.dev(), ours.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
+/// The job whose results `directory` holds, read as one of `kind`.
+///
+/// # Errors
+/// When there is none, or it cannot be read.
+pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
+    Ok(job_file::read(&directory.join(JOB), kind)?)
+}
+
 /// Refuses a directory whose job is not `specification`, and says where they differ.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    let ours = job_file::to_toml(specification);
-    if stored == ours {
-        return Ok(());
+    match difference(stored, &job_file::to_toml(specification)) {
+        None => Ok(()),
+        Some(difference) => Err(Failure::bad_input(anyhow!(
+            "{} belongs to a different specification ({difference}); \
+             choose another --out directory",
+            path.display()
+        ))),
     }
-    let different = stored.lines().zip(ours.lines()).position(|(a, b)| a != b);
-    let line = different.unwrap_or_else(|| stored.lines().count().min(ours.lines().count()));
+}
+
+/// The first line in which the complete texts of two jobs differ, in words.
+pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
+    if there == here {
+        return None;
+    }
+    let different = there.lines().zip(here.lines()).position(|(a, b)| a != b);
+    let line = different.unwrap_or_else(|| there.lines().count().min(here.lines().count()));
     let shown = |text: &str| {
         let line = text.lines().nth(line).unwrap_or("(nothing)");
         line.chars().take(80).collect::<String>()
     };
-    Err(Failure::bad_input(anyhow!(
-        "{} belongs to a different specification (line {}: `{}` there, `{}` here); \
-         choose another --out directory",
-        path.display(),
-        line + 1,
-        shown(stored),
-        shown(&ours)
-    )))
+    Some(format!("line {}: `{}` there, `{}` here", line + 1, shown(there), shown(here)))
 }
 
 /// Writes `text` to `path` so that a reader sees either what was there before, or all of it.
@@ -174,6 +232,15 @@ pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
         fs::rename(&part, path)
     };
     write().with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn remove_if_there(path: &Path) -> anyhow::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot replace {}", path.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
@@ -191,3 +258,6 @@ fn random_id() -> String {
     let half = |salt: u8| RandomState::new().hash_one((process, salt));
     format!("{:016x}{:016x}", half(0), half(1))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,8 @@
 //! `identify` and `propagate` on worker processes of their own: same bits however many work,
 //! results kept and continued, nothing left behind.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -8,10 +10,14 @@ mod support;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 use std::sync::OnceLock;
 
 use serde_json::Value;
-use support::{Owned, Scratch, children, eventually, is_alive, job, osteon, run, signal, text};
+use support::{
+    Coordinator, Owned, Scratch, children, eventually, is_alive, job, option, osteon, run, signal,
+    text,
+};
 
 #[test]
 fn the_digest_does_not_depend_on_who_computes() {
@@ -82,6 +88,14 @@ fn a_finished_directory_is_shown_again_and_another_job_refused() {
     let refused = run(&["propagate", text(&first), "--out", text(&out)]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert_eq!(modified(), before);
+
+    // A realization of its best point is one of its own job.
+    let draw = |job: &Path| run(&["draw", text(job), "--index", "3", "--at", text(&out)]);
+    let drawn = draw(&first);
+    assert!(drawn.succeeded().contains("mandel"), "{drawn:?}");
+    let refused = draw(&other);
+    assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{refused:?}");
+    assert!(refused.stderr.contains("realizations = 31"), "{refused:?}");
 }
 
 #[test]
@@ -99,7 +113,7 @@ fn the_stored_job_is_complete_and_runs_to_the_same_bits() {
 
 /// A search of a few seconds.
 fn long_job() -> String {
-    job(100, 60)
+    job(60, 50)
 }
 
 /// The result of [`long_job`] without any disturbance.
@@ -112,54 +126,118 @@ fn undisturbed() -> &'static Value {
     })
 }
 
-/// A long run in `out`, seen to have completed some evaluations.
-fn long_run(scratch: &Scratch, out: &Path) -> (Owned, Vec<u32>) {
-    let job = scratch.write("long.toml", &long_job());
-    let mut command = osteon();
-    command.args(["identify", text(&job), "--json", "--out", text(out)]);
-    let process = Owned::spawn(&mut command);
-    let mut workers = Vec::new();
-    eventually("two workers run", || {
-        workers = children(process.id());
-        workers.len() == 2
+/// A run of [`long_job`] in `out`.
+struct LongRun {
+    process: Owned,
+    workers: Vec<u32>,
+    /// Of its coordinator.
+    url: String,
+}
+
+impl LongRun {
+    fn start(scratch: &Scratch, out: &Path) -> Self {
+        let job = scratch.write("long.toml", &long_job());
+        let mut command = osteon();
+        command.args(["identify", text(&job), "--json", "--out", text(out)]);
+        let process = Owned::spawn(&mut command);
+        let (mut workers, mut url) = (Vec::new(), None);
+        eventually("two workers run", || {
+            workers = children(process.id());
+            url = workers.first().and_then(|&worker| option(worker, "--coordinator"));
+            workers.len() == 2 && url.is_some()
+        });
+        Self { process, workers, url: url.unwrap() }
+    }
+
+    /// As [`start`](Self::start), with some evaluations stored; their number.
+    fn under_way(scratch: &Scratch, out: &Path) -> (Self, u64) {
+        let run = Self::start(scratch, out);
+        let mut stored = 0;
+        eventually("some evaluations are stored", || {
+            stored = only_evaluations(&run.url).unwrap_or(0);
+            stored >= 3
+        });
+        (run, stored)
+    }
+}
+
+/// Stored evaluations of the only job at `url`; `None` while there is none.
+fn only_evaluations(url: &str) -> Option<u64> {
+    let listed = run(&["jobs", "--json", "--coordinator", url]);
+    let jobs: Vec<Value> = serde_json::from_str(&listed.stdout).ok()?;
+    assert!(jobs.len() <= 1, "{jobs:?}");
+    jobs.first().map(|job| job["evaluations"].as_u64().unwrap())
+}
+
+/// Continues the run in `out`: what was stored is there without any worker, and the job that is
+/// continued is the one that stored it.
+fn continues(scratch: &Scratch, out: &Path, stored: u64) {
+    assert!(!out.join("result.json").exists());
+    let idle = Coordinator::start(&out.join("store"));
+    let found = only_evaluations(&idle.url);
+    assert!(found >= Some(stored), "{found:?} of {stored} evaluations");
+    drop(idle);
+
+    let mut run = LongRun::start(scratch, out);
+    let mut first = None;
+    eventually("the job goes on", || {
+        first = only_evaluations(&run.url);
+        first.is_some()
     });
-    eventually("the job is accepted", || out.join("job.toml").exists());
-    (process, workers)
+    assert!(first >= found, "{first:?} of {found:?} evaluations");
+    assert_eq!(run.process.code(), Some(0));
+    let result = fs::read_to_string(out.join("result.json")).unwrap();
+    assert_eq!(&serde_json::from_str::<Value>(&result).unwrap(), undisturbed());
 }
 
 #[test]
 fn an_interrupted_run_ends_its_workers_and_can_be_continued() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
-    let (mut process, workers) = long_run(&scratch, &out);
+    let (LongRun { mut process, workers, .. }, stored) = LongRun::under_way(&scratch, &out);
     process.signal("TERM");
     assert_eq!(process.code(), Some(1));
     // They were reaped by their parent before it ended.
     assert!(workers.iter().all(|&worker| !is_alive(worker)), "{workers:?}");
-    assert!(!out.join("result.json").exists());
-
-    let job = scratch.path("long.toml");
-    let continued = run(&["identify", text(&job), "--json", "--out", text(&out)]).json();
-    assert_eq!(&continued, undisturbed());
+    continues(&scratch, &out, stored);
 }
 
 #[test]
 fn workers_of_a_killed_run_go_away_and_it_can_be_continued() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
-    let (mut process, workers) = long_run(&scratch, &out);
+    let (LongRun { mut process, workers, .. }, stored) = LongRun::under_way(&scratch, &out);
     process.kill();
     eventually("the workers leave", || workers.iter().all(|&worker| !is_alive(worker)));
-    let job = scratch.path("long.toml");
-    let continued = run(&["identify", text(&job), "--json", "--out", text(&out)]).json();
-    assert_eq!(&continued, undisturbed());
+    continues(&scratch, &out, stored);
+}
+
+#[test]
+fn a_run_whose_store_is_full_says_so_and_can_be_continued() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let job = scratch.write("long.toml", &long_job());
+    // No file may grow beyond 128 KiB: there is room for some evaluations.
+    let limited = "trap '' XFSZ; ulimit -f 128; exec \"$@\"";
+    let program = osteon();
+    let output = Command::new("bash")
+        .args(["-c", limited, "bash"])
+        .arg(program.get_program())
+        .args(["identify", text(&job), "--json", "--out", text(&out)])
+        .env_remove("OSTEON_COORDINATOR")
+        .output()
+        .unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{stderr}");
+    assert!(stderr.contains("store has refused a record"), "{stderr}");
+    continues(&scratch, &out, 3);
 }
 
 #[test]
 fn a_killed_worker_is_replaced() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
-    let (mut process, workers) = long_run(&scratch, &out);
+    let (LongRun { mut process, workers, .. }, _) = LongRun::under_way(&scratch, &out);
     signal(workers[0], "KILL");
     eventually("another worker is started", || {
         let now = children(process.id());
@@ -174,7 +252,7 @@ fn a_killed_worker_is_replaced() {
 fn two_runs_do_not_share_a_directory() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
-    let (_process, _) = long_run(&scratch, &out);
+    let _running = LongRun::under_way(&scratch, &out);
     let job = scratch.path("long.toml");
     let second = run(&["identify", text(&job), "--out", text(&out)]);
     assert_eq!(second.code, Some(1), "{second:?}");

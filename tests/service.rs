@@ -89,6 +89,51 @@ fn a_cancelled_job_ends_and_says_so() {
 }
 
 #[test]
+fn a_cancelled_result_gives_way_to_a_finished_one() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let file = file.to_str().unwrap();
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let cancelled = |arguments: &[&str]| {
+        let id = coordinator.client(arguments).succeeded().trim_end().to_owned();
+        coordinator.client(&["cancel", &id]).succeeded();
+        coordinator.client(&["watch", &id]);
+        id
+    };
+    let out = scratch.path("out");
+    let fetch = |id: &str| coordinator.client(&["fetch", id, "--out", out.to_str().unwrap()]);
+    let status = || {
+        let text = fs::read_to_string(out.join("result.json")).unwrap();
+        serde_json::from_str::<Value>(&text).unwrap()["status"].clone()
+    };
+
+    // A propagation that did not complete its evaluation has no result.
+    let propagation = fetch(&cancelled(&["submit", file, "--propagate"]));
+    assert_eq!(propagation.code, Some(1), "{propagation:?}");
+    assert!(propagation.stderr.contains("was cancelled"), "{propagation:?}");
+    assert!(!out.exists());
+
+    let first = cancelled(&["submit", file]);
+    fetch(&first).succeeded();
+    assert_eq!(status(), "cancelled");
+    let _worker = coordinator.worker(2);
+    coordinator.client(&["identify", file, "--out", out.to_str().unwrap()]).succeeded();
+    assert_eq!(status(), "max_evaluations");
+    let refused = fetch(&first);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.stderr.contains("another result of this job"), "{refused:?}");
+    assert_eq!(status(), "max_evaluations");
+
+    fs::remove_dir_all(&out).unwrap();
+    fetch(&first).succeeded();
+    let second = coordinator.submit(std::path::Path::new(file));
+    coordinator.client(&["watch", &second]).succeeded();
+    fetch(&second).succeeded();
+    assert_eq!(status(), "max_evaluations");
+    fetch(&second).succeeded();
+}
+
+#[test]
 fn unknown_jobs_are_named() {
     let scratch = Scratch::new();
     let coordinator = Coordinator::start(&scratch.path("store"));

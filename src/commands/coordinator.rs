@@ -13,7 +13,7 @@ use crate::resolved::Format;
 use crate::results_directory;
 use crate::signals;
 
-/// Serves until SIGINT or SIGTERM. The URL in use is printed, and stands in DIR/address.
+/// Serves until SIGINT or SIGTERM, or until a part of it has ended unasked. The URL in use is printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
     let interruption = signals::interruption()?;
@@ -33,13 +33,16 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     results_directory::write(&address_file, &format!("{}\n", coordinator.url()))
         .map_err(Failure::Failed)?;
     let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
-    if printed.is_ok() {
-        interruption.await;
-    }
+    let served = match printed {
+        Ok(()) => tokio::select! {
+            () = interruption => Ok(Ending::Done),
+            failed = coordinator.failed() => Err(Failure::failed(failed)),
+        },
+        Err(error) => Err(stdout_failure(error)),
+    };
     drop(fs::remove_file(&address_file));
     coordinator.shutdown().await;
-    printed.map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    served
 }
 
 fn bind_failure(error: BindError) -> Failure {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
 use osteon_common::case::Case;
-use osteon_common::job::JobKind;
+use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 use osteon_common::{case_file, job_file, results_json};
@@ -13,6 +13,7 @@ use crate::arguments::DrawArguments;
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::resolved::Format;
+use crate::results_directory;
 
 /// Prints the case file.
 pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
@@ -26,7 +27,11 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
         )));
     }
     let point = match &arguments.at {
-        Some(directory) => best_point(directory).map_err(Failure::BadInput)?,
+        Some(directory) => {
+            let point = best_point(directory).map_err(Failure::BadInput)?;
+            same_job(directory, &arguments.job, &specification).map_err(Failure::BadInput)?;
+            point
+        }
         None => specification.start(),
     };
     let ensemble =
@@ -39,6 +44,26 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
     let text = case_file::to_toml(&Case { setup: specification.setup, bone });
     output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
     Ok(Ending::Done)
+}
+
+/// Refuses a directory whose results are not those of the job: the realizations of its best point
+/// would be others. Without data a job is compared in all the rest, on which realizations depend.
+fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> anyhow::Result<()> {
+    let searched = job_file::read(job, JobKind::Identification).ok();
+    let here = searched.as_ref().unwrap_or(specification);
+    let there = results_directory::job_of(directory, here.kind)
+        .with_context(|| format!("cannot tell whose results {} holds", directory.display()))?;
+    let different =
+        results_directory::difference(&job_file::to_toml(&there), &job_file::to_toml(here));
+    match different {
+        None => Ok(()),
+        Some(difference) => Err(anyhow!(
+            "{} holds the results of another job than {} ({difference}); give the job that was run \
+             there",
+            directory.display(),
+            job.display()
+        )),
+    }
 }
 
 fn best_point(directory: &Path) -> anyhow::Result<Point> {

@@ -9,13 +9,15 @@ use osteon_common::job_file;
 use osteon_common::results::Status;
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
+use serde_json::Value;
 use tonic::Code;
 
-use crate::client::{self, Client, ClientError};
+use crate::client::{self, Client, ClientError, Fetched};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::resolved::Format;
-use crate::results_directory::ResultsDirectory;
+use crate::results_directory::{self, ResultsDirectory};
+use crate::verdict;
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -79,14 +81,52 @@ pub(super) async fn fetch(
             }
             _ => Failure::from(error),
         })?;
+    if let Some(missing) = verdict::missing_result(&fetched) {
+        return Err(Failure::failed(anyhow!("job {job}: {missing}")));
+    }
     let specification = &fetched.specification;
-    // The same specification has the same result: a finished directory is left as it is.
-    if ResultsDirectory::finished(out, specification)?.is_none() {
-        ResultsDirectory::open(out)?.write_results(specification.kind, &fetched)?;
+    // Looked at before anything is made there, and again when nobody else can change it.
+    ResultsDirectory::stored(out, specification)?;
+    let directory = ResultsDirectory::open(out)?;
+    let stored = ResultsDirectory::stored(out, specification)?;
+    let wanted = match stored {
+        Some(stored) => replaces(&fetched, &stored, out)?,
+        None => true,
+    };
+    if wanted {
+        directory.write_results(specification.kind, &fetched)?;
     }
     let line = format!("{}\n", out.display());
     output::stdout(Format::Text).verbatim(&line).map_err(stdout_failure)?;
     Ok(Ending::Done)
+}
+
+/// Whether the fetched result takes the place of the one stored in `out`: not if it is the same,
+/// and nothing takes the place of a run that is done.
+fn replaces(fetched: &Fetched, stored: &str, out: &Path) -> Result<bool, Failure> {
+    let specification = &fetched.specification;
+    let new = results_directory::result_json(specification.kind, fetched);
+    let read = |json: &str| serde_json::from_str::<Value>(json).unwrap_or_default();
+    let (there, here) = (read(stored), read(&new));
+    // The digest is over everything that was computed; another version may have computed it.
+    if ["status", "digest"].iter().all(|key| there[key] == here[key]) {
+        return Ok(false);
+    }
+    let ending = |json: &str| verdict::ending(specification.kind, specification, json);
+    let better = ending(stored) == Ending::RunFailed && !verdict::is_cancelled(&new);
+    if better || verdict::is_cancelled(stored) {
+        return Ok(true);
+    }
+    let shown = |value: &Value| {
+        let text = |key: &str| value[key].as_str().unwrap_or_default().to_owned();
+        format!("{} digest {}", text("status"), text("digest")).trim_start().to_owned()
+    };
+    Err(Failure::bad_input(anyhow!(
+        "{} holds another result of this job ({} there, {} fetched); choose another --out directory",
+        out.display(),
+        shown(&there),
+        shown(&here)
+    )))
 }
 
 fn ending(snapshot: &JobSnapshot) -> Ending {

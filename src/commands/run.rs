@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
+use osteon_common::results::Status;
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
-use serde_json::Value;
 
 use crate::client::{Client, Fetched};
 use crate::embedded::{Embedded, StorePlace};
@@ -18,74 +18,82 @@ use crate::progress::Progress;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
+use crate::verdict;
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let specification = job_file::read(&run.job, run.kind).map_err(Failure::bad_input)?;
-    let finished = match &run.out {
-        Some(path) => ResultsDirectory::finished(path, &specification)?,
-        None => None,
-    };
-    if let Some(json) = finished {
-        return show(&run, &specification, &json, None);
+    if let Some(json) = finished(&run, &specification)? {
+        return show(&run, &specification, &json);
     }
     let interruption = signals::interruption()?;
-    let (fetched, directory) = match &run.place {
-        Place::Here { workers, threads } => {
-            let directory = open(&run)?;
-            let fetched =
-                here(*workers, *threads, &specification, directory.as_ref(), interruption).await?;
-            (fetched, directory)
+    // An address that does not answer leaves no directory behind.
+    let computers = Computers::find(&run.place).await?;
+    let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
+    // Another run may have ended between the look and the lock.
+    if let Some(json) = finished(&run, &specification)? {
+        return show(&run, &specification, &json);
+    }
+    let fetched = match computers {
+        Computers::Here { workers, threads } => {
+            here(workers, threads, &specification, directory.as_ref(), interruption).await?
         }
-        Place::There(endpoint) => {
-            // An address that does not answer leaves no directory behind.
-            let client = Client::connect(endpoint).await?;
-            let directory = open(&run)?;
-            let fetched =
-                there(client, endpoint, &specification, directory.as_ref(), interruption).await?;
-            (fetched, directory)
+        Computers::There(client, endpoint) => {
+            there(client, endpoint, &specification, directory.as_ref(), interruption).await?
         }
     };
-    let json = match &directory {
-        Some(directory) => directory.write_results(run.kind, &fetched)?,
-        None => results_directory::result_json(run.kind, &fetched),
-    };
-    show(&run, &specification, &json, fetched.result.reason.as_deref())
+    let json = keep(run.kind, &fetched, directory.as_ref())?;
+    show(&run, &specification, &json)
 }
 
-fn open(run: &Run) -> Result<Option<ResultsDirectory>, Failure> {
-    run.out.as_deref().map(ResultsDirectory::open).transpose()
+/// Who computes, and is there.
+enum Computers<'a> {
+    Here { workers: u32, threads: u32 },
+    There(Client, &'a Endpoint),
 }
 
-fn show(
-    run: &Run,
-    specification: &JobSpecification,
-    json: &str,
-    reason: Option<&str>,
-) -> Result<Ending, Failure> {
-    let shown =
-        ShownResult { kind: run.kind, specification, json, reason, directory: run.out.as_deref() };
+impl<'a> Computers<'a> {
+    async fn find(place: &'a Place) -> Result<Self, Failure> {
+        Ok(match place {
+            Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
+            Place::There(endpoint) => Self::There(Client::connect(endpoint).await?, endpoint),
+        })
+    }
+}
+
+fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<String>, Failure> {
+    match &run.out {
+        Some(path) => ResultsDirectory::finished(path, specification),
+        None => Ok(None),
+    }
+}
+
+/// Writes what an ended job left, if there is a directory for it; the text of the result.
+fn keep(
+    kind: JobKind,
+    fetched: &Fetched,
+    directory: Option<&ResultsDirectory>,
+) -> Result<String, Failure> {
+    let missing = verdict::missing_result(fetched);
+    if let Some(directory) = directory
+        && (missing.is_some() || fetched.result.status == Status::Cancelled)
+    {
+        // The same command shall run it again, not meet the same end again.
+        directory.forget_request();
+    }
+    if let Some(missing) = missing {
+        return Err(Failure::failed(anyhow!(missing)));
+    }
+    match directory {
+        Some(directory) => directory.write_results(kind, fetched),
+        None => Ok(results_directory::result_json(kind, fetched)),
+    }
+}
+
+fn show(run: &Run, specification: &JobSpecification, json: &str) -> Result<Ending, Failure> {
+    let shown = ShownResult { kind: run.kind, specification, json, directory: run.out.as_deref() };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
-    Ok(ending(run.kind, specification, json))
-}
-
-/// What a result means for the exit code; the same for a stored one and for a new one.
-fn ending(kind: JobKind, specification: &JobSpecification, json: &str) -> Ending {
-    let value: Value = serde_json::from_str(json).unwrap_or_default();
-    let done = match kind {
-        JobKind::Identification => {
-            matches!(value["status"].as_str(), Some("converged" | "max_evaluations"))
-        }
-        JobKind::Propagation => {
-            let counts = value["failures"].as_object();
-            let failed: u64 = counts.into_iter().flatten().filter_map(|(_, n)| n.as_u64()).sum();
-            let realizations = specification.monte_carlo.realizations;
-            let fraction = failed as f64 / realizations as f64;
-            value["velocity"]["mean"].is_number()
-                && fraction <= specification.monte_carlo.max_failed_fraction
-        }
-    };
-    if done { Ending::Done } else { Ending::RunFailed }
+    Ok(verdict::ending(run.kind, specification, json))
 }
 
 /// The job on worker processes of this one.
@@ -111,7 +119,7 @@ async fn here(
     };
     let result = tokio::select! {
         driven = driven => driven,
-        failure = embedded.workers_failed() => Err(failure),
+        failure = embedded.failed() => Err(failure),
         () = interruption => Err(Failure::failed(anyhow!(match directory {
             Some(_) => "interrupted; the same command continues",
             None => "interrupted; nothing was kept (with --out DIR a run can be continued)",
@@ -163,6 +171,3 @@ async fn drive(
     progress.finish();
     Ok(client.fetch(&job).await?)
 }
-
-#[cfg(test)]
-mod tests;

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
@@ -20,7 +20,8 @@ use crate::progress::say;
 
 /// A worker leaves by itself after this long without this process, s.
 const GIVE_UP_AFTER_S: u64 = 5;
-/// Most deaths in a row, over all workers, without any progress between them.
+/// Most deaths of one worker in a row without any progress of the run between them. All of them
+/// may be killed at once: deaths of others do not count.
 const DEATHS_IN_A_ROW_MAX: u32 = 10;
 /// Wait before a worker is started again, ms, times the deaths in a row.
 const RESPAWN_MS: u64 = 50;
@@ -44,10 +45,9 @@ struct Shared {
     endpoint: Endpoint,
     threads: u32,
     progress: Arc<AtomicU64>,
-    deaths: Mutex<Deaths>,
 }
 
-/// Deaths since the last progress.
+/// Deaths of one worker since the last progress.
 #[derive(Debug, Default)]
 struct Deaths {
     in_a_row: u32,
@@ -72,9 +72,8 @@ impl Workers {
         threads: u32,
         progress: Arc<AtomicU64>,
     ) -> Self {
-        let deaths = Mutex::default();
         let endpoint = endpoint.clone();
-        let shared = Arc::new(Shared { executable, endpoint, threads, progress, deaths });
+        let shared = Arc::new(Shared { executable, endpoint, threads, progress });
         let (stop, stopped) = watch::channel(false);
         let (failure_sender, failures) = mpsc::channel(1);
         let mut tasks = JoinSet::new();
@@ -107,6 +106,7 @@ async fn keep(
     mut stopped: watch::Receiver<bool>,
     failures: mpsc::Sender<anyhow::Error>,
 ) {
+    let mut deaths = Deaths::default();
     loop {
         let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
             Ok(mut child) => {
@@ -122,15 +122,11 @@ async fn keep(
             }
             Err(error) => (format!("cannot be started: {error:#}"), String::new()),
         };
-        let progress = shared.progress.load(Ordering::Relaxed);
-        let in_a_row = {
-            let mut deaths = shared.deaths.lock().unwrap_or_else(PoisonError::into_inner);
-            deaths.count(progress)
-        };
+        let in_a_row = deaths.count(shared.progress.load(Ordering::Relaxed));
         if in_a_row >= DEATHS_IN_A_ROW_MAX {
             let error = anyhow!(
-                "the workers died {in_a_row} times in a row without any progress; \
-                 the last one {death}{words}"
+                "worker {number} died {in_a_row} times in a row without any progress; \
+                 the last time it {death}{words}"
             );
             // A full channel holds the same message of another worker.
             drop(failures.try_send(error));
@@ -232,6 +228,37 @@ mod tests {
         workers.end().await;
         assert!(failure.contains("died 10 times in a row"), "{failure}");
         assert!(failure.contains("--coordinator"), "{failure}");
+    }
+
+    #[tokio::test]
+    async fn workers_that_all_die_at_once_are_started_again() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let directory = tempfile::tempdir().unwrap();
+        let starts = directory.path().join("starts");
+        std::fs::create_dir(&starts).unwrap();
+        let count = || std::fs::read_dir(&starts).unwrap().count();
+        // Dies at once until there were twice as many starts as deaths of one worker may be.
+        let script = directory.path().join("worker");
+        let place = starts.display();
+        let text = format!(
+            "#!/bin/sh\nmktemp -p {place} >&2\n[ $(ls {place} | wc -l) -lt 20 ] && exit 1\nexec sleep 60\n"
+        );
+        std::fs::write(&script, text).unwrap();
+        std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o700)).unwrap();
+        let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
+        let mut workers = Workers::start(script, &endpoint, 12, 1, Arc::default());
+        let started = async {
+            while count() < 20 {
+                sleep(Duration::from_millis(10)).await;
+            }
+        };
+        let failure = tokio::select! {
+            () = started => None,
+            failure = workers.failed() => Some(failure),
+            () = sleep(Duration::from_secs(60)) => panic!("{} starts", count()),
+        };
+        workers.end().await;
+        assert!(failure.is_none(), "{failure:?}");
     }
 
     #[tokio::test]

@@ -58,10 +58,10 @@ const RESULT: &str = r#"{
 }
 "#;
 
-fn shown(kind: JobKind, free: &[&str], json: &str, reason: Option<&str>) -> String {
+fn shown(kind: JobKind, free: &[&str], json: &str) -> String {
     let specification = specification(kind, free);
     let directory = Some(Path::new("results"));
-    let result = ShownResult { kind, specification: &specification, json, reason, directory };
+    let result = ShownResult { kind, specification: &specification, json, directory };
     printed(Format::Text, |output| output.result(&result).unwrap())
 }
 
@@ -76,13 +76,13 @@ fn a_search_says_what_the_data_determine() {
         "transverse_poisson_ratio",
         "dispersion",
     ];
-    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT, None));
+    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT));
 }
 
 #[test]
 fn two_searched_parameters_are_determined() {
     let free = ["longitudinal_young_modulus", "dispersion"];
-    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT, None));
+    insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT));
 }
 
 #[test]
@@ -90,12 +90,45 @@ fn a_failed_search_says_why() {
     let failed = r#"{"status": "failed", "reason": "no point was feasible", "digest": "00",
         "cost": null, "parameters": {"density": null}, "dispersion": null,
         "evaluations": 30, "realizations": 2747, "failures": {}}"#;
-    insta::assert_snapshot!(shown(JobKind::Identification, &["dispersion"], failed, None));
+    insta::assert_snapshot!(shown(JobKind::Identification, &["dispersion"], failed));
+}
+
+#[test]
+fn what_is_said_about_a_search_depends_on_how_it_ended() {
+    let all = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
+    let check = |changes: &[(&str, &str)], expected: &[&str], absent: &[&str]| {
+        let json = changes.iter().fold(RESULT.to_owned(), |json, (old, new)| {
+            assert!(json.contains(old), "{old}");
+            json.replace(old, new)
+        });
+        let text = shown(JobKind::Identification, &all, &json);
+        expected.iter().for_each(|part| assert!(text.contains(part), "no `{part}` in\n{text}"));
+        absent.iter().for_each(|part| assert!(!text.contains(part), "`{part}` in\n{text}"));
+    };
+    let status = |to: &'static str| ("\"status\": \"converged\"", to);
+    check(&[], &["Converged\n", "data determine only"], &[]);
+    let failed = status("\"status\": \"failed\", \"reason\": \"too dark\"");
+    let no_cost = ("3.21e-11", "null");
+    let point = ["data determine", "best point", "GPa", "mean velocity"];
+    check(&[failed, no_cost], &["Failed: too dark\n", "no point was feasible"], &point);
+    check(&[failed], &["Failed: too dark\n", "best point"], &["data determine"]);
+    let used_up = "Not converged: the evaluations are used up\n";
+    check(&[status("\"status\": \"max_evaluations\"")], &[used_up], &[]);
+    let early = status("\"status\": \"max_evaluations\", \"reason\": \"it collapsed\"");
+    check(&[early], &["Not converged: it collapsed\n"], &["used up"]);
+}
+
+#[test]
+fn a_failed_propagation_says_why_whenever_it_is_shown() {
+    let failed = RESULT.replace("\"no_arrival\": 2", "\"no_arrival\": 1200");
+    let text = shown(JobKind::Propagation, &[], &failed);
+    let expected = "Failed: 1201 of 2747 realizations failed; max_failed_fraction is 0.01\n";
+    assert!(text.starts_with(expected), "{text}");
 }
 
 #[test]
 fn a_propagation_shows_moments() {
-    insta::assert_snapshot!(shown(JobKind::Propagation, &[], RESULT, None));
+    insta::assert_snapshot!(shown(JobKind::Propagation, &[], RESULT));
 }
 
 #[test]
@@ -105,7 +138,6 @@ fn json_is_what_stands_in_the_file() {
         kind: JobKind::Identification,
         specification: &specification,
         json: RESULT,
-        reason: None,
         directory: None,
     };
     assert_eq!(printed(Format::Json, |output| output.result(&result).unwrap()), RESULT);

@@ -72,7 +72,10 @@ pub(crate) fn text(path: &Path) -> &str {
 /// The program under test, without the caller's settings.
 pub(crate) fn osteon() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_osteon"));
-    command.env_remove("OSTEON_COORDINATOR").env_remove("RUST_LOG").stdin(Stdio::null());
+    for name in ["OSTEON_COORDINATOR", "RUST_LOG", "COLUMNS"] {
+        command.env_remove(name);
+    }
+    command.stdin(Stdio::null());
     command
 }
 
@@ -232,6 +235,12 @@ pub(crate) fn children(parent: u32) -> Vec<u32> {
         }
     }
     children
+}
+
+/// The value of an option on a process's command line (Linux).
+pub(crate) fn option(process: u32, name: &str) -> Option<String> {
+    let line = fs::read_to_string(format!("/proc/{process}/cmdline")).ok()?;
+    line.split('\0').skip_while(|&word| word != name).nth(1).map(str::to_owned)
 }
 
 /// Whether a process is there and no zombie (Linux).

@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use osteon_common::case::Setup;
+use osteon_common::limits::ACTIVE_JOBS_MAX;
 use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::realization::Ensemble;
 use osteon_proto::batch::Work;
@@ -22,8 +23,9 @@ use rayon::prelude::*;
 use crate::error::{PanickedCase, WorkerError};
 use crate::state::Computed;
 
-/// Most solvers, each with its tables, that a worker keeps.
-const SOLVERS_MAX: usize = 4;
+/// Most solvers, each with its tables, that a worker keeps: batches of all active jobs come in
+/// turn, and each may have a setup of its own.
+const SOLVERS_MAX: usize = ACTIVE_JOBS_MAX;
 
 thread_local! {
     /// Scratch memory of one thread of the pool.
@@ -136,7 +138,7 @@ fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
     text.unwrap_or("no message").to_owned()
 }
 
-/// The solvers of the last few setups.
+/// The solvers of the last few setups, the one used last in front.
 #[derive(Debug, Default)]
 struct Solvers(Mutex<VecDeque<Arc<Solver>>>);
 
@@ -145,10 +147,11 @@ impl Solvers {
     fn get(&self, setup: &Setup) -> Arc<Solver> {
         // A panic while the lock is held leaves the queue as it was: no half-made entry.
         let mut solvers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(solver) = solvers.iter().find(|solver| solver.setup() == setup) {
-            return Arc::clone(solver);
-        }
-        let solver = Arc::new(Solver::new(setup));
+        let known = solvers.iter().position(|solver| solver.setup() == setup);
+        let solver = match known.and_then(|position| solvers.remove(position)) {
+            Some(solver) => solver,
+            None => Arc::new(Solver::new(setup)),
+        };
         solvers.truncate(SOLVERS_MAX - 1);
         solvers.push_front(Arc::clone(&solver));
         solver

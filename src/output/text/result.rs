@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::{aligned, significant};
 use crate::output::ShownResult;
+use crate::verdict;
 
 /// The table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
@@ -30,20 +31,24 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
 
 fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     let status = value["status"].as_str().unwrap_or("unknown");
+    let reason = value["reason"].as_str().filter(|reason| !reason.is_empty());
     let headline = match status {
         "converged" => "Converged",
+        // A search that stops early says itself why.
+        "max_evaluations" if reason.is_some() => "Not converged",
         "max_evaluations" => "Not converged: the evaluations are used up",
         "cancelled" => "Cancelled",
         _ => "Failed",
     };
     text.push_str(headline);
-    let reason = value["reason"].as_str().or(shown.reason);
-    if let Some(reason) = reason.filter(|reason| !reason.is_empty()) {
+    if let Some(reason) = reason {
         text.push_str(&format!(": {reason}"));
     }
     let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
     text.push_str(&format!("\n{evaluations} evaluations of {realizations} realizations"));
-    let Ok(point) = results_json::best_point(shown.json) else {
+    // Without a finite cost a point says nothing about the data.
+    let feasible = value["cost"].is_number();
+    let Some(point) = results_json::best_point(shown.json).ok().filter(|_| feasible) else {
         text.push_str("; no point was feasible\n");
         return;
     };
@@ -51,11 +56,13 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     text.push_str(&moments(value, true));
     text.push('\n');
     text.push_str(&parameters(&point, shown.specification));
-    text.push_str(&uniqueness(&point, shown.specification));
+    if status != "failed" {
+        text.push_str(&uniqueness(&point, shown.specification));
+    }
 }
 
 fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
-    if let Some(reason) = shown.reason.filter(|reason| !reason.is_empty()) {
+    if let Some(reason) = verdict::propagation_failure(shown.specification, value) {
         text.push_str(&format!("Failed: {reason}\n"));
     }
     text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));

@@ -1,5 +1,7 @@
-use osteon_common::document::Format;
 use std::path::Path;
+
+use osteon_common::document::Format;
+use osteon_common::job_file;
 
 use super::*;
 
@@ -51,4 +53,14 @@ fn a_propagation_fails_above_the_accepted_fraction() {
     );
     check(r#"{"failures": {}, "velocity": {"mean": null}}"#, Ending::RunFailed);
     check("no JSON", Ending::RunFailed);
+}
+
+#[test]
+fn only_a_search_that_somebody_ended_is_cancelled() {
+    let check = |json: &str, expected| assert_eq!(is_cancelled(json), expected, "{json}");
+    check(r#"{"status": "cancelled"}"#, true);
+    check(r#"{"status": "converged"}"#, false);
+    check(r#"{"status": "failed"}"#, false);
+    check(r#"{"failures": {}, "velocity": {"mean": 3900.0}}"#, false);
+    check("no JSON", false);
 }

@@ -1,0 +1,89 @@
+use osteon_common::document::Format;
+use osteon_common::results::JobResult;
+use osteon_common::settings::{Picking, SolverSettings};
+
+use super::*;
+
+fn specification() -> JobSpecification {
+    let values = [
+        ("density", 1598.8),
+        ("longitudinal_young_modulus", 17.717e9),
+        ("longitudinal_poisson_ratio", 0.3816),
+        ("longitudinal_shear_modulus", 4.795e9),
+        ("transverse_young_modulus", 9.8254e9),
+        ("transverse_poisson_ratio", 0.4495),
+    ];
+    let mut text = "[data]\nmean = 3906.0\ncoefficient_of_variation = 0.0271\n".to_owned();
+    for (name, value) in values {
+        text.push_str(&format!("[parameters.{name}]\nfixed = {value:?}\n"));
+    }
+    text.push_str("[parameters.dispersion]\nstart = 0.1\nbounds = [0.02, 0.3]\n");
+    job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
+}
+
+fn fetched(status: Status) -> Fetched {
+    let result = JobResult {
+        status,
+        reason: None,
+        digest: "00".to_owned(),
+        best: None,
+        data: None,
+        evaluations: 0,
+        realizations: 2747,
+        seed: 1,
+        solver: SolverSettings::default(),
+        picking: Picking::default(),
+        version: "0".to_owned(),
+    };
+    Fetched { specification: specification(), result, history: Vec::new() }
+}
+
+#[test]
+fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
+    for status in Status::ALL {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("out");
+        let directory = ResultsDirectory::open(&path).unwrap();
+        let request = directory.request_id().unwrap();
+        fs::create_dir(directory.store()).unwrap();
+        let text = directory.write_results(JobKind::Identification, &fetched(status)).unwrap();
+
+        let ended = status != Status::Cancelled;
+        let finished = ResultsDirectory::finished(&path, &specification()).unwrap();
+        assert_eq!(finished.as_ref(), ended.then_some(&text), "{status:?}");
+        let stored = ResultsDirectory::stored(&path, &specification()).unwrap();
+        assert_eq!(stored, Some(text), "{status:?}");
+        assert_eq!(directory.store().exists(), !ended, "{status:?}");
+        assert_eq!(directory.request_id().unwrap() == request, !ended, "{status:?}");
+        directory.forget_request();
+        assert_ne!(directory.request_id().unwrap(), request, "{status:?}");
+    }
+}
+
+#[test]
+fn a_directory_is_held_until_everything_is_written() {
+    let scratch = tempfile::tempdir().unwrap();
+    let directory = ResultsDirectory::open(scratch.path()).unwrap();
+    let refused = |what: &str| {
+        let failure = ResultsDirectory::open(scratch.path()).unwrap_err();
+        assert!(failure.to_string().contains("another osteon is running"), "{what}: {failure}");
+    };
+    refused("opened");
+    directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    refused("written");
+    drop(directory);
+    assert!(!scratch.path().join(LOCK).exists());
+    drop(ResultsDirectory::open(scratch.path()).unwrap());
+}
+
+#[test]
+fn a_lock_whose_file_was_removed_locks_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join(LOCK);
+    let removed = File::create(&path).unwrap();
+    assert!(is_at(&removed, &path));
+    fs::remove_file(&path).unwrap();
+    assert!(!is_at(&removed, &path));
+    let present = File::create(&path).unwrap();
+    assert!(is_at(&present, &path) && !is_at(&removed, &path));
+}
