@@ -2,11 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
-use std::fmt::Write as _;
+mod support;
+
 use std::path::Path;
 
 use osteon_common::case_file;
 use osteon_common::document::Format;
+
+use support::pin;
 
 const CASE: &str = include_str!("files/case.toml");
 const MANDEL: &str = include_str!("files/mandel.toml");
@@ -25,18 +28,6 @@ fn check(name: &str, base: &str, edits: &[(&str, &str)]) {
         (to_shown, refusal(&base.replace(from, to), Format::Toml))
     });
     pin(name, refusals);
-}
-
-/// Pins what a user reads of each input.
-fn pin<'a>(name: &str, refusals: impl IntoIterator<Item = (&'a str, String)>) {
-    let mut page = String::new();
-    for (input, message) in refusals {
-        writeln!(page, "{input}\n=> {message}\n").unwrap();
-    }
-    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
-        insta::assert_snapshot!(name, page);
-    });
-    assert!(!page.contains("ACCEPTED"), "{page}");
 }
 
 #[test]

@@ -2,12 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
-use std::fmt::Write as _;
+mod support;
+
 use std::path::Path;
 
 use osteon_common::document::Format;
 use osteon_common::job::JobKind;
 use osteon_common::job_file;
+
+use support::pin;
 
 const JOB: &str = include_str!("files/job.toml");
 
@@ -33,18 +36,6 @@ fn check(name: &str, kind: JobKind, edits: &[(&str, &str)]) {
         (to_shown, refusal(&edited(from, to), kind))
     });
     pin(name, refusals);
-}
-
-/// Pins what a user reads of each input.
-fn pin<'a>(name: &str, refusals: impl IntoIterator<Item = (&'a str, String)>) {
-    let mut page = String::new();
-    for (input, message) in refusals {
-        writeln!(page, "{input}\n=> {message}\n").unwrap();
-    }
-    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
-        insta::assert_snapshot!(name, page);
-    });
-    assert!(!page.contains("ACCEPTED"), "{page}");
 }
 
 #[test]
