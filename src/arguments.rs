@@ -39,6 +39,8 @@ pub(crate) enum Command {
     Cancel(JobArguments),
     /// Write the results of an ended job to a directory
     Fetch(FetchArguments),
+    /// Measure the solvers against each other; prints a table in Markdown
+    Study(StudyArguments),
 }
 
 /// Of `identify` and `propagate`.
@@ -79,6 +81,9 @@ pub(crate) struct SimulateArguments {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Solve with both methods and a refined exact one, and show how they differ
+    #[arg(long)]
+    pub(crate) check: bool,
     /// Duration of the traces, s
     #[arg(long, value_name = "S", default_value = "16e-6", value_parser = positive)]
     pub(crate) duration: f64,
@@ -192,6 +197,42 @@ pub(crate) struct FetchArguments {
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+}
+
+/// Of `study`.
+#[derive(Debug, Args)]
+pub(crate) struct StudyArguments {
+    /// What to measure.
+    #[command(subcommand)]
+    pub(crate) study: Study,
+}
+
+/// What to measure.
+#[derive(Debug, Clone, Copy, Subcommand)]
+pub(crate) enum Study {
+    /// How often a realization has no velocity, by kind of failure, dispersion and plate
+    Failures(DrawsArguments),
+    /// Errors of the exact method against refinement 5, and its own estimates of them
+    Accuracy(DrawsArguments),
+    /// Both methods against the exact one at refinement 5
+    Methods(DrawsArguments),
+    /// Jumps of the velocity between bones whose elasticity differs by 1e-9
+    Continuity(DrawsArguments),
+    /// How the hybrid method's error falls with element size, order and time step
+    Convergence,
+}
+
+/// Of every study over draws.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct DrawsArguments {
+    /// Realizations of each row [default: the study's own]
+    #[arg(long, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..=osteon_common::limits::REALIZATIONS_MAX))]
+    pub(crate) realizations: Option<u64>,
+    /// Seed of the draws
+    #[arg(long, value_name = "S", default_value_t = 1,
+          value_parser = clap::value_parser!(u64).range(0..=osteon_common::limits::SEED_MAX))]
+    pub(crate) seed: u64,
 }
 
 /// Longest span that a command line may ask for, s: a year.

@@ -5,6 +5,7 @@ mod draw;
 mod jobs;
 mod run;
 mod simulate;
+mod study;
 mod worker;
 
 use crate::ending::{Ending, Failure};
@@ -17,7 +18,8 @@ use crate::resolved::Resolved;
 pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
     match resolved {
         Resolved::Run(run) => run::run(run).await,
-        Resolved::Simulate(arguments) => simulate::simulate(arguments).await,
+        Resolved::Simulate { arguments, isa } => simulate::simulate(arguments, isa).await,
+        Resolved::Study { study, isa } => study::run(study, isa).await,
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
         Resolved::Worker(config) => worker::serve(config).await,

@@ -8,6 +8,7 @@ mod client;
 mod commands;
 mod embedded;
 mod ending;
+mod instruction_set;
 mod output;
 mod progress;
 mod resolved;

@@ -10,6 +10,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::{Arrival, Failure};
+use osteon_study::check::Check;
 
 use crate::resolved::Format;
 
@@ -35,6 +36,8 @@ pub(crate) struct ShownSimulation<'a> {
     pub(crate) arrival: &'a Result<Arrival, Failure>,
     /// The file of the traces, if there is one.
     pub(crate) traces: Option<&'a Path>,
+    /// The same case solved in other ways, if that was asked for.
+    pub(crate) check: Option<&'a Check>,
 }
 
 /// One way to print. Every method writes whole lines.

@@ -7,13 +7,15 @@ use std::time::Duration;
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_proto::endpoint::Endpoint;
+use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, Command, CoordinatorArguments, DrawArguments, RunArguments, SimulateArguments,
-    SubmitArguments, WorkerArguments,
+    Study, SubmitArguments, WorkerArguments,
 };
 use crate::ending::Failure;
+use crate::instruction_set;
 
 /// Worker processes of a run on this machine, unless given.
 const WORKERS_DEFAULT: u32 = 2;
@@ -36,7 +38,19 @@ pub(crate) enum Resolved {
     /// `identify`, `propagate`.
     Run(Run),
     /// `simulate`.
-    Simulate(SimulateArguments),
+    Simulate {
+        /// What, and what of it is wanted.
+        arguments: SimulateArguments,
+        /// What computes.
+        isa: Isa,
+    },
+    /// `study`.
+    Study {
+        /// What to measure.
+        study: Study,
+        /// What computes.
+        isa: Isa,
+    },
     /// `draw`.
     Draw(DrawArguments),
     /// `coordinator`.
@@ -127,19 +141,25 @@ impl Resolved {
         let cores = u32::try_from(cores).unwrap_or(1);
         let environment = environment(std::env::var_os(VARIABLE))?;
         let coordinator = |flag| resolve_coordinator(flag, environment.as_deref());
+        let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
+        let run = |kind, run| {
+            let run = resolve_run(kind, run, cores, environment.as_deref())?;
+            if matches!(run.place, Place::Here { .. }) {
+                // Workers read it again; a wrong one is told here, at once.
+                isa()?;
+            }
+            Ok::<_, Failure>(Self::Run(run))
+        };
         Ok(match arguments.command {
-            Command::Identify(run) => {
-                Self::Run(resolve_run(JobKind::Identification, run, cores, environment.as_deref())?)
-            }
-            Command::Propagate(run) => {
-                Self::Run(resolve_run(JobKind::Propagation, run, cores, environment.as_deref())?)
-            }
-            Command::Simulate(arguments) => Self::Simulate(arguments),
+            Command::Identify(arguments) => run(JobKind::Identification, arguments)?,
+            Command::Propagate(arguments) => run(JobKind::Propagation, arguments)?,
+            Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
+            Command::Study(arguments) => Self::Study { study: arguments.study, isa: isa()? },
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {
                 let endpoint = coordinator(arguments.coordinator.clone())?;
-                Self::Worker(resolve_worker(&arguments, endpoint, cores))
+                Self::Worker(resolve_worker(&arguments, endpoint, cores, isa()?))
             }
             Command::Submit(arguments) => {
                 let endpoint = coordinator(arguments.client.coordinator.clone())?;
@@ -230,10 +250,16 @@ fn resolve_run(
     Ok(Run { kind, job, place, out, format: format(json) })
 }
 
-fn resolve_worker(arguments: &WorkerArguments, endpoint: Endpoint, cores: u32) -> WorkerConfig {
+fn resolve_worker(
+    arguments: &WorkerArguments,
+    endpoint: Endpoint,
+    cores: u32,
+    isa: Isa,
+) -> WorkerConfig {
     WorkerConfig {
         endpoint,
         threads: arguments.threads.unwrap_or(cores),
+        isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
     }

@@ -39,9 +39,10 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
+    let setup = &fetched.specification.setup;
     match kind {
-        JobKind::Identification => results_json::identification(&fetched.result),
-        JobKind::Propagation => results_json::propagation(&fetched.result),
+        JobKind::Identification => results_json::identification(&fetched.result, setup),
+        JobKind::Propagation => results_json::propagation(&fetched.result, setup),
     }
 }
 

@@ -21,9 +21,16 @@ fn help_of_every_command() {
         "watch",
         "cancel",
         "fetch",
+        "study",
+        "study failures",
+        "study accuracy",
+        "study methods",
+        "study continuity",
+        "study convergence",
     ] {
         text.push_str(&format!("\n==== osteon {command}\n"));
-        text.push_str(run(&[command, "--help"]).succeeded());
+        let words: Vec<_> = command.split(' ').chain(["--help"]).collect();
+        text.push_str(run(&words).succeeded());
     }
     insta::assert_snapshot!(text);
 }

@@ -34,6 +34,9 @@ fn the_digest_does_not_depend_on_who_computes() {
     assert_eq!(result["digest"].as_str().unwrap().len(), 64);
     assert_eq!(result["evaluations"], 8);
     assert_eq!(result["status"], "max_evaluations");
+    let errors = &result["solver"]["estimated_error"];
+    let (median, largest) = (errors["median"].as_f64(), errors["largest"].as_f64());
+    assert!(0.0 <= median.unwrap() && median <= largest, "{errors}");
 }
 
 #[test]

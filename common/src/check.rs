@@ -5,6 +5,7 @@
 
 mod job;
 mod setup;
+mod solver;
 
 use crate::accepted::{Interval, WholeRange};
 use crate::job::JobSpecification;
@@ -14,8 +15,9 @@ pub(crate) use self::job::{
     DATA_FORMS, EVALUATIONS, REALIZATIONS, SEED, VELOCITIES_MIN, VELOCITY, no_data,
 };
 pub use self::job::{data, job};
-pub(crate) use self::setup::RECEIVERS;
 pub use self::setup::setup;
+pub use self::solver::{HYBRID_KEYS, of_hybrid_only};
+pub(crate) use self::{setup::RECEIVERS, solver::ELEMENT_ORDER};
 
 impl JobSpecification {
     /// Everything that is wrong with the specification, each field named as in a job file.

@@ -23,6 +23,7 @@ pub mod limits;
 pub mod outcome;
 pub mod parameters;
 pub mod probe;
+pub mod quantile;
 mod reader;
 pub mod realization;
 pub mod results;

@@ -16,13 +16,21 @@ pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
 pub const REFINEMENT_MIN: f64 = 0.5;
 /// Largest refinement of the solver's sampling.
 pub const REFINEMENT_MAX: f64 = 16.0;
+/// Smallest element of the hybrid method, m.
+pub const ELEMENT_SIZE_MIN: f64 = 1e-6;
+/// Largest element of the hybrid method, m.
+pub const ELEMENT_SIZE_MAX: f64 = 1e-2;
+/// Lowest polynomial degree of the hybrid method's elements.
+pub const ELEMENT_ORDER_MIN: u32 = 2;
+/// Highest polynomial degree of the hybrid method's elements.
+pub const ELEMENT_ORDER_MAX: u32 = 12;
 /// Most (frequency, wavenumber) pairs of one realization.
 pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
 /// Longest job or case file, bytes. (A million velocities inlined take 20 MB.)
 pub const FILE_BYTES_MAX: u64 = 64 << 20;
 /// Longest message on the wire, bytes.
 pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
-/// Most realizations in one batch: 9 bytes each on the wire.
+/// Most realizations in one batch: 17 bytes each on the wire.
 pub const BATCH_REALIZATIONS_MAX: u32 = 1 << 16;
 /// Most threads a worker may announce.
 pub const WORKER_THREADS_MAX: u32 = 4096;

@@ -68,6 +68,30 @@ pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
     (velocity.to_bits() == 0).then_some(Err(kind))
 }
 
+/// One realization as a worker answers it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Estimate of the velocity's relative error by discretisation, ≥ 0; 0 on failure.
+    pub estimated_error: f64,
+}
+
+impl Solved {
+    /// A realization without a velocity.
+    pub fn failed(kind: FailureKind) -> Self {
+        Self { outcome: Err(kind), estimated_error: 0.0 }
+    }
+
+    /// Whether the estimate is one that such an outcome can have.
+    pub fn is_sound(&self) -> bool {
+        match self.outcome {
+            Ok(_) => self.estimated_error.is_finite() && self.estimated_error >= 0.0,
+            Err(_) => self.estimated_error.to_bits() == 0,
+        }
+    }
+}
+
 /// How many realizations failed, by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FailureCounts([u64; 5]);
@@ -132,6 +156,19 @@ mod tests {
             (6, 0.0),
         ] {
             assert_eq!(decode(code, velocity), None, "code {code}, velocity {velocity}");
+        }
+    }
+
+    #[test]
+    fn an_estimate_is_finite_and_a_failure_has_none() {
+        let sound = |outcome, estimated_error| Solved { outcome, estimated_error }.is_sound();
+        assert!(sound(Ok(3900.0), 0.0) && sound(Ok(3900.0), 2e-5));
+        assert!(Solved::failed(FailureKind::NoArrival).is_sound());
+        for estimate in [-1e-9, f64::NAN, f64::INFINITY] {
+            assert!(!sound(Ok(3900.0), estimate), "{estimate}");
+        }
+        for estimate in [-0.0, 1e-5, f64::NAN] {
+            assert!(!sound(Err(FailureKind::NoArrival), estimate), "{estimate}");
         }
     }
 

@@ -51,6 +51,15 @@ pub struct Estimate {
     pub standard_error: Moments,
 }
 
+/// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EstimatedError {
+    /// Their median.
+    pub median: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
 /// One evaluation of the search, as a row of `history.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
@@ -64,6 +73,8 @@ pub struct Evaluation {
     pub cost: Option<f64>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
+    /// Estimated errors of the successes, unless there are none, or they are not known.
+    pub estimated_error: Option<EstimatedError>,
 }
 
 /// The result of a job. No wall times in it: one job, the same bytes.
@@ -104,6 +115,8 @@ pub struct BestPoint {
     pub velocity: Option<Estimate>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
+    /// Estimated errors of the successes, unless there are none, or they are not known.
+    pub estimated_error: Option<EstimatedError>,
     /// Outcomes in index order.
     pub outcomes: Vec<Outcome>,
 }

@@ -6,9 +6,12 @@
 use serde_json::{Map, Value, json};
 use thiserror::Error;
 
+use crate::case::Setup;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::results::{Estimate, JobResult, Moments};
+use crate::results::{Estimate, EstimatedError, JobResult, Moments};
+use crate::sampling;
+use crate::settings::Method;
 
 /// Why a text is no `result.json` with a best point.
 #[derive(Debug, Error)]
@@ -28,8 +31,8 @@ pub enum ResultError {
     },
 }
 
-/// The object of an identification, with a final newline.
-pub fn identification(result: &JobResult) -> String {
+/// The object of an identification in this setup, with a final newline.
+pub fn identification(result: &JobResult, setup: &Setup) -> String {
     let best = result.best.as_ref();
     let point = best.map(|best| best.point);
     let of_point = |parameter| json!(point.map(|point| point.get(parameter)));
@@ -51,23 +54,52 @@ pub fn identification(result: &JobResult) -> String {
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
-    let (solver, picking) = (&result.solver, &result.picking);
-    put("solver", json!({"method": solver.method.name(), "refinement": solver.refinement}));
+    let picking = &result.picking;
+    put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
     put("version", json!(result.version));
     text(object)
 }
 
-/// The object of a propagation, with a final newline.
-pub fn propagation(result: &JobResult) -> String {
+/// The object of a propagation in this setup, with a final newline.
+pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     let best = result.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("digest", json!(result.digest));
     text(object)
+}
+
+/// How velocities of a setup are computed: method, refinement, the method's sampling, and an
+/// estimate of their relative error.
+///
+/// Of the exact method: highest frequency (`band`, Hz), `period` (s) and (frequency, wavenumber)
+/// `pairs` at the usual speeds of bone; a realization with faster waves may use others.
+pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
+    let settings = &setup.solver;
+    let mut object = Map::new();
+    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    put("method", json!(settings.method.name()));
+    put("refinement", json!(settings.refinement));
+    match settings.method {
+        Method::Exact => {
+            let sampling = sampling::nominal(setup);
+            put("band", json!(sampling.band));
+            put("period", json!(sampling.period));
+            put("pairs", json!(sampling.pairs().round() as u64));
+        }
+        Method::Hybrid => {
+            put("element_size", json!(settings.element_size));
+            put("element_order", json!(settings.element_order));
+            put("time_step", json!(settings.time_step));
+        }
+    }
+    put("estimated_error", estimated_error);
+    Value::Object(object)
 }
 
 /// The best point in the text of an identification's `result.json`.
@@ -117,6 +149,13 @@ fn estimate(estimate: Option<Estimate>) -> Value {
     let mut value = moments(estimate.map(|estimate| estimate.moments));
     value["standard_error"] = moments(estimate.map(|estimate| estimate.standard_error));
     value
+}
+
+fn errors(errors: Option<EstimatedError>) -> Value {
+    json!({
+        "median": errors.map(|errors| errors.median),
+        "largest": errors.map(|errors| errors.largest),
+    })
 }
 
 fn failures(failures: Option<FailureCounts>) -> Value {

@@ -6,48 +6,74 @@
 //! repetition weakened by exp(-α T). Both repetitions are kept away from what is looked at:
 //!
 //! - L: the wave of the nearest repeated source reaches the last receiver, at the speed that the
-//!   sampling is made for, only after the window of interest;
-//! - T: from a receiver's earliest possible arrival on, one period takes in the window of interest
+//!   sampling is made for, only after the first packet;
+//! - T: from a receiver's earliest possible arrival on, one period takes in the first packet
 //!   and the large wave that the bone's face reflects: were that to wrap round, it would come down
 //!   on the first arrival, a thousand times smaller;
 //! - band: the pulse's spectrum is cut smoothly between [`Sampling::taper_start`] and
 //!   [`Sampling::band`];
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
+//!
+//! High in the band nothing is left but the tail of the pulse's kink at t = 0. There a shorter
+//! period does, so frequencies are thinned out ([`thinning`]), and so do the wavenumbers of the first
+//! packet, so that those of the later, slower waves are left out smoothly.
+
+mod thinning;
 
 use std::f64::consts::PI;
 
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 
+use thinning::smooth_step;
+pub use thinning::{RUN, Run};
+
 /// Ratio of neighbouring speeds on the ladder.
-const RUNG_RATIO: f64 = 1.125;
+const RUNG_RATIO: f64 = 1.05;
 /// Rungs of the ladder: its last speed is 280 times the first.
-pub const RUNGS: usize = 49;
+pub const RUNGS: usize = 116;
 /// Speed, m/s, at which a setup's sampling is sized before any bone is known: the usual bound of
 /// speeds in cortical bone.
 const NOMINAL_SPEED: f64 = 4000.0;
-/// Highest frequency over centre frequency at refinement 1.
-const BAND: f64 = 8.0;
 /// Plates thinner than this many millimetres at 1 MHz (m·Hz) need a wider band: the first extremum
 /// lies closer to the wave of the pulse's kink at t = 0, whose spectrum falls slowly.
 const THIN_PLATE: f64 = 2000.0;
+/// The band grows as this power of the thinness.
+const THIN_PLATE_POWER: f64 = 1.6;
 /// Most widening of the band for a thin plate.
-const THIN_PLATE_MAX: f64 = 2.0;
-/// Where the taper starts, as a fraction of the band.
-const TAPER_START: f64 = 0.4;
-/// Band of traces over that of velocities: a trace is right to 1e-3 of its largest value.
-const TRACE_BAND: f64 = 1.5;
+const THIN_PLATE_MAX: f64 = 3.0;
+/// Highest frequency of traces over centre frequency: a trace is right to 1e-3 of its largest value.
+const TRACE_BAND: f64 = 12.0;
+/// Where the taper of a trace starts, as a fraction of the band.
+const TRACE_TAPER_START: f64 = 0.4;
+/// Where the taper of a velocity starts, as a fraction of the band.
+const TAPER_START: f64 = 0.5;
 /// α T: what wraps round is weaker by exp(-this). More amplifies rounding and truncation, which
 /// grow as e^(αt), beyond what it gains.
 const WRAP_DAMPING: f64 = 12.0;
 /// Exponent at which the sum over wavenumbers ends, at refinement 1.
-const EVANESCENCE: f64 = 20.0;
-/// Length of the reflected wave, in periods of the centre frequency.
-const REFLECTED_PERIODS: f64 = 4.0;
+const EVANESCENCE: f64 = 18.5;
 /// Share of the period left free after what it has to take in.
-const PERIOD_MARGIN: f64 = 1.05;
+const PERIOD_MARGIN: f64 = 1.03;
 /// The same for traces.
 const TRACE_MARGIN: f64 = 1.15;
+/// Frequencies, over the centre frequency, between which the sum over wavenumbers draws in from
+/// every wave to those of the first packet.
+const SLOW_WAVES_END: (f64, f64) = (3.5, 4.0);
+/// Slowness at which waves begin to be left out, over that of the fastest wave.
+const SLOWNESS_START: f64 = 0.8;
+/// Range of slowness over which they fade, over that of the coupling fluid.
+const SLOWNESS_FADE: f64 = 0.5;
+
+/// How much a sampling has to allow for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Grade {
+    /// What most bones need.
+    Quick,
+    /// What a bone needs whose first arrival is weak or slow, or lies close to later ones: twice
+    /// the band, and period and length that take in the whole window before the direct wave.
+    Thorough,
+}
 
 /// Sampling of one setup for waves up to one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,13 +99,28 @@ pub struct Sampling {
     /// Whether reflections of the marrow's outer face can arrive inside a window.
     pub lower_echoes: bool,
     sound_speed: f64,
+    /// What stands for the centre frequency where the top of the band is sampled more coarsely, Hz;
+    /// infinite where it is not.
+    unit: f64,
+}
+
+/// The quick sampling of a setup at the usual speeds of bone.
+pub fn nominal(setup: &Setup) -> Sampling {
+    let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
+    let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
+    Sampling::at_rung(setup, rung, first_grade(setup))
+}
+
+/// The grade that a bone is first computed with.
+///
+/// Above refinement 1 there is one grade only.
+pub fn first_grade(setup: &Setup) -> Grade {
+    if setup.solver.refinement > 1.0 { Grade::Thorough } else { Grade::Quick }
 }
 
 /// Number of (frequency, wavenumber) pairs of one realization, at the usual speeds of bone.
 pub fn pair_count(setup: &Setup) -> f64 {
-    let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
-    let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
-    Sampling::at_rung(setup, rung).pairs()
+    nominal(setup).pairs()
 }
 
 /// The lowest rung whose speed is at least `speed` (m/s); `None` above the ladder, or if `speed`
@@ -127,39 +168,50 @@ pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
 
 impl Sampling {
     /// The sampling that picks velocities of bones whose waves are no faster than the rung's speed.
-    pub fn at_rung(setup: &Setup, rung: usize) -> Self {
+    pub fn at_rung(setup: &Setup, rung: usize, grade: Grade) -> Self {
         let speed = (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO);
-        let tail = REFLECTED_PERIODS / setup.probe.center_frequency;
+        let fc = setup.probe.center_frequency;
+        // Length of the reflected wave, and of the first packet, in periods.
+        let (reflected_periods, packet_periods) = match grade {
+            Grade::Quick => (1.0, 1.4),
+            Grade::Thorough => (4.0, f64::INFINITY),
+        };
         let (mut longest, mut last) = (0.0_f64, 0.0_f64);
         for x in distances(setup) {
-            let reflected = reflected_arrival(setup, x) + tail;
-            longest = longest.max(reflected - earliest_arrival(setup, x, speed));
-            last = last.max(direct_arrival(setup, x));
+            let reflected = reflected_arrival(setup, x) + reflected_periods / fc;
+            let earliest = earliest_arrival(setup, x, speed);
+            longest = longest.max(reflected - earliest);
+            last = last.max(direct_arrival(setup, x).min(earliest + packet_periods / fc));
         }
-        Self::new(setup, speed, PERIOD_MARGIN * longest, last)
+        Self::new(setup, grade, speed, PERIOD_MARGIN * longest, last)
     }
 
     /// The sampling for traces from 0 to `duration` (s) of bones whose waves are no faster than
     /// `speed` (m/s).
     pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
-        let mut sampling = Self::new(setup, speed, TRACE_MARGIN * duration, duration);
-        sampling.band *= TRACE_BAND;
-        sampling.taper_start *= TRACE_BAND;
+        let fc = setup.probe.center_frequency;
+        let period = TRACE_MARGIN * duration;
+        let mut sampling = Self::new(setup, Grade::Thorough, speed, period, duration);
+        sampling.band = TRACE_BAND * setup.solver.refinement * thinness(setup) * fc;
+        sampling.taper_start = TRACE_TAPER_START * sampling.band;
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
+        sampling.unit = f64::INFINITY;
         sampling
     }
 
-    fn new(setup: &Setup, speed: f64, period: f64, last: f64) -> Self {
+    fn new(setup: &Setup, grade: Grade, speed: f64, period: f64, last: f64) -> Self {
         let refinement = setup.solver.refinement;
         let coupling = &setup.layers.coupling;
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let fc = setup.probe.center_frequency;
-        let thin = (THIN_PLATE / (setup.layers.bone_thickness * fc)).clamp(1.0, THIN_PLATE_MAX);
-        let band = BAND * refinement * thin * fc;
-        // Finer sampling is also less truncated, slowly.
-        let more = 2.0 * libm::log(refinement.max(1.0));
+        let band = relative_band(grade, refinement, thinness(setup)) * fc;
+        let (unit, evanescence) = match grade {
+            Grade::Quick => (1.0, EVANESCENCE),
+            // Finer sampling is also less truncated, slowly.
+            Grade::Thorough => (1.5, EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))),
+        };
         let through_fluid = earliest_arrival(setup, 0.0, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
@@ -170,14 +222,16 @@ impl Sampling {
             band,
             taper_start: TAPER_START * band,
             wavenumber_step: 2.0 * PI / length,
-            evanescent_limit: (EVANESCENCE + more) / heights,
+            evanescent_limit: evanescence / heights,
             upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
             lower_echoes: lower_echoes(setup, speed),
             sound_speed: coupling.sound_speed,
+            unit: unit * refinement.max(1.0) * fc,
         }
     }
 
-    /// Number of frequencies, n = 0 … this - 1.
+    /// Number of frequencies below the band's end, n = 0 … this - 1; [`Sampling::runs`] says which
+    /// of them are computed.
     pub fn frequencies(&self) -> usize {
         // The taper vanishes at the band's end.
         (self.band * self.period).ceil() as usize
@@ -188,27 +242,47 @@ impl Sampling {
         n as f64 * self.frequency_step
     }
 
-    /// Number of wavenumbers at frequency `n`, m = 0 … this - 1.
+    /// Number of wavenumbers at frequency `n`, m = 0 … this - 1: a multiple of [`RUN`].
     pub fn wavenumbers(&self, n: usize) -> usize {
-        let propagating = self.angular_frequency(n) / self.sound_speed;
-        let limit =
-            propagating.mul_add(propagating, self.evanescent_limit * self.evanescent_limit).sqrt();
-        (limit / self.wavenumber_step) as usize + 1
+        ((self.fading(n).1 / self.wavenumber_step) as usize + 1).next_multiple_of(RUN)
     }
 
-    /// Smooth weight of frequency `n`: 1 up to the taper's start, 0 at the band's end.
-    pub fn taper(&self, n: usize) -> f64 {
-        let frequency = n as f64 / self.period;
-        let x = (frequency - self.taper_start) / (self.band - self.taper_start);
-        if x <= 0.0 {
-            1.0
-        } else if x >= 1.0 {
-            0.0
-        } else {
-            // Infinitely smooth at both ends.
-            let (rising, falling) = (libm::exp(-1.0 / x), libm::exp(-1.0 / (1.0 - x)));
-            falling / (rising + falling)
+    /// Smooth weight of wavenumber `k` (rad/m) at frequency `n`: 1 except where slow waves are left
+    /// out.
+    pub fn wavenumber_weight(&self, n: usize, k: f64) -> f64 {
+        let (start, end) = self.fading(n);
+        if start < end { smooth_step((end - k) / (end - start)) } else { 1.0 }
+    }
+
+    /// Smooth weight of frequency `n` that cuts the band: 1 up to `start` Hz, 0 from `end` Hz on.
+    pub fn taper(&self, n: usize, start: f64, end: f64) -> f64 {
+        smooth_step((end - n as f64 / self.period) / (end - start))
+    }
+
+    /// Wavenumbers, rad/m, at which the sum at frequency `n` begins to fade and ends.
+    fn fading(&self, n: usize) -> (f64, f64) {
+        let omega = self.angular_frequency(n);
+        let all = self.last_wavenumber(omega);
+        let start = SLOWNESS_START * self.sound_speed / self.speed;
+        let end = start + SLOWNESS_FADE;
+        if end >= 1.0 {
+            return (all, all);
         }
+        let (from, to) = (SLOW_WAVES_END.0 * self.unit, SLOW_WAVES_END.1 * self.unit);
+        let frequency = n as f64 / self.period;
+        if frequency <= from {
+            return (all, all);
+        }
+        let kept = (end * omega / self.sound_speed).max(self.last_wavenumber(2.0 * PI * from));
+        let limit = all.min(kept);
+        let fade = smooth_step((frequency - from) / (to - from));
+        (limit * (1.0 - (1.0 - start / end) * fade), limit)
+    }
+
+    /// Where g (x3 + x3S) has damped the integrand away, rad/m.
+    fn last_wavenumber(&self, omega: f64) -> f64 {
+        let propagating = omega / self.sound_speed;
+        propagating.mul_add(propagating, self.evanescent_limit * self.evanescent_limit).sqrt()
     }
 
     /// Number of (frequency, wavenumber) pairs, estimated without a loop over frequencies when
@@ -217,11 +291,28 @@ impl Sampling {
         let frequencies = self.band * self.period;
         let highest = 2.0 * PI * self.band / self.sound_speed;
         let per_frequency = (0.5 * highest + self.evanescent_limit) / self.wavenumber_step;
-        if frequencies * per_frequency > 4.0 * SAMPLING_PAIRS_MAX || frequencies.is_nan() {
+        if frequencies * per_frequency > 20.0 * SAMPLING_PAIRS_MAX || frequencies.is_nan() {
             return frequencies * per_frequency;
         }
-        (0..self.frequencies()).map(|n| self.wavenumbers(n) as f64).sum()
+        let runs = self.runs();
+        let computed = runs.iter().flat_map(|run| run.frequencies());
+        computed.filter(|&n| self.is_computed(n)).map(|n| self.wavenumbers(n) as f64).sum()
     }
+}
+
+/// Highest frequency over the centre frequency.
+fn relative_band(grade: Grade, refinement: f64, thinness: f64) -> f64 {
+    match grade {
+        Grade::Quick => 5.25 * refinement * thinness,
+        // Twice the quick one at refinement 1, 23 at refinement 5.
+        Grade::Thorough => (10.5 * thinness).min(24.0) * refinement.sqrt(),
+    }
+}
+
+/// How much wider the band has to be than that of a thick plate.
+fn thinness(setup: &Setup) -> f64 {
+    let product = setup.layers.bone_thickness * setup.probe.center_frequency;
+    libm::pow((THIN_PLATE / product).max(1.0), THIN_PLATE_POWER).min(THIN_PLATE_MAX)
 }
 
 /// Speed of the lowest rung, m/s: waves no faster than the coupling fluid never come first.
@@ -268,7 +359,8 @@ mod tests {
     fn the_papers_outer_faces_are_not_heard_and_near_ones_are() {
         let echoes = |change: fn(&mut Setup)| {
             let setup = setup(change);
-            let sampling = Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap());
+            let sampling =
+                Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap(), Grade::Thorough);
             (sampling.upper_echoes, sampling.lower_echoes)
         };
         assert_eq!(echoes(|_| ()), (false, false));
@@ -291,7 +383,7 @@ mod tests {
     fn a_rung_is_fast_enough_and_not_much_faster() {
         let setup = Setup::default();
         for speed in [1000.0, 1687.5, 1687.6, 4000.0, 25_000.0] {
-            let sampling = Sampling::at_rung(&setup, rung(&setup, speed).unwrap());
+            let sampling = Sampling::at_rung(&setup, rung(&setup, speed).unwrap(), Grade::Quick);
             assert!(sampling.speed >= speed);
             assert!(sampling.speed <= speed.max(1500.0) * RUNG_RATIO * (1.0 + 1e-12));
         }
@@ -302,7 +394,7 @@ mod tests {
     #[test]
     fn the_repeated_source_is_heard_after_the_window() {
         let setup = Setup::default();
-        let sampling = Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap());
+        let sampling = Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap(), Grade::Thorough);
         let length = 2.0 * PI / sampling.wavenumber_step;
         let image = earliest_arrival(&setup, length - 21.4e-3, sampling.speed);
         assert!(image > direct_arrival(&setup, 21.4e-3));
@@ -310,18 +402,20 @@ mod tests {
 
     #[test]
     fn the_taper_falls_from_one_to_nothing() {
-        let sampling = Sampling::at_rung(&Setup::default(), 8);
-        let weights: Vec<f64> = (0..sampling.frequencies()).map(|n| sampling.taper(n)).collect();
+        let sampling = Sampling::at_rung(&Setup::default(), 18, Grade::Quick);
+        let weights: Vec<f64> = (0..sampling.frequencies())
+            .map(|n| sampling.taper(n, sampling.taper_start, sampling.band))
+            .collect();
         assert_eq!(weights[0], 1.0);
         assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]));
         assert!(*weights.last().unwrap() < 1e-3);
     }
 
     #[test]
-    fn the_count_is_estimated_well_where_it_is_not_counted() {
+    fn the_count_is_estimated_from_above_where_it_is_not_counted() {
         for refinement in [1.0, 4.0] {
             let setup = setup(|s| s.solver.refinement = refinement);
-            let sampling = Sampling::at_rung(&setup, 8);
+            let sampling = Sampling::for_traces(&setup, 4000.0, 16e-6);
             let per_frequency = (PI * sampling.band / 1500.0 + sampling.evanescent_limit)
                 / sampling.wavenumber_step;
             let ratio = sampling.band * sampling.period * per_frequency / sampling.pairs();

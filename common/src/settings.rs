@@ -45,16 +45,19 @@ pub enum Method {
     /// Exact layers in (frequency, wavenumber).
     #[default]
     Exact,
+    /// The paper's: Fourier in x1, spectral elements in x3, time steps.
+    Hybrid,
 }
 
 impl Method {
     /// Every method, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::Exact];
+    pub const ALL: [Self; 2] = [Self::Exact, Self::Hybrid];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
+            Self::Hybrid => "hybrid",
         }
     }
 }
@@ -64,12 +67,28 @@ impl Method {
 pub struct SolverSettings {
     /// The method.
     pub method: Method,
-    /// 0.5 to 16: larger is more accurate and slower.
+    /// 0.5 to 16: larger is more accurate and slower. Of the hybrid method, it divides element
+    /// size and time step by its square root.
     pub refinement: f64,
+    /// Largest element of the hybrid method along x3 at refinement 1, m, 1e-6 to 1e-2. The default
+    /// under any other method.
+    pub element_size: f64,
+    /// Polynomial degree of the hybrid method's elements, 2 to 12. The default under any other
+    /// method.
+    pub element_order: u32,
+    /// The hybrid method's time step at refinement 1, s, above 0; `None`: chosen from the stability limit. `None`
+    /// under any other method.
+    pub time_step: Option<f64>,
 }
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        Self { method: Method::Exact, refinement: 1.0 }
+        Self {
+            method: Method::Exact,
+            refinement: 1.0,
+            element_size: 0.5e-3,
+            element_order: 8,
+            time_step: None,
+        }
     }
 }

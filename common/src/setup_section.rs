@@ -1,7 +1,7 @@
 //! `[layers]`, `[probe]`, `[picking]` and `[solver]`: what case and job files share.
 
 use crate::case::Setup;
-use crate::check::RECEIVERS;
+use crate::check::{self, ELEMENT_ORDER, RECEIVERS};
 use crate::layers::{Fluid, Layers};
 use crate::probe::{Probe, Receivers, Source};
 use crate::reader::{Choice, Reader, Table};
@@ -81,10 +81,29 @@ fn picking(reader: &mut Reader, root: &Table<'_>) -> Picking {
 
 fn solver(reader: &mut Reader, root: &Table<'_>) -> SolverSettings {
     let default = SolverSettings::default();
-    let table = reader.table(root, "solver", &["method", "refinement"]);
-    let method = Choice { all: &Method::ALL, name: Method::name, reserved: &["hybrid"] };
+    let keys = ["method", "refinement", "element_size", "element_order", "time_step"];
+    let table = reader.table(root, "solver", &keys);
+    let methods = Choice { all: &Method::ALL, name: Method::name, reserved: &[] };
+    let chosen = reader.choice(&table, "method", &methods);
+    let method = chosen.unwrap_or(default.method);
+    let refinement = reader.number(&table, "refinement").unwrap_or(default.refinement);
+    if method != Method::Hybrid {
+        // Of a method that could not be read, nobody knows what belongs to it.
+        if chosen.is_some() || !table.has("method") {
+            for key in check::HYBRID_KEYS.into_iter().filter(|key| table.has(key)) {
+                reader.violations.add(table.path(key), check::of_hybrid_only(method));
+            }
+        }
+        return SolverSettings { method, refinement, ..default };
+    }
+    let order = reader.whole(&table, "element_order", ELEMENT_ORDER);
     SolverSettings {
-        method: reader.choice(&table, "method", &method).unwrap_or(default.method),
-        refinement: reader.number(&table, "refinement").unwrap_or(default.refinement),
+        method,
+        refinement,
+        element_size: reader.number(&table, "element_size").unwrap_or(default.element_size),
+        element_order: order
+            .and_then(|order| u32::try_from(order).ok())
+            .unwrap_or(default.element_order),
+        time_step: reader.number(&table, "time_step"),
     }
 }

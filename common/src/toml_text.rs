@@ -8,6 +8,7 @@ use crate::elasticity::Elasticity;
 use crate::job::{Data, JobSpecification, Range};
 use crate::layers::Fluid;
 use crate::parameters::Parameter;
+use crate::settings::{Method, SolverSettings};
 
 /// Velocities on one line of an inlined data set.
 const VELOCITIES_PER_LINE: usize = 6;
@@ -67,9 +68,21 @@ fn setup(out: &mut String, setup: &Setup) -> fmt::Result {
     writeln!(out, "\n[picking]")?;
     writeln!(out, "extremum = \"{}\"", setup.picking.extremum.name())?;
     writeln!(out, "threshold = {:?}  # of the packet's peak", setup.picking.threshold)?;
+    solver(out, &setup.solver)
+}
+
+fn solver(out: &mut String, solver: &SolverSettings) -> fmt::Result {
     writeln!(out, "\n[solver]")?;
-    writeln!(out, "method = \"{}\"", setup.solver.method.name())?;
-    writeln!(out, "refinement = {:?}", setup.solver.refinement)
+    writeln!(out, "method = \"{}\"", solver.method.name())?;
+    writeln!(out, "refinement = {:?}", solver.refinement)?;
+    if solver.method == Method::Hybrid {
+        writeln!(out, "element_size = {:?}  # m", solver.element_size)?;
+        writeln!(out, "element_order = {}", solver.element_order)?;
+        if let Some(time_step) = solver.time_step {
+            writeln!(out, "time_step = {time_step:?}  # s")?;
+        }
+    }
+    Ok(())
 }
 
 fn fluid(out: &mut String, key: &str, fluid: &Fluid) -> fmt::Result {

@@ -56,7 +56,13 @@ const DEFAULT_SETUP: Setup = Setup {
         receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
     },
     picking: Picking { extremum: Extremum::First, threshold: 0.05 },
-    solver: SolverSettings { method: Method::Exact, refinement: 1.0 },
+    solver: SolverSettings {
+        method: Method::Exact,
+        refinement: 1.0,
+        element_size: 0.5e-3,
+        element_order: 8,
+        time_step: None,
+    },
 };
 
 #[test]
@@ -112,7 +118,7 @@ fn a_complete_job_means_what_it_says() {
                 receivers: Receivers { first_x1: 13e-3, pitch: 0.9e-3, count: 12, x3: 2.5e-3 },
             },
             picking: Picking { extremum: Extremum::Second, threshold: 0.06 },
-            solver: SolverSettings { method: Method::Exact, refinement: 1.5 },
+            solver: SolverSettings { refinement: 1.5, ..SolverSettings::default() },
         }
     );
     // An integer stands for a number.
@@ -153,6 +159,9 @@ fn values_at_the_edges_are_accepted() {
         ("seed = 7", "seed = 9223372036854775807"),
         ("refinement = 1.5", "refinement = 0.5"),
         ("refinement = 1.5", "refinement = 16"),
+        ("\"exact\"", "\"hybrid\""),
+        ("\"exact\"", "\"hybrid\"\nelement_size = 1e-6\nelement_order = 2\ntime_step = 1e-300"),
+        ("\"exact\"", "\"hybrid\"\nelement_size = 1e-2\nelement_order = 12"),
         ("max_failed_fraction = 0.02", "max_failed_fraction = 0"),
         ("max_failed_fraction = 0.02", "max_failed_fraction = 1"),
         ("start = 1700.0", "start = 1500"),

@@ -1,9 +1,12 @@
 //! The text of results: exact keys, columns and digits.
 
+use osteon_common::case::Setup;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
-use osteon_common::results::{BestPoint, Estimate, Evaluation, JobResult, Moments, Status};
-use osteon_common::settings::{Picking, SolverSettings};
+use osteon_common::results::{
+    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
+};
+use osteon_common::settings::{Method, Picking, SolverSettings};
 use osteon_common::{results_csv, results_json};
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -29,6 +32,7 @@ fn result() -> JobResult {
                 standard_error: moments(2.0, 3.6e-4),
             }),
             failures: FailureCounts::of(&outcomes()),
+            estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
             outcomes: outcomes(),
         }),
         data: Some(moments(3906.3, 0.02709)),
@@ -53,6 +57,14 @@ fn failed() -> JobResult {
 
 fn check(name: &str, text: &str) {
     assert!(text.ends_with("}\n"));
+    // The sampling's numbers are tested where they are chosen.
+    let text = (["band", "period", "pairs"]).iter().fold(text.to_owned(), |text, key| {
+        let lines = text.lines().map(|line| match line.split_once(&format!("\"{key}\": ")) {
+            Some((indent, _)) => format!("{indent}\"{key}\": (a number),\n"),
+            None => format!("{line}\n"),
+        });
+        lines.collect()
+    });
     insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
         insta::assert_snapshot!(name, text);
     });
@@ -60,14 +72,36 @@ fn check(name: &str, text: &str) {
 
 #[test]
 fn identification() {
-    check("result_identification", &results_json::identification(&result()));
-    check("result_identification_failed", &results_json::identification(&failed()));
+    check("result_identification", &results_json::identification(&result(), &Setup::default()));
+    check(
+        "result_identification_failed",
+        &results_json::identification(&failed(), &Setup::default()),
+    );
 }
 
 #[test]
 fn propagation() {
-    check("result_propagation", &results_json::propagation(&result()));
-    check("result_propagation_failed", &results_json::propagation(&failed()));
+    check("result_propagation", &results_json::propagation(&result(), &Setup::default()));
+    check("result_propagation_failed", &results_json::propagation(&failed(), &Setup::default()));
+}
+
+#[test]
+fn the_solver_states_its_method_and_sampling() {
+    let keys = |setup: &Setup| -> Vec<String> {
+        let solver = results_json::solver(setup, 2e-5.into());
+        let numbers = ["refinement", "band", "period", "pairs", "element_size", "estimated_error"];
+        for key in numbers.iter().filter(|key| solver.get(key).is_some()) {
+            assert!(solver[key].as_f64().unwrap() > 0.0, "{key}: {solver}");
+        }
+        solver.as_object().unwrap().keys().cloned().collect()
+    };
+    let mut setup = Setup::default();
+    let of_exact = ["method", "refinement", "band", "period", "pairs", "estimated_error"];
+    assert_eq!(keys(&setup), of_exact);
+    setup.solver.method = Method::Hybrid;
+    let of_hybrid =
+        ["method", "refinement", "element_size", "element_order", "time_step", "estimated_error"];
+    assert_eq!(keys(&setup), of_hybrid);
 }
 
 #[test]
@@ -80,7 +114,7 @@ fn what_is_not_finite_is_null() {
         standard_error: moments(f64::NAN, f64::NAN),
     });
     let value: serde_json::Value =
-        serde_json::from_str(&results_json::identification(&result)).unwrap();
+        serde_json::from_str(&results_json::identification(&result, &Setup::default())).unwrap();
     assert!(value["cost"].is_null());
     assert!(value["velocity"]["mean"].is_null());
     assert!(value["velocity"]["coefficient_of_variation"].is_null());
@@ -93,7 +127,9 @@ fn the_best_point_is_read_back_to_the_bit() {
     let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
     for point in [POINT, odd] {
         result.best.as_mut().unwrap().point = point;
-        let read = results_json::best_point(&results_json::identification(&result)).unwrap();
+        let read =
+            results_json::best_point(&results_json::identification(&result, &Setup::default()))
+                .unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
     }
 }
@@ -107,9 +143,15 @@ fn a_result_without_a_point_gives_none() {
     check("", "not valid JSON: EOF");
     check("[]", "`parameters.density` is missing; it must be a number");
     check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
-    check(&results_json::identification(&failed()), "`parameters.density` is null;");
-    check(&results_json::propagation(&result()), "`parameters.density` is missing;");
-    let text = results_json::identification(&result());
+    check(
+        &results_json::identification(&failed(), &Setup::default()),
+        "`parameters.density` is null;",
+    );
+    check(
+        &results_json::propagation(&result(), &Setup::default()),
+        "`parameters.density` is missing;",
+    );
+    let text = results_json::identification(&result(), &Setup::default());
     check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
 }
 
@@ -121,6 +163,7 @@ fn history() {
         moments,
         cost,
         failures,
+        estimated_error: None,
     };
     let none = FailureCounts::default();
     let text = results_csv::history(&[

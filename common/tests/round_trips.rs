@@ -11,7 +11,7 @@ use osteon_common::file_error::ContentError;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Search};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::settings::{Extremum, Picking, SolverSettings};
+use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_common::{case_file, job_file};
 use proptest::prelude::*;
 
@@ -32,18 +32,33 @@ fn fluid() -> impl Strategy<Value = Fluid> {
     })
 }
 
+fn solver() -> impl Strategy<Value = SolverSettings> {
+    let exact = (0.5..1.5)
+        .prop_map(|refinement| SolverSettings { refinement, ..SolverSettings::default() });
+    let hybrid = (0.5..1.5, 1e-4..1e-3, 2_u32..=12, prop::option::of(1e-9..1e-7)).prop_map(
+        |(refinement, element_size, element_order, time_step)| SolverSettings {
+            method: Method::Hybrid,
+            refinement,
+            element_size,
+            element_order,
+            time_step,
+        },
+    );
+    prop_oneof![exact, hybrid]
+}
+
 fn setup() -> impl Strategy<Value = Setup> {
     let layers = (fluid(), 0.5e-3..8e-3, fluid());
     let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
     let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
     let pulse = (0.5e6..1.5e6, positive());
-    let settings = (any::<bool>(), 1e-300..1.0, 0.5..1.5);
+    let settings = (any::<bool>(), 1e-300..1.0, solver());
     (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
         |((coupling, bone_thickness, marrow), x1, (x3, receivers_x3), row, pulse, settings)| {
             let (distance, pitch, count, left) = row;
             let span = f64::from(count) * pitch;
             let first_x1 = if left { x1 - distance - span } else { x1 + distance };
-            let (second, threshold, refinement) = settings;
+            let (second, threshold, solver) = settings;
             let extremum = if second { Extremum::Second } else { Extremum::First };
             Setup {
                 layers: Layers { coupling, bone_thickness, marrow },
@@ -54,7 +69,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
                 },
                 picking: Picking { extremum, threshold },
-                solver: SolverSettings { refinement, ..SolverSettings::default() },
+                solver,
             }
         },
     )

@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use osteon_common::outcome::{Outcome, encode};
+use osteon_common::outcome::{Outcome, Solved, encode};
 use osteon_common::parameters::Point;
+use osteon_common::quantile;
+use osteon_common::results::EstimatedError;
 
 /// Consecutive indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,9 +30,9 @@ pub struct Contradiction {
     /// The index.
     pub index: u64,
     /// The answer that came first.
-    pub earlier: Outcome,
+    pub earlier: Solved,
     /// The answer that came second.
-    pub later: Outcome,
+    pub later: Solved,
 }
 
 /// The realizations of one point.
@@ -40,8 +42,8 @@ pub struct Evaluation {
     pub number: u64,
     /// The point.
     pub point: Point,
-    /// Outcome of each index.
-    pub(crate) slots: Vec<Option<Outcome>>,
+    /// What became of each index.
+    pub(crate) slots: Vec<Option<Solved>>,
     /// How many slots are filled.
     pub(crate) filled: u64,
     /// Indices to hand out, from the front.
@@ -113,8 +115,8 @@ impl Evaluation {
     ///
     /// # Errors
     /// When a slot is filled already with other bits; slots before it are filled then.
-    pub fn fill(&mut self, indices: Indices, outcomes: &[Outcome]) -> Result<(), Contradiction> {
-        for (index, &later) in (indices.first..indices.end()).zip(outcomes) {
+    pub fn fill(&mut self, indices: Indices, solved: &[Solved]) -> Result<(), Contradiction> {
+        for (index, &later) in (indices.first..indices.end()).zip(solved) {
             let slot = usize::try_from(index).ok().and_then(|index| self.slots.get_mut(index));
             match slot {
                 None => {}
@@ -131,16 +133,22 @@ impl Evaluation {
         Ok(())
     }
 
-    /// All outcomes in index order, once there are all.
-    pub fn complete(&self) -> Option<Arc<[Outcome]>> {
+    /// All outcomes in index order and the estimated errors of the successes, once there are all.
+    pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
         if self.filled < self.slots.len() as u64 {
             return None;
         }
-        self.slots.iter().copied().collect()
+        let outcomes: Option<_> = self.slots.iter().map(|slot| slot.map(|it| it.outcome)).collect();
+        let successes = self.slots.iter().flatten().filter(|solved| solved.outcome.is_ok());
+        let errors = successes.map(|solved| solved.estimated_error).collect();
+        Some((outcomes?, quantile::estimated_error(errors)))
     }
 }
 
-fn same_bits(a: Outcome, b: Outcome) -> bool {
-    let ((code_a, velocity_a), (code_b, velocity_b)) = (encode(a), encode(b));
-    code_a == code_b && velocity_a.to_bits() == velocity_b.to_bits()
+fn same_bits(a: Solved, b: Solved) -> bool {
+    let bits = |solved: Solved| {
+        let (code, velocity) = encode(solved.outcome);
+        (code, velocity.to_bits(), solved.estimated_error.to_bits())
+    };
+    bits(a) == bits(b)
 }

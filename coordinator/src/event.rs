@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::Solved;
 
 use crate::effect::CloseReason;
 use crate::ids::{BatchId, JobId, Token, WorkerId};
@@ -33,8 +33,8 @@ pub enum Event {
         worker: WorkerId,
         /// The batch.
         batch: BatchId,
-        /// Its outcomes in index order.
-        outcomes: Vec<Outcome>,
+        /// Its realizations in index order.
+        solved: Vec<Solved>,
         /// Computing time, s, as the worker measured it.
         elapsed_s: f64,
     },

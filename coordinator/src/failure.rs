@@ -1,6 +1,6 @@
 //! Why a job fails for other reasons than its search.
 
-use osteon_common::outcome::{Outcome, encode};
+use osteon_common::outcome::{Solved, encode};
 use osteon_common::parameters::Point;
 use thiserror::Error;
 
@@ -42,9 +42,13 @@ pub enum Failure {
     Replay(#[from] ReplayError),
 }
 
-fn shown(outcome: Outcome) -> String {
-    match outcome {
-        Ok(velocity) => format!("{velocity} m/s (bits {:016x})", encode(outcome).1.to_bits()),
+fn shown(solved: Solved) -> String {
+    match solved.outcome {
+        Ok(velocity) => format!(
+            "{velocity} m/s (bits {:016x}, estimated error {:?})",
+            encode(solved.outcome).1.to_bits(),
+            solved.estimated_error
+        ),
         Err(kind) => kind.name().to_owned(),
     }
 }

@@ -34,8 +34,8 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         Event::Hello { worker, hello } => {
             workers::hello(state, worker, hello, now, &mut effects);
         }
-        Event::Answered { worker, batch, outcomes, elapsed_s } => {
-            batches::answered(state, worker, batch, &outcomes, elapsed_s, now, &mut effects);
+        Event::Answered { worker, batch, solved, elapsed_s } => {
+            batches::answered(state, worker, batch, &solved, elapsed_s, now, &mut effects);
         }
         Event::Heartbeat { worker } => workers::heard(state, worker, now),
         Event::WorkerDrains { worker } => workers::drains(state, worker, now, &mut effects),

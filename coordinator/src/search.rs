@@ -11,7 +11,7 @@ use osteon_common::ensemble::DISPERSION_MAX;
 use osteon_common::job::{Data, JobKind, JobSpecification, Range};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
-use osteon_common::results::{BestPoint, Evaluation, JobResult, Moments, Status};
+use osteon_common::results::{BestPoint, EstimatedError, Evaluation, JobResult, Moments, Status};
 use osteon_common::statistics::{self, Verdict};
 use thiserror::Error;
 
@@ -113,7 +113,12 @@ impl Search {
     ///
     /// # Errors
     /// When it is at another point than the search asks for; nothing is changed then.
-    pub fn retell(&mut self, point: Point, outcomes: Arc<[Outcome]>) -> Result<(), ReplayError> {
+    pub fn retell(
+        &mut self,
+        point: Point,
+        outcomes: Arc<[Outcome]>,
+        estimated_error: Option<EstimatedError>,
+    ) -> Result<(), ReplayError> {
         let found = point.0;
         let expected = match self.ask() {
             Step::Evaluate(point) => Some(point.0),
@@ -126,7 +131,7 @@ impl Search {
                 expected: expected.map(Box::new),
             });
         }
-        self.tell(outcomes);
+        self.tell(outcomes, estimated_error);
         Ok(())
     }
 
@@ -142,8 +147,9 @@ impl Search {
         }
     }
 
-    /// Takes the outcomes, in index order, of the point asked for. Ignored once done.
-    pub fn tell(&mut self, outcomes: Arc<[Outcome]>) {
+    /// Takes the outcomes, in index order, of the point asked for, and the estimated errors of the
+    /// successes, which decide nothing. Ignored once done.
+    pub fn tell(&mut self, outcomes: Arc<[Outcome]>, estimated_error: Option<EstimatedError>) {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
@@ -166,6 +172,7 @@ impl Search {
             moments: verdict.moments,
             cost,
             failures: FailureCounts::of(&outcomes),
+            estimated_error,
         };
         self.history.push(row);
         let feasible = row.cost.is_none_or(f64::is_finite);
@@ -298,6 +305,7 @@ impl Summary {
                 cost: row.cost,
                 velocity: statistics::estimate(outcomes),
                 failures: row.failures,
+                estimated_error: row.estimated_error,
                 outcomes: outcomes.to_vec(),
             }),
             data: match (specification.kind, &specification.data) {

@@ -7,7 +7,6 @@ use std::time::Duration;
 use futures::{Stream, StreamExt as _};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
-use osteon_proto::realizations;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::workers_server::Workers;
@@ -154,17 +153,15 @@ fn event(worker: WorkerId, message: AttachRequest) -> Event {
         Some(Request::Hello(_)) => Event::Misbehaved { worker, reason: CloseReason::SecondHello },
         Some(Request::Heartbeat(Heartbeat {})) => Event::Heartbeat { worker },
         Some(Request::Drain(_)) => Event::WorkerDrains { worker },
-        Some(Request::Result(result)) => {
-            match realizations::unpack(&result.codes, &result.velocities) {
-                Ok(outcomes) => Event::Answered {
-                    worker,
-                    batch: BatchId(result.batch),
-                    outcomes,
-                    elapsed_s: result.elapsed_s,
-                },
-                Err(malformed) => Event::Misbehaved { worker, reason: malformed.into() },
-            }
-        }
+        Some(Request::Result(result)) => match batch::answer_from_message(&result) {
+            Ok(solved) => Event::Answered {
+                worker,
+                batch: BatchId(result.batch),
+                solved,
+                elapsed_s: result.elapsed_s,
+            },
+            Err(malformed) => Event::Misbehaved { worker, reason: malformed.into() },
+        },
         None => {
             let reason = Malformed::Missing { field: "message" }.into();
             Event::Misbehaved { worker, reason }

@@ -12,7 +12,7 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
-use osteon_common::results::{Evaluation, Moments};
+use osteon_common::results::{EstimatedError, Evaluation, Moments};
 use thiserror::Error;
 
 use crate::ids::JobId;
@@ -47,6 +47,8 @@ pub struct EvaluationRecord {
     pub point: Point,
     /// Outcomes in index order.
     pub outcomes: Arc<[Outcome]>,
+    /// Estimated errors of the successes, unless there are none, or an older version has stored it.
+    pub estimated_error: Option<EstimatedError>,
 }
 
 /// The end of a job, with what a snapshot of it shows.

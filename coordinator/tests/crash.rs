@@ -65,9 +65,15 @@ fn evaluations_of_other_numerics_are_computed_again() {
     for number in 0..3 {
         let Step::Evaluate(point) = search.ask() else { panic!("done") };
         let outcomes: Arc<[_]> = [Ok(4000.0 + number as f64); 20].into();
-        let record = EvaluationRecord { job: JobId(1), number, point, outcomes: outcomes.clone() };
+        let record = EvaluationRecord {
+            job: JobId(1),
+            number,
+            point,
+            outcomes: outcomes.clone(),
+            estimated_error: None,
+        };
         store.put_evaluation(&record).unwrap();
-        search.tell(outcomes);
+        search.tell(outcomes, None);
     }
     drop(store);
     assert!(live(directory.path(), &specification, None));
@@ -104,8 +110,8 @@ fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>
     while let Some(effect) = effects.pop_front() {
         let event = match effect {
             Effect::Send { batch, work, .. } => {
-                let outcomes = fake::outcomes(&work);
-                Event::Answered { worker, batch, outcomes, elapsed_s: 0.1 }
+                let solved = fake::solved(&work);
+                Event::Answered { worker, batch, solved, elapsed_s: 0.1 }
             }
             Effect::Store(record) => {
                 writes += 1;

@@ -22,8 +22,8 @@ use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
-    AttachRequest, BatchResult, CancelRequest, FetchRequest, GetRequest, JobSnapshot, JobState,
-    JobStatus, ListRequest, SubmitRequest, WatchRequest, WorkerHello,
+    AttachRequest, CancelRequest, FetchRequest, GetRequest, JobSnapshot, JobState, JobStatus,
+    ListRequest, SubmitRequest, WatchRequest, WorkerHello,
 };
 use osteon_proto::{batch, realizations, results, specification, status};
 use tokio::sync::mpsc;
@@ -72,8 +72,7 @@ async fn work(channel: Channel, batches_max: usize) -> Result<usize, Status> {
     {
         if let Some(Response::Batch(message)) = message.message {
             let work = batch::from_message(&message).unwrap();
-            let (codes, velocities) = realizations::pack(&fake::outcomes(&work));
-            let result = BatchResult { batch: message.batch, codes, velocities, elapsed_s: 0.001 };
+            let result = batch::answer_to_message(message.batch, &fake::solved(&work), 0.001);
             let result = AttachRequest { message: Some(Request::Result(result)) };
             outbound.send(result).await.unwrap();
             answered += 1;

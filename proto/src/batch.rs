@@ -4,10 +4,12 @@ use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::job::Sampling;
 use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX, SEED_MAX};
+use osteon_common::outcome::{self, Solved};
 use osteon_common::parameters::Point;
 use osteon_common::violations::Violations;
 
 use crate::malformed::Malformed;
+use crate::realizations;
 use crate::setup::{self, SetupMessages};
 use crate::v1;
 
@@ -77,6 +79,35 @@ pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
     Ok(Work { setup, point, seed, sampling, first: message.first, count: message.count })
 }
 
+/// The answer to batch number `batch`: its realizations in index order, and the wall time, s,
+/// that they took.
+pub fn answer_to_message(batch: u64, solved: &[Solved], elapsed_s: f64) -> v1::BatchResult {
+    let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
+    let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
+    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }
+}
+
+/// The realizations of an answer, in index order.
+///
+/// # Errors
+/// When the lengths differ, a code and a velocity are not those of an outcome, or an estimated
+/// error is not one that the outcome can have.
+pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Malformed> {
+    let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
+    let (found, expected) = (message.estimated_errors.len(), outcomes.len());
+    if found != expected {
+        return Err(Malformed::WrongLength { field: "estimated_errors", found, expected });
+    }
+    let pairs = outcomes.into_iter().zip(&message.estimated_errors).enumerate();
+    pairs
+        .map(|(index, (outcome, &estimated_error))| {
+            let solved = Solved { outcome, estimated_error };
+            let unsound = Malformed::EstimatedError { index, value: estimated_error };
+            solved.is_sound().then_some(solved).ok_or(unsound)
+        })
+        .collect()
+}
+
 /// The point of seven finite numbers.
 ///
 /// # Errors
@@ -119,6 +150,7 @@ fn read_setup(message: &v1::Batch, violations: &mut Violations) -> Result<Setup,
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::outcome::FailureKind;
     use proptest::prelude::*;
 
     use super::*;
@@ -148,6 +180,35 @@ mod tests {
         }
     }
 
+    #[test]
+    fn answers_survive_the_wire_and_unsound_ones_do_not() {
+        let solved = [
+            Solved { outcome: Ok(3900.5), estimated_error: 2e-5 },
+            Solved::failed(FailureKind::NoArrival),
+            Solved { outcome: Ok(3901.5), estimated_error: 0.0 },
+        ];
+        let message = answer_to_message(7, &solved, 0.25);
+        assert_eq!((message.batch, message.elapsed_s), (7, 0.25));
+        assert_eq!(answer_from_message(&message).unwrap(), solved);
+        let refused = |change: fn(&mut v1::BatchResult)| {
+            let mut message = message.clone();
+            change(&mut message);
+            answer_from_message(&message).unwrap_err()
+        };
+        let (field, found, expected) = ("estimated_errors", 2, 3);
+        assert_eq!(
+            refused(|answer| answer.estimated_errors.truncate(2)),
+            Malformed::WrongLength { field, found, expected }
+        );
+        let unsound = |index, value| Malformed::EstimatedError { index, value };
+        assert_eq!(refused(|answer| answer.estimated_errors[0] = -1.0), unsound(0, -1.0));
+        assert_eq!(refused(|answer| answer.estimated_errors[1] = 1e-5), unsound(1, 1e-5));
+        let infinite = refused(|answer| answer.estimated_errors[2] = f64::INFINITY);
+        assert_eq!(infinite, unsound(2, f64::INFINITY));
+        let wrong_code = refused(|answer| answer.codes[0] = 1);
+        assert!(matches!(wrong_code, Malformed::Outcome { index: 0, .. }));
+    }
+
     fn refused(change: impl FnOnce(&mut v1::Batch)) -> Malformed {
         let mut message = to_message(1, &WORK(1598.8, 1, 0, 10));
         change(&mut message);
@@ -165,6 +226,14 @@ mod tests {
             refused(|batch| batch.sampling = "dice".to_owned()),
             Malformed::InvalidSetup(_)
         ));
+        let hybrid = |batch: &mut v1::Batch| {
+            batch.solver.as_mut().unwrap().method = Some("hybrid".to_owned());
+        };
+        assert_eq!(refused(hybrid), Malformed::IncompleteSetup);
+        let element_size = |batch: &mut v1::Batch| {
+            batch.solver.as_mut().unwrap().element_size = Some(0.5e-3);
+        };
+        assert!(matches!(refused(element_size), Malformed::InvalidSetup(_)));
         let negative = |batch: &mut v1::Batch| {
             batch.layers.as_mut().unwrap().coupling.as_mut().unwrap().density = Some(-1.0);
         };

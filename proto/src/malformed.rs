@@ -50,6 +50,17 @@ pub enum Malformed {
         /// Velocity, m/s.
         velocity: f64,
     },
+    /// An estimated error that no outcome has.
+    #[error(
+        "realization {index} has the estimated error {value}; it must be finite and at least 0, and \
+         0 on failure"
+    )]
+    EstimatedError {
+        /// Index within the block.
+        index: usize,
+        /// What was found.
+        value: f64,
+    },
     /// The setup of a batch lacks a field: its result would depend on the worker's defaults.
     #[error("the setup of a batch is incomplete")]
     IncompleteSetup,

@@ -2,7 +2,9 @@
 
 use osteon_common::job::JobKind;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
-use osteon_common::results::{BestPoint, Estimate, Evaluation, JobResult, Moments, Status};
+use osteon_common::results::{
+    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
+};
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::violations::Violations;
 
@@ -22,6 +24,7 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
             cost: best.cost,
             velocity: best.velocity.as_ref().map(estimate_to_message),
             failures: failures_to_message(&best.failures),
+            estimated_error: best.estimated_error.map(errors_to_message),
         }),
         data: result.data.as_ref().map(moments_to_message),
         evaluations: result.evaluations,
@@ -70,6 +73,7 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
         moments: evaluation.moments.as_ref().map(moments_to_message),
         cost: evaluation.cost,
         failures: failures_to_message(&evaluation.failures),
+        estimated_error: evaluation.estimated_error.map(errors_to_message),
     }
 }
 
@@ -84,6 +88,7 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,
         failures: failures_from_message(&message.failures)?,
+        estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
     })
 }
 
@@ -137,6 +142,7 @@ fn best_from_message(
         cost: message.cost,
         velocity,
         failures: failures_from_message(&message.failures)?,
+        estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
         outcomes,
     })
 }
@@ -173,6 +179,20 @@ fn estimate_from_message(message: &v1::Estimate) -> Result<Estimate, Malformed> 
         moments: moments_from_message(moments),
         standard_error: moments_from_message(standard_error),
     })
+}
+
+fn errors_to_message(errors: EstimatedError) -> v1::EstimatedError {
+    v1::EstimatedError { median: errors.median, largest: errors.largest }
+}
+
+fn errors_from_message(message: v1::EstimatedError) -> Result<EstimatedError, Malformed> {
+    for (field, value) in [("median", message.median), ("largest", message.largest)] {
+        if !value.is_finite() || value < 0.0 {
+            let allowed = "an estimated error must be finite and at least 0";
+            return Err(Malformed::OutOfRange { field, value, allowed });
+        }
+    }
+    Ok(EstimatedError { median: message.median, largest: message.largest })
 }
 
 fn failures_to_message(failures: &FailureCounts) -> Vec<v1::FailureCount> {
@@ -217,6 +237,13 @@ mod tests {
         })
     }
 
+    fn estimated_error() -> impl Strategy<Value = Option<EstimatedError>> {
+        let errors = (0.0..1e-3, 0.0..1.0);
+        proptest::option::of(
+            errors.prop_map(|(median, largest)| EstimatedError { median, largest }),
+        )
+    }
+
     fn cost() -> impl Strategy<Value = Option<f64>> {
         proptest::option::of(prop_oneof![0.0..10.0, Just(f64::INFINITY)])
     }
@@ -231,11 +258,12 @@ mod tests {
             cost in cost(),
             velocity in proptest::option::of((moments(), moments())),
             failures in failures(),
+            estimated_error in estimated_error(),
         ) -> BestPoint {
             let velocity =
                 velocity.map(|(moments, standard_error)| Estimate { moments, standard_error });
             let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
-            BestPoint { point, cost, velocity, failures, outcomes }
+            BestPoint { point, cost, velocity, failures, estimated_error, outcomes }
         }
     }
 
@@ -280,8 +308,9 @@ mod tests {
             moments in proptest::option::of(moments()),
             cost in cost(),
             failures in failures(),
+            estimated_error in estimated_error(),
         ) {
-            let evaluation = Evaluation { number, point, moments, cost, failures };
+            let evaluation = Evaluation { number, point, moments, cost, failures, estimated_error };
             let message = evaluation_to_message(&evaluation);
             prop_assert_eq!(evaluation_from_message(&message), Ok(evaluation));
         }
@@ -300,6 +329,10 @@ mod tests {
             failures_from_message(&twice),
             Err(Malformed::UnknownValue { field: "code", value: 1 })
         );
+        for median in [-1e-9, f64::NAN, f64::INFINITY] {
+            let errors = v1::EstimatedError { median, largest: 1.0 };
+            assert!(errors_from_message(errors).is_err(), "{median}");
+        }
         let unknown = [v1::FailureCount { code: 6, count: 1 }];
         assert!(failures_from_message(&unknown).is_err());
         assert_eq!(

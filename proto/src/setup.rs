@@ -4,6 +4,7 @@
 //! only what differs from them.
 
 use osteon_common::case::Setup;
+use osteon_common::check;
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -63,9 +64,13 @@ pub fn picking_to_message(picking: &Picking) -> v1::Picking {
 
 /// Solver settings as a complete message.
 pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
+    let hybrid = solver.method == Method::Hybrid;
     v1::SolverSettings {
         method: Some(solver.method.name().to_owned()),
         refinement: Some(solver.refinement),
+        element_size: hybrid.then_some(solver.element_size),
+        element_order: hybrid.then_some(solver.element_order),
+        time_step: solver.time_step.filter(|_| hybrid),
     }
 }
 
@@ -83,20 +88,41 @@ pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) 
     }
 }
 
-/// Solver settings of a message; a name that is not known is added to `violations`.
+/// Solver settings of a message; a name that is not known, and a field that the method does not
+/// have, are added to `violations`.
 pub fn solver_from_message(
     message: &v1::SolverSettings,
     violations: &mut Violations,
 ) -> SolverSettings {
     let default = SolverSettings::default();
+    let method = named(
+        message.method.as_deref(),
+        &Method::ALL.map(|method| (method.name(), method)),
+        "solver.method",
+        violations,
+    );
+    let given = [
+        message.element_size.is_some(),
+        message.element_order.is_some(),
+        message.time_step.is_some(),
+    ];
+    let refinement = message.refinement.unwrap_or(default.refinement);
+    if method != Method::Hybrid {
+        // Of a method that could not be read, nobody knows what belongs to it.
+        let known = !violations.touches("solver.method");
+        for (key, _) in
+            check::HYBRID_KEYS.into_iter().zip(given).filter(|&(_, given)| given && known)
+        {
+            violations.add(format!("solver.{key}"), check::of_hybrid_only(method));
+        }
+        return SolverSettings { method, refinement, ..default };
+    }
     SolverSettings {
-        method: named(
-            message.method.as_deref(),
-            &Method::ALL.map(|method| (method.name(), method)),
-            "solver.method",
-            violations,
-        ),
-        refinement: message.refinement.unwrap_or(default.refinement),
+        method,
+        refinement,
+        element_size: message.element_size.unwrap_or(default.element_size),
+        element_order: message.element_order.unwrap_or(default.element_order),
+        time_step: message.time_step,
     }
 }
 

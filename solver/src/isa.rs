@@ -5,6 +5,10 @@
 //! multiply-adds, whose results do not depend on how many lanes fit into a register. Without
 //! hardware support a fused multiply-add is a slow but exact function call.
 
+#[cfg(target_arch = "x86_64")]
+use crate::vector::{Avx2, Avx512, Fma};
+use crate::vector::{Scalar, Vector};
+
 /// An instruction set of this machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Isa(Kind);
@@ -48,6 +52,11 @@ impl Isa {
         Self::available().last().copied().unwrap_or(Self(Kind::Baseline))
     }
 
+    /// The instruction set of that name, if this machine offers it.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::available().into_iter().find(|isa| isa.name() == name)
+    }
+
     /// Name for users.
     pub fn name(self) -> &'static str {
         match self.0 {
@@ -64,7 +73,7 @@ impl Isa {
     /// Runs `kernel` compiled for this instruction set.
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            Kind::Baseline => kernel.run(),
+            Kind::Baseline => kernel.run::<Scalar>(),
             // SAFETY: a value of this type exists only for an instruction set that was detected.
             #[cfg(target_arch = "x86_64")]
             Kind::ScalarFma => unsafe { scalar_fma(kernel) },
@@ -85,23 +94,23 @@ impl Isa {
 /// right, but pays a function call for every fused multiply-add.
 pub(crate) trait Kernel {
     type Output;
-    fn run(self) -> Self::Output;
+    fn run<V: Vector>(self) -> Self::Output;
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "fma")]
 fn scalar_fma<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
+    kernel.run::<Fma>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
+    kernel.run::<Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx2,fma")]
 fn avx512<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
+    kernel.run::<Avx512>()
 }

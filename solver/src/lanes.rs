@@ -108,28 +108,6 @@ pub(crate) struct ComplexLanes {
 
 impl ComplexLanes {
     pub(crate) const ZERO: Self = Self { re: Lanes::ZERO, im: Lanes::ZERO };
-
-    /// self · factor + addend.
-    #[inline(always)]
-    pub(crate) fn mul_add(self, factor: Self, addend: Self) -> Self {
-        Self {
-            re: self.re.mul_add(factor.re, (-self.im).mul_add(factor.im, addend.re)),
-            im: self.re.mul_add(factor.im, self.im.mul_add(factor.re, addend.im)),
-        }
-    }
-
-    /// minuend - self · factor.
-    #[inline(always)]
-    pub(crate) fn mul_sub_from(self, factor: Self, minuend: Self) -> Self {
-        (-self).mul_add(factor, minuend)
-    }
-
-    /// 1 / self.
-    #[inline(always)]
-    pub(crate) fn recip(self) -> Self {
-        let scale = self.re.mul_add(self.re, self.im * self.im).recip();
-        Self { re: self.re * scale, im: -(self.im * scale) }
-    }
 }
 
 impl Add for ComplexLanes {

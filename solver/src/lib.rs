@@ -14,22 +14,20 @@
 #![expect(clippy::needless_range_loop, reason = "matrix indices read as in the formulas")]
 
 mod complex;
-mod direct;
+mod exact;
+pub mod hybrid;
 mod isa;
 mod lanes;
 mod medium;
 mod picking;
-mod plate;
 mod pulse;
 mod quadrature;
-mod response;
-mod series;
-mod signal;
 mod solver;
-mod tables;
-mod traces;
+mod vector;
 
 pub use complex::Complex;
+pub use exact::admittance;
+pub use exact::traces::{TraceError, Traces};
+pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::Isa;
-pub use solver::{Arrival, Failure, Solver, Workspace, admittance};
-pub use traces::{TraceError, Traces};
+pub use solver::{Arrival, Failure, Solver, Workspace};

@@ -32,16 +32,18 @@ pub(crate) struct Medium {
     pub(crate) membrane: Matrix3,
     /// Bound of every wave's speed along x1 in the solid, m/s: √(λmax(A11)/ρ).
     pub(crate) fastest: f64,
-    /// Bound of |λ|/k of the static system (σ = 0), λ its eigenvalues.
-    pub(crate) static_growth: f64,
     /// Bound of |λ|² · stiffness / |σ| at k = 0.
     pub(crate) dynamic_growth: f64,
 }
 
 impl Medium {
+    #[inline(always)]
     pub(crate) fn new(bone: &Bone) -> Self {
         let c = &bone.elasticity;
-        let stiffness = (0..6).map(|i| c.rows()[i][i]).fold(0.0, f64::max);
+        let mut stiffness = 0.0_f64;
+        for i in 0..6 {
+            stiffness = stiffness.max(c.rows()[i][i]);
+        }
         let a11 = block(c, 0, 0, stiffness);
         let a31 = block(c, 2, 0, stiffness);
         let a33 = block(c, 2, 2, stiffness);
@@ -57,7 +59,6 @@ impl Medium {
         }
         symmetrize(&mut membrane);
         let fastest = (largest_eigenvalue(&a11) * stiffness / bone.density).sqrt();
-        let static_growth = static_growth(&compliance, &coupling, &membrane);
         let dynamic_growth = largest_eigenvalue(&compliance);
         Self {
             density: bone.density,
@@ -66,25 +67,21 @@ impl Medium {
             coupling,
             membrane,
             fastest,
-            static_growth,
             dynamic_growth,
         }
-    }
-
-    /// Estimate from above of |λ|, rad/m, of the system at wavenumber `k` (rad/m) and complex
-    /// frequency of modulus `s_modulus` (1/s). Exact up to the bounds in it for a solid with
-    /// λ² = k² + s²/c².
-    #[inline(always)]
-    pub(crate) fn growth(&self, k: f64, s_modulus: f64) -> f64 {
-        let dynamic = self.density * s_modulus * s_modulus / self.stiffness * self.dynamic_growth;
-        let across = self.static_growth * k;
-        across.mul_add(across, dynamic).sqrt()
     }
 }
 
 /// (A_jl)_im = c_ijml / stiffness.
+#[inline(always)]
 fn block(c: &Elasticity, j: usize, l: usize, stiffness: f64) -> Matrix3 {
-    std::array::from_fn(|i| std::array::from_fn(|m| c.component(i, j, m, l) / stiffness))
+    let mut matrix = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for m in 0..3 {
+            matrix[i][m] = c.component(i, j, m, l) / stiffness;
+        }
+    }
+    matrix
 }
 
 #[inline(always)]
@@ -98,6 +95,7 @@ pub(crate) fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
     c
 }
 
+#[inline(always)]
 fn symmetrize(a: &mut Matrix3) {
     for i in 0..3 {
         for j in i + 1..3 {
@@ -109,26 +107,31 @@ fn symmetrize(a: &mut Matrix3) {
 }
 
 /// Inverse of a symmetric positive definite matrix by cofactors, symmetric to the bit.
+#[inline(always)]
 fn inverse_symmetric(a: &Matrix3) -> Matrix3 {
-    let minor = |i: usize, j: usize| {
-        let rows = [(i + 1) % 3, (i + 2) % 3];
-        let columns = [(j + 1) % 3, (j + 2) % 3];
-        a[rows[0]][columns[0]]
-            .mul_add(a[rows[1]][columns[1]], -(a[rows[0]][columns[1]] * a[rows[1]][columns[0]]))
-    };
     let determinant =
-        a[0][2].mul_add(minor(0, 2), a[0][1].mul_add(minor(0, 1), a[0][0] * minor(0, 0)));
+        a[0][2].mul_add(minor(a, 0, 2), a[0][1].mul_add(minor(a, 0, 1), a[0][0] * minor(a, 0, 0)));
     let mut inverse = [[0.0; 3]; 3];
     for i in 0..3 {
         for j in i..3 {
-            inverse[i][j] = minor(i, j) / determinant;
+            inverse[i][j] = minor(a, i, j) / determinant;
             inverse[j][i] = inverse[i][j];
         }
     }
     inverse
 }
 
+/// The cofactor of entry (i, j) of a symmetric matrix.
+#[inline(always)]
+fn minor(a: &Matrix3, i: usize, j: usize) -> f64 {
+    let rows = [(i + 1) % 3, (i + 2) % 3];
+    let columns = [(j + 1) % 3, (j + 2) % 3];
+    a[rows[0]][columns[0]]
+        .mul_add(a[rows[1]][columns[1]], -(a[rows[0]][columns[1]] * a[rows[1]][columns[0]]))
+}
+
 /// Largest eigenvalue of a symmetric matrix by cyclic Jacobi rotations.
+#[inline(always)]
 fn largest_eigenvalue(a: &Matrix3) -> f64 {
     // Convergence is quadratic: after five sweeps nothing is left off the diagonal.
     const SWEEPS: usize = 6;
@@ -142,6 +145,7 @@ fn largest_eigenvalue(a: &Matrix3) -> f64 {
 }
 
 /// One Jacobi rotation that annihilates entry (p, q).
+#[inline(always)]
 fn rotate(a: &mut Matrix3, p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
@@ -160,31 +164,4 @@ fn rotate(a: &mut Matrix3, p: usize, q: usize) {
         a[p][m] = cos.mul_add(x, -(sin * y));
         a[q][m] = sin.mul_add(x, cos * y);
     }
-}
-
-/// Bound of the spectral radius of the system at κ = 1, σ = 0: the 16th root of a norm of its
-/// 16th power. (The system is homogeneous: its eigenvalues at κ are κ times these.)
-fn static_growth(compliance: &Matrix3, coupling: &Matrix3, membrane: &Matrix3) -> f64 {
-    let mut power = [[0.0; 6]; 6];
-    for i in 0..3 {
-        for j in 0..3 {
-            power[i][j] = coupling[i][j];
-            power[i][j + 3] = compliance[i][j];
-            power[i + 3][j] = -membrane[i][j];
-            power[i + 3][j + 3] = coupling[j][i];
-        }
-    }
-    for _ in 0..4 {
-        power = std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                (0..6).fold(0.0, |sum, m| power[i][m].mul_add(power[m][j], sum))
-            })
-        });
-    }
-    let mut norm: f64 = 0.0;
-    for row in power {
-        norm = norm.max(row.iter().fold(0.0, |sum, value| sum + value.abs()));
-    }
-    // Four square roots are the 16th root.
-    norm.sqrt().sqrt().sqrt().sqrt()
 }

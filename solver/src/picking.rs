@@ -4,8 +4,7 @@
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::{self, Picking};
 
-use crate::signal::Extremum;
-use crate::{Arrival, Failure};
+use crate::Failure;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
 const FLOOR: f64 = 1e-3;
@@ -13,6 +12,15 @@ const FLOOR: f64 = 1e-3;
 const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.
 const RESIDUAL_PERIODS_MAX: f64 = 0.05;
+
+/// A local extremum of the pressure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extremum {
+    /// Time, s.
+    pub(crate) time: f64,
+    /// Pressure, Pa.
+    pub(crate) pressure: f64,
+}
 
 /// What is seen at one receiver before the direct wave can arrive.
 #[derive(Debug, Default)]
@@ -47,6 +55,19 @@ impl Window {
     }
 }
 
+/// The first arriving signal of an array.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pick {
+    /// Velocity, m/s.
+    pub(crate) velocity: f64,
+    /// Time of the extremum at each receiver, s.
+    pub(crate) times: Vec<f64>,
+    /// Ratio of the packet's first extremum to the packet's peak, in the median over the receivers.
+    pub(crate) ratio: f64,
+    /// Largest distance of a time from the line, s.
+    pub(crate) residual: f64,
+}
+
 /// Picks the first arriving signal.
 ///
 /// `windows` and `distances` (m, from the source) have one entry per receiver.
@@ -59,7 +80,7 @@ pub(crate) fn pick(
     center_frequency: f64,
     distances: &[f64],
     windows: &[Window],
-) -> Result<Arrival, Failure> {
+) -> Result<Pick, Failure> {
     if let Some(r) = windows.iter().position(|window| window.extrema.is_empty()) {
         return Err(Failure {
             kind: FailureKind::DirectWaveFirst,
@@ -71,7 +92,7 @@ pub(crate) fn pick(
             ),
         });
     }
-    let first = first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
+    let (first, ratio) = first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
     let rank = match picking.extremum {
         settings::Extremum::First => first,
         settings::Extremum::Second => first + 1,
@@ -90,12 +111,25 @@ pub(crate) fn pick(
         });
     }
     let times: Vec<f64> = picks.iter().map(|p| p.time).collect();
-    let velocity = fit(distances, &times, RESIDUAL_PERIODS_MAX / center_frequency)?;
-    Ok(Arrival { velocity, times })
+    let (velocity, residual) = line(distances, &times, center_frequency)?;
+    Ok(Pick { velocity, times, ratio, residual })
 }
 
-/// The lowest rank whose ratio, in the median over the receivers, exceeds the threshold.
-fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<usize, Failure> {
+/// Velocity, m/s, of the line through picked times (s), and the largest distance of a time from it.
+///
+/// # Errors
+/// `InconsistentArrival` when the times do not lie on one line that leaves the source.
+pub(crate) fn line(
+    distances: &[f64],
+    times: &[f64],
+    center_frequency: f64,
+) -> Result<(f64, f64), Failure> {
+    fit(distances, times, RESIDUAL_PERIODS_MAX / center_frequency)
+}
+
+/// The lowest rank whose ratio, in the median over the receivers, exceeds the threshold, and that
+/// ratio.
+fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<(usize, f64), Failure> {
     // The loop ends at the latest when a receiver runs out of extrema.
     let mut rank = 0;
     loop {
@@ -103,8 +137,9 @@ fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<usize, 
         for (r, window) in windows.iter().enumerate() {
             ratios.push(window.ratio(rank, packet).ok_or_else(|| no_arrival(r, rank))?);
         }
-        if median(&mut ratios) > threshold {
-            return Ok(rank);
+        let ratio = median(&mut ratios);
+        if ratio > threshold {
+            return Ok((rank, ratio));
         }
         rank += 1;
     }
@@ -128,24 +163,33 @@ fn median(values: &mut [f64]) -> f64 {
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-/// Least-squares slope of distance against time, m/s.
-fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<f64, Failure> {
-    let count = times.len() as f64;
-    let mean_time = times.iter().fold(0.0, |sum, t| sum + t) / count;
-    let mean_distance = distances.iter().fold(0.0, |sum, x| sum + x) / count;
+/// Least-squares slope of distance (m) against time (s), m/s.
+pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
+    let (mean_distance, mean_time) = (mean(distances), mean(times));
     let (mut cross, mut square) = (0.0, 0.0);
     for (x, t) in distances.iter().zip(times) {
         let dt = t - mean_time;
         cross = dt.mul_add(x - mean_distance, cross);
         square = dt.mul_add(dt, square);
     }
-    let slope = cross / square;
+    cross / square
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
+}
+
+/// The slope, and the largest residual, s.
+fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<(f64, f64), Failure> {
+    let slope = slope(distances, times);
+    let (mean_distance, mean_time) = (mean(distances), mean(times));
     if !(slope > 0.0 && slope.is_finite()) {
         return Err(Failure {
             kind: FailureKind::InconsistentArrival,
             detail: "the picked extremum does not travel away from the source".to_owned(),
         });
     }
+    let mut largest: f64 = 0.0;
     for (r, (x, t)) in distances.iter().zip(times).enumerate() {
         let residual = (x - mean_distance - slope * (t - mean_time)).abs() / slope;
         if residual > residual_max {
@@ -159,8 +203,9 @@ fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<f64, Failu
                 ),
             });
         }
+        largest = largest.max(residual);
     }
-    Ok(slope)
+    Ok((slope, largest))
 }
 
 #[cfg(test)]

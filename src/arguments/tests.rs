@@ -32,7 +32,10 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon simulate a.toml --duration nan", "it must be a number above 0");
     check("osteon simulate a.toml --time-step -1e-8", "unexpected argument");
     check("osteon simulate a.toml --time-step inf", "it must be a number above 0");
-    check("osteon simulate a.toml --check", "unexpected argument");
+    check("osteon study", "Usage");
+    check("osteon study nothing", "unrecognized subcommand");
+    check("osteon study failures --realizations 0", "0 is not in 1..=10000000");
+    check("osteon study methods --seed -1", "unexpected argument");
     check("osteon draw a.toml", "--index");
     check("osteon draw a.toml --index -1", "unexpected argument");
     check("osteon draw a.toml --index 1.5", "invalid digit");

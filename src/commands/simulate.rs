@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use osteon_common::case::Case;
 use osteon_common::case_file;
-use osteon_solver::{Arrival, Solver, TraceError, Traces, Workspace};
+use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
+use osteon_study::check::Check;
 
 use crate::arguments::SimulateArguments;
 use crate::ending::{Ending, Failure, stdout_failure};
@@ -15,28 +16,31 @@ use crate::resolved;
 use crate::results_directory;
 
 /// Solves the case, writes the traces if they are wanted, prints.
-pub(super) async fn simulate(arguments: SimulateArguments) -> Result<Ending, Failure> {
+pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
     let format = resolved::format(arguments.json);
     let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
-    let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments));
+    let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = solved.await.map_err(Failure::failed)??;
     let shown = ShownSimulation {
         setup: &case.setup,
         arrival: &solved.arrival,
         traces: solved.traces.as_deref(),
+        check: solved.check.as_ref(),
     };
     output::stdout(format).simulation(&shown).map_err(stdout_failure)?;
-    Ok(if solved.arrival.is_ok() { Ending::Done } else { Ending::RunFailed })
+    let passed = solved.check.as_ref().is_none_or(Check::passed);
+    Ok(if passed && solved.arrival.is_ok() { Ending::Done } else { Ending::RunFailed })
 }
 
 struct Solved {
     arrival: Result<Arrival, osteon_solver::Failure>,
     /// The file of the traces.
     traces: Option<PathBuf>,
+    check: Option<Check>,
 }
 
-fn solve(case: &Case, arguments: &SimulateArguments) -> Result<Solved, Failure> {
-    let solver = Solver::new(&case.setup);
+fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved, Failure> {
+    let solver = Solver::with_isa(&case.setup, isa);
     let traces = match &arguments.out {
         Some(directory) => {
             let traces = solver
@@ -48,7 +52,8 @@ fn solve(case: &Case, arguments: &SimulateArguments) -> Result<Solved, Failure> 
         None => None,
     };
     let arrival = solver.arrival(&case.bone, &mut Workspace::default());
-    Ok(Solved { arrival, traces })
+    let check = arguments.check.then(|| Check::of(case, isa));
+    Ok(Solved { arrival, traces, check })
 }
 
 fn trace_failure(error: TraceError) -> Failure {

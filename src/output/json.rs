@@ -2,8 +2,10 @@
 
 use std::io::{self, Write};
 
-use osteon_common::version;
+use osteon_common::{results_json, version};
 use osteon_proto::v1::JobSnapshot;
+use osteon_study::Difference;
+use osteon_study::check::Solution;
 use serde_json::{Value, json};
 
 use super::{Output, ShownResult, ShownSimulation};
@@ -33,12 +35,13 @@ impl Output for JsonOutput<'_> {
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         let setup = simulation.setup;
         let arrival = simulation.arrival;
+        let estimated_error = arrival.as_ref().ok().map(|arrival| arrival.estimated_error);
         let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
             let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
             json!({ "x1": x1, "time": time })
         });
         let receivers: Vec<Value> = receivers.collect();
-        self.value(&json!({
+        let mut value = json!({
             "velocity": arrival.as_ref().ok().map(|arrival| arrival.velocity),
             "failure": arrival.as_ref().err().map(|failure| failure.kind.name()),
             "detail": arrival.as_ref().err().map(|failure| failure.detail.as_str()),
@@ -47,12 +50,13 @@ impl Output for JsonOutput<'_> {
                 "extremum": setup.picking.extremum.name(),
                 "threshold": setup.picking.threshold,
             },
-            "solver": {
-                "method": setup.solver.method.name(),
-                "refinement": setup.solver.refinement,
-            },
+            "solver": results_json::solver(setup, json!(estimated_error)),
             "version": version::VERSION,
-        }))
+        });
+        if let Some(check) = simulation.check {
+            value["check"] = check.solutions().into_iter().map(solution_value).collect();
+        }
+        self.value(&value)
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
@@ -71,6 +75,19 @@ impl Output for JsonOutput<'_> {
         self.writer.write_all(text.as_bytes())?;
         self.writer.flush()
     }
+}
+
+/// The object `solver` of one solution, with what came out and how it differs from the refined one.
+fn solution_value(solution: &Solution) -> Value {
+    let arrival = solution.arrival.as_ref();
+    let estimated_error = arrival.ok().map(|arrival| arrival.estimated_error);
+    let mut value = results_json::solver(&solution.setup, json!(estimated_error));
+    value["velocity"] = json!(arrival.ok().map(|arrival| arrival.velocity));
+    value["failure"] = json!(arrival.err().map(|failure| failure.kind.name()));
+    value["same_pick"] = json!(solution.difference != Difference::Picks);
+    value["time_difference"] = json!(solution.difference.time());
+    value["relative_difference"] = json!(solution.difference.velocity());
+    value
 }
 
 fn snapshot_value(snapshot: &JobSnapshot) -> Value {

@@ -1,7 +1,10 @@
 use osteon_common::document::Format as FileFormat;
 use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
+use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
+use osteon_study::Difference;
+use osteon_study::check::Solution;
 
 use super::*;
 
@@ -144,20 +147,33 @@ fn json_is_what_stands_in_the_file() {
 }
 
 fn arrival() -> Arrival {
-    Arrival { velocity: 3908.75, times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6] }
+    Arrival {
+        velocity: 3908.75,
+        times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
+        estimated_error: 2e-5,
+    }
 }
 
-fn simulation(format: Format, arrival: &Result<Arrival, Failure>) -> String {
+/// Three receivers. The exact method's sampling changes with every improvement; the hybrid
+/// method's discretisation is the user's.
+fn setup(method: Method) -> Setup {
     let mut setup = Setup::default();
     setup.probe.receivers.count = 3;
-    let shown = ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")) };
+    setup.solver.method = method;
+    setup
+}
+
+fn simulation(format: Format, arrival: &Result<Arrival, Failure>, check: Option<&Check>) -> String {
+    let setup = setup(Method::Hybrid);
+    let shown =
+        ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
     printed(format, |output| output.simulation(&shown).unwrap())
 }
 
 #[test]
 fn a_simulation_shows_times_and_velocity() {
-    insta::assert_snapshot!(simulation(Format::Text, &Ok(arrival())));
-    insta::assert_snapshot!(simulation(Format::Json, &Ok(arrival())));
+    insta::assert_snapshot!(simulation(Format::Text, &Ok(arrival()), None));
+    insta::assert_snapshot!(simulation(Format::Json, &Ok(arrival()), None));
 }
 
 #[test]
@@ -166,8 +182,45 @@ fn a_simulation_without_velocity_says_why() {
         kind: FailureKind::NoArrival,
         detail: "receiver 3 has no extremum".to_owned(),
     };
-    insta::assert_snapshot!(simulation(Format::Text, &Err(failure())));
-    insta::assert_snapshot!(simulation(Format::Json, &Err(failure())));
+    insta::assert_snapshot!(simulation(Format::Text, &Err(failure()), None));
+    insta::assert_snapshot!(simulation(Format::Json, &Err(failure()), None));
+}
+
+/// A check in which the hybrid method differs as given.
+fn checked(hybrid: Difference) -> Check {
+    let solution = |method, velocity, difference| Solution {
+        setup: setup(method),
+        arrival: Ok(Arrival { velocity, ..arrival() }),
+        difference,
+    };
+    let numbers = |velocity, time| Difference::Numbers { velocity, time };
+    let mut refined = setup(Method::Exact);
+    refined.solver.refinement = 5.0;
+    Check {
+        exact: solution(Method::Exact, 3908.85, numbers(2.5e-5, 1.2e-10)),
+        hybrid: solution(Method::Hybrid, 3908.9, hybrid),
+        refined: Solution { setup: refined, ..solution(Method::Exact, 3908.75, numbers(0.0, 0.0)) },
+    }
+}
+
+#[test]
+fn a_check_shows_every_solution_and_whether_it_passed() {
+    let text = |check: &Check| simulation(Format::Text, &Ok(arrival()), Some(check));
+    let same = checked(Difference::Numbers { velocity: 3.8e-5, time: 4e-10 });
+    insta::assert_snapshot!(text(&same));
+    assert!(text(&checked(Difference::Picks)).contains("THE PICKS DIFFER\n"));
+    let mut off = same.clone();
+    off.exact.difference = Difference::Numbers { velocity: 1.1e-4, time: 1e-9 };
+    assert!(text(&off).contains("THE EXACT METHOD IS OFF by more than 1e-4\n"), "{}", text(&off));
+    let json = simulation(Format::Json, &Ok(arrival()), Some(&same));
+    let check = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["check"];
+    assert_eq!(check.as_array().unwrap().len(), 3);
+    assert_eq!(check[0]["velocity"], 3908.85);
+    assert_eq!(check[1]["method"], "hybrid");
+    assert_eq!(check[1]["relative_difference"], 3.8e-5);
+    assert_eq!(check[1]["time_difference"], 4e-10);
+    assert_eq!(check[2]["estimated_error"], 2e-5);
+    assert_eq!(check[2]["same_pick"], true);
 }
 
 fn jobs() -> Vec<JobSnapshot> {

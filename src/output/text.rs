@@ -1,9 +1,12 @@
 //! Output for people.
 
+mod check;
 mod result;
+mod solver;
 
 use std::io::{self, Write};
 
+use osteon_common::results_json;
 use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
 use super::{Output, ShownResult, ShownSimulation};
@@ -118,6 +121,12 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {
             text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
         }
+    }
+    let estimated_error = simulation.arrival.as_ref().ok().map(|arrival| arrival.estimated_error);
+    let solver = results_json::solver(simulation.setup, estimated_error.into());
+    text.push_str(&format!("\n{}\n", solver::line(&solver)));
+    if let Some(check) = simulation.check {
+        text.push_str(&format!("\n{}", check::table(check)));
     }
     if let Some(path) = simulation.traces {
         text.push_str(&format!("\ntraces in {}\n", path.display()));

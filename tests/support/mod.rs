@@ -72,7 +72,7 @@ pub(crate) fn text(path: &Path) -> &str {
 /// The program under test, without the caller's settings.
 pub(crate) fn osteon() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_osteon"));
-    for name in ["OSTEON_COORDINATOR", "RUST_LOG", "COLUMNS"] {
+    for name in ["OSTEON_COORDINATOR", "OSTEON_INSTRUCTION_SET", "RUST_LOG", "COLUMNS"] {
         command.env_remove(name);
     }
     command.stdin(Stdio::null());
@@ -82,6 +82,14 @@ pub(crate) fn osteon() -> Command {
 /// Runs the program to its end.
 pub(crate) fn run<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Finished {
     Finished::of(osteon().args(arguments).output().unwrap())
+}
+
+/// Runs the program to its end with one variable of the environment set.
+pub(crate) fn run_with<S: AsRef<std::ffi::OsStr>>(
+    (name, value): (&str, &str),
+    arguments: &[S],
+) -> Finished {
+    Finished::of(osteon().env(name, value).args(arguments).output().unwrap())
 }
 
 /// A program that has ended.

@@ -1,7 +1,7 @@
 //! Realizations on the cores of this worker.
 //!
 //! Realization i of a batch is drawn by [`Ensemble`] from (point, seed, i), and solved by
-//! [`Solver::outcome`]; its bits depend on nothing else: not on the thread, the batch, or what was
+//! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or what was
 //! computed before. A drawn tensor that is not positive definite in floating point, or a point
 //! from which nothing can be drawn, is the failure `not_finite` of each realization concerned.
 
@@ -14,10 +14,10 @@ use std::time::Instant;
 
 use osteon_common::case::Setup;
 use osteon_common::limits::ACTIVE_JOBS_MAX;
-use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::realization::Ensemble;
 use osteon_proto::batch::Work;
-use osteon_solver::{Solver, Workspace};
+use osteon_solver::{Isa, Solver, Workspace};
 use rayon::prelude::*;
 
 use crate::error::{PanickedCase, WorkerError};
@@ -55,17 +55,17 @@ impl StopFlag {
 }
 
 impl Cores {
-    /// A pool of `threads` threads.
+    /// A pool of `threads` threads that compute on `isa`.
     ///
     /// # Errors
     /// When the operating system gives none.
-    pub(crate) fn new(threads: u32) -> Result<Self, WorkerError> {
+    pub(crate) fn new(threads: u32, isa: Isa) -> Result<Self, WorkerError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads as usize)
             .thread_name(|index| format!("realizations-{index}"))
             .build()
             .map_err(|source| WorkerError::Pool { threads, source })?;
-        Ok(Self { pool, solvers: Arc::default() })
+        Ok(Self { pool, solvers: Arc::new(Solvers::new(isa)) })
     }
 
     /// Computes `work` on the pool and hands the end of it to `done`, on a thread of the pool.
@@ -80,8 +80,8 @@ impl Cores {
         self.pool.spawn_fifo(move || {
             let start = Instant::now();
             done(match compute(&work, &solvers, &stop) {
-                Ok(outcomes) => {
-                    Computed::Complete { outcomes, elapsed_s: start.elapsed().as_secs_f64() }
+                Ok(solved) => {
+                    Computed::Complete { solved, elapsed_s: start.elapsed().as_secs_f64() }
                 }
                 Err(Interrupted::Stopped) => Computed::Abandoned,
                 Err(Interrupted::Panicked { case, message }) => {
@@ -92,14 +92,14 @@ impl Cores {
     }
 }
 
-/// Why there are no outcomes.
+/// Why there is no answer.
 enum Interrupted {
     Stopped,
     Panicked { case: Box<PanickedCase>, message: String },
 }
 
-/// The outcomes in index order.
-fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Outcome>, Interrupted> {
+/// The realizations in index order.
+fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved>, Interrupted> {
     if stop.is_raised() {
         return Err(Interrupted::Stopped);
     }
@@ -113,7 +113,7 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Outcom
     }));
     let (solver, ensemble) = prepared.map_err(|payload| panicked(work.first, payload))?;
     let Ok(ensemble) = ensemble else {
-        return Ok(indices.map(|_| Err(FailureKind::NotFinite)).collect());
+        return Ok(indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect());
     };
     indices
         .into_par_iter()
@@ -127,9 +127,16 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Outcom
         .collect()
 }
 
-fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> Outcome {
-    let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-    WORKSPACE.with_borrow_mut(|workspace| solver.outcome(&bone, workspace))
+fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> Solved {
+    let Ok(bone) = ensemble.bone(index) else {
+        return Solved::failed(FailureKind::NotFinite);
+    };
+    match WORKSPACE.with_borrow_mut(|workspace| solver.arrival(&bone, workspace)) {
+        Ok(arrival) => {
+            Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+        }
+        Err(failure) => Solved::failed(failure.kind),
+    }
 }
 
 fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
@@ -139,18 +146,25 @@ fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
 }
 
 /// The solvers of the last few setups, the one used last in front.
-#[derive(Debug, Default)]
-struct Solvers(Mutex<VecDeque<Arc<Solver>>>);
+#[derive(Debug)]
+struct Solvers {
+    isa: Isa,
+    kept: Mutex<VecDeque<Arc<Solver>>>,
+}
 
 impl Solvers {
+    fn new(isa: Isa) -> Self {
+        Self { isa, kept: Mutex::default() }
+    }
+
     /// The solver of `setup`; made once, even if several batches ask at a time.
     fn get(&self, setup: &Setup) -> Arc<Solver> {
         // A panic while the lock is held leaves the queue as it was: no half-made entry.
-        let mut solvers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut solvers = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = solvers.iter().position(|solver| solver.setup() == setup);
         let solver = match known.and_then(|position| solvers.remove(position)) {
             Some(solver) => solver,
-            None => Arc::new(Solver::new(setup)),
+            None => Arc::new(Solver::with_isa(setup, self.isa)),
         };
         solvers.truncate(SOLVERS_MAX - 1);
         solvers.push_front(Arc::clone(&solver));

@@ -9,6 +9,7 @@ use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::endpoint::{self, Endpoint};
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
+use osteon_solver::Isa;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 use tokio_stream::wrappers::ReceiverStream;
@@ -36,6 +37,8 @@ pub struct WorkerConfig {
     pub endpoint: Endpoint,
     /// Threads to compute on, 1 to [`WORKER_THREADS_MAX`].
     pub threads: u32,
+    /// The instruction set to compute on; results do not depend on it.
+    pub isa: Isa,
     /// Ends the worker after this long without a coordinator; by default it tries without end.
     pub give_up_after: Option<Duration>,
     /// Drains and ends the worker after this long, e.g. shortly before a batch system would.
@@ -55,6 +58,12 @@ pub async fn run(
     if config.threads == 0 || config.threads > WORKER_THREADS_MAX {
         return Err(WorkerError::Threads { threads: config.threads, max: WORKER_THREADS_MAX });
     }
+    info!(
+        endpoint = %config.endpoint,
+        threads = config.threads,
+        instruction_set = config.isa.name(),
+        "starting"
+    );
     let (finished_sender, finished) = mpsc::channel(BATCHES_HELD_MAX);
     let mut worker = Worker {
         state: State::new(Identity {
@@ -62,7 +71,7 @@ pub async fn run(
             host: host_name(),
             process: std::process::id(),
         }),
-        cores: Cores::new(config.threads)?,
+        cores: Cores::new(config.threads, config.isa)?,
         stops: BTreeMap::new(),
         finished_sender,
         finished,

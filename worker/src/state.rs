@@ -5,11 +5,10 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::Solved;
 use osteon_common::version;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
-use osteon_proto::realizations;
 use osteon_proto::v1;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
@@ -47,10 +46,10 @@ pub(crate) struct Task {
 /// How the computation of a batch ended.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Computed {
-    /// All outcomes, in index order.
+    /// All realizations, in index order.
     Complete {
-        /// The outcomes.
-        outcomes: Vec<Outcome>,
+        /// The realizations.
+        solved: Vec<Solved>,
         /// Wall time, s.
         elapsed_s: f64,
     },
@@ -254,10 +253,9 @@ impl State {
             // Revoked, or of a lease that is over: nobody waits for it.
             return Vec::new();
         }
-        let Computed::Complete { outcomes, elapsed_s } = computed else { return Vec::new() };
+        let Computed::Complete { solved, elapsed_s } = computed else { return Vec::new() };
         self.held.remove(&task.batch);
-        let (codes, velocities) = realizations::pack(&outcomes);
-        let result = v1::BatchResult { batch: task.batch, codes, velocities, elapsed_s };
+        let result = batch::answer_to_message(task.batch, &solved, elapsed_s);
         let mut effects = vec![Effect::Send(Request::Result(result))];
         effects.extend(self.leave_if_idle());
         effects

@@ -12,11 +12,20 @@ const FORMAT: &[&str] = &["fmt", "--all", "--check"];
 const LINT: &[&str] = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
 const TEST: &[&str] = &["test", "--workspace"];
 
+const TABLES: &[&[&str]] = &[
+    &["run", "--release", "--", "study", "failures"],
+    &["run", "--release", "--", "study", "accuracy"],
+    &["run", "--release", "--", "study", "methods"],
+    &["run", "--release", "--", "study", "continuity"],
+    &["run", "--release", "--", "study", "convergence"],
+];
+
 const TASKS: &[Task] = &[
     ("format", "format the code", &[&["fmt", "--all"]]),
     ("lint", "formatting and lints, as CI wants them", &[FORMAT, LINT]),
     ("test", "every test", &[TEST]),
     ("ci", "what CI runs: formatting, lints, every test", &[FORMAT, LINT, TEST]),
+    ("tables", "the tables of docs/validation.md, on stdout", TABLES),
     ("docs", "the documentation of all crates", &[&["doc", "--workspace", "--no-deps"]]),
 ];
 

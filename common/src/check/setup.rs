@@ -6,6 +6,7 @@ use crate::layers::{Fluid, Layers};
 use crate::limits;
 use crate::probe::Probe;
 use crate::sampling::pair_count;
+use crate::settings::Method;
 use crate::violations::Violations;
 
 use super::{known_wrong, number, whole};
@@ -26,8 +27,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
         Interval::between(0.0, 1.0, ""),
         violations,
     );
-    let refinement = Interval::from_to(limits::REFINEMENT_MIN, limits::REFINEMENT_MAX, "");
-    number("solver.refinement", setup.solver.refinement, refinement, violations);
+    super::solver::solver(&setup.solver, violations);
     sampling(setup, violations);
 }
 
@@ -96,8 +96,11 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
     }
 }
 
-/// The sampling of frequencies and wavenumbers stays within its bound.
+/// The exact method's sampling of frequencies and wavenumbers stays within its bound.
 fn sampling(setup: &Setup, violations: &mut Violations) {
+    if setup.solver.method != Method::Exact {
+        return;
+    }
     let fields = ["layers", "probe", "picking", "solver"];
     if fields.iter().any(|field| violations.touches(field)) {
         return;

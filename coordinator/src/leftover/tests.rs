@@ -6,6 +6,7 @@ use std::time::Duration;
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings};
 use osteon_common::outcome::Outcome;
+use osteon_common::results::EstimatedError;
 
 use super::*;
 use crate::search::{Ending, Search, Step};
@@ -36,8 +37,12 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
                 let spread = 2000.0 * point.dispersion();
                 let outcomes: Arc<[Outcome]> = [Ok(3900.0 - spread), Ok(3900.0 + spread)].into();
                 let number = search.evaluations();
-                search.tell(outcomes.clone());
-                records.push(EvaluationRecord { job: JOB, number, point, outcomes });
+                let estimated_error =
+                    Some(EstimatedError { median: spread, largest: 2.0 * spread });
+                search.tell(outcomes.clone(), estimated_error);
+                let record =
+                    EvaluationRecord { job: JOB, number, point, outcomes, estimated_error };
+                records.push(record);
             }
         }
     };

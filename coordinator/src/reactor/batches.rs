@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::Solved;
 
 use super::{Effects, jobs, workers};
 use crate::effect::{CloseReason, Effect};
@@ -23,7 +23,7 @@ pub(super) fn answered(
     state: &mut State,
     worker: WorkerId,
     batch: BatchId,
-    outcomes: &[Outcome],
+    solved: &[Solved],
     elapsed_s: f64,
     now: Duration,
     effects: &mut Effects,
@@ -38,7 +38,7 @@ pub(super) fn answered(
     let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
         return;
     };
-    let (found, expected) = (outcomes.len(), assignment.indices.count);
+    let (found, expected) = (solved.len(), assignment.indices.count);
     if found as u64 != expected {
         let reason = CloseReason::WrongCount { batch, found, expected };
         workers::close(state, worker, reason, now, effects);
@@ -52,7 +52,7 @@ pub(super) fn answered(
             revoke(state, twin, now, effects);
         }
     }
-    fill(state, &assignment, outcomes, now, effects);
+    fill(state, &assignment, solved, now, effects);
     workers::dismiss_if_drained(state, worker, now, effects);
 }
 
@@ -104,7 +104,7 @@ pub(super) fn orphaned(
 fn fill(
     state: &mut State,
     assignment: &Assignment,
-    outcomes: &[Outcome],
+    solved: &[Solved],
     now: Duration,
     effects: &mut Effects,
 ) {
@@ -113,7 +113,7 @@ fn fill(
         return;
     };
     let before = evaluation.filled();
-    let filled = evaluation.fill(indices, outcomes);
+    let filled = evaluation.fill(indices, solved);
     let news = evaluation.filled() - before;
     let point = evaluation.point;
     if let Some(job) = state.jobs.get_mut(&job) {

@@ -39,7 +39,7 @@ pub(super) fn stored(
         }
         (RecordKey::Evaluation(number), Stage::Storing(record)) if record.number == number => {
             if let Some(search) = &mut job.search {
-                search.tell(record.outcomes.clone());
+                search.tell(record.outcomes.clone(), record.estimated_error);
             }
             job.trouble = None;
             advance(state, id, now, effects);
@@ -101,11 +101,11 @@ pub(super) fn store_if_complete(state: &mut State, id: JobId, effects: &mut Effe
     let Stage::Computing(evaluation) = &job.stage else {
         return;
     };
-    let Some(outcomes) = evaluation.complete() else {
+    let Some((outcomes, estimated_error)) = evaluation.complete() else {
         return;
     };
-    let record =
-        EvaluationRecord { job: id, number: evaluation.number, point: evaluation.point, outcomes };
+    let (number, point) = (evaluation.number, evaluation.point);
+    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error };
     effects.push(Effect::Store(Record::Evaluation(record.clone())));
     job.stage = Stage::Storing(record);
 }

@@ -97,7 +97,7 @@ fn replay(
             gap = Some(RestoreError::Gap { job, missing });
             return ControlFlow::Break(());
         }
-        told = search.retell(stored.point, stored.outcomes);
+        told = search.retell(stored.point, stored.outcomes, stored.estimated_error);
         if told.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     })?;
     match gap {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::{Outcome, Solved};
 use osteon_common::version;
 
 use super::*;
@@ -132,8 +132,9 @@ fn hello(worker: u64, threads: u32) -> Event {
 
 /// An answer whose velocities follow from the indices, computed in `elapsed_s`.
 fn answer_in(elapsed_s: f64, worker: u64, batch: u64, first: u64, count: u64) -> Event {
-    let outcomes = (first..first + count).map(velocity).collect();
-    Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), outcomes, elapsed_s }
+    let solved = |index| Solved { outcome: velocity(index), estimated_error: 0.0 };
+    let solved = (first..first + count).map(solved).collect();
+    Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s }
 }
 
 fn answer(worker: u64, batch: u64, first: u64, count: u64) -> Event {

@@ -22,6 +22,8 @@ fn specification(max_evaluations: u64) -> JobSpecification {
     }
 }
 
+const ERRORS: Option<EstimatedError> = Some(EstimatedError { median: 2e-5, largest: 3e-5 });
+
 /// Four velocities whose moments follow from e_L and the dispersion.
 fn outcomes(point: &Point) -> Arc<[Outcome]> {
     let mean = 3900.0 * (point.0[1] / 17.7e9);
@@ -38,7 +40,7 @@ fn run(specification: &JobSpecification) -> (Search, Told) {
     let mut told = Vec::new();
     while let Step::Evaluate(point) = search.ask() {
         told.push((point, outcomes(&point)));
-        search.tell(outcomes(&point));
+        search.tell(outcomes(&point), ERRORS);
     }
     (search, told)
 }
@@ -92,12 +94,12 @@ fn a_replay_of_any_part_of_the_path_goes_on_the_same_way() {
     for length in 0..=told.len() {
         let mut search = Search::new(Arc::new(specification.clone()));
         for (point, outcomes) in &told[..length] {
-            search.retell(*point, outcomes.clone()).unwrap();
+            search.retell(*point, outcomes.clone(), ERRORS).unwrap();
         }
         assert_eq!(search.evaluations(), length as u64);
         for (point, outcomes) in &told[length..] {
             assert_eq!(search.ask(), Step::Evaluate(*point));
-            search.tell(outcomes.clone());
+            search.tell(outcomes.clone(), ERRORS);
         }
         assert_eq!(search.ask(), full.ask());
         assert_eq!(search.history(), full.history());
@@ -112,7 +114,8 @@ fn a_replay_of_another_path_is_refused() {
     let (_, mut told) = run(&specification);
     told[3].0.0[1] += 1.0;
     let mut search = Search::new(Arc::new(specification));
-    let mut retold = told.into_iter().map(|(point, outcomes)| search.retell(point, outcomes));
+    let mut retold =
+        told.into_iter().map(|(point, outcomes)| search.retell(point, outcomes, ERRORS));
     assert_eq!(retold.find_map(Result::err).unwrap().number, 3);
 }
 
@@ -132,7 +135,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     let mut failed = outcomes(&specification(400).start()).to_vec();
     failed[2] = Err(FailureKind::NoArrival);
     while let Step::Evaluate(_) = search.ask() {
-        search.tell(failed.clone().into());
+        search.tell(failed.clone().into(), ERRORS);
     }
     let Ending { status, reason } = ending(&search);
     let reason = reason.unwrap();
@@ -148,10 +151,10 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
 #[test]
 fn an_infeasible_point_is_not_best_even_while_nothing_else_is_known() {
     let mut search = Search::new(Arc::new(specification(400)));
-    search.tell([Err(FailureKind::NoArrival); 4].into());
+    search.tell([Err(FailureKind::NoArrival); 4].into(), ERRORS);
     assert_eq!(search.best(), None);
     let Step::Evaluate(point) = search.ask() else { panic!("done") };
-    search.tell(outcomes(&point));
+    search.tell(outcomes(&point), ERRORS);
     assert_eq!(search.best().unwrap().number, 1);
 }
 
@@ -162,7 +165,7 @@ fn failures_within_the_fraction_leave_a_finite_cost() {
     let mut search = Search::new(Arc::new(job));
     let mut failed = outcomes(&specification(400).start()).to_vec();
     failed[2] = Err(FailureKind::NoArrival);
-    search.tell(failed.into());
+    search.tell(failed.into(), ERRORS);
     assert!(search.history()[0].cost.unwrap().is_finite());
     assert_eq!(search.history()[0].failures.total(), 1);
 }
@@ -176,10 +179,11 @@ fn a_propagation_is_one_evaluation_at_the_start() {
     assert_eq!(told[0].0, propagation.start());
     let result = search.result(&ending(&search), "1");
     assert_eq!((result.status, result.data), (Status::Converged, None));
-    assert_eq!(result.best.unwrap().cost, None);
+    let best = result.best.unwrap();
+    assert_eq!((best.cost, best.estimated_error), (None, ERRORS));
 
     let mut search = Search::new(Arc::new(propagation));
-    search.tell([Err(FailureKind::NotFinite); 4].into());
+    search.tell([Err(FailureKind::NotFinite); 4].into(), ERRORS);
     let Ending { status, reason } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("4 of 4 realizations failed (4 not_finite)"));
@@ -197,7 +201,7 @@ fn inadmissible_points_are_not_evaluated() {
     while let Step::Evaluate(point) = search.ask() {
         assert!(point.constants().violated().is_empty(), "{point:?}");
         evaluated += 1;
-        search.tell(outcomes(&point));
+        search.tell(outcomes(&point), ERRORS);
     }
     assert_eq!(search.evaluations(), evaluated);
 }

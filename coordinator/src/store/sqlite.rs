@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::Point;
-use osteon_common::results::{Moments, Status};
+use osteon_common::results::{EstimatedError, Moments, Status};
 use osteon_proto::{specification, v1};
 use prost::Message as _;
 use rusqlite::{Connection, ErrorCode, OptionalExtension as _, Row, params};
@@ -25,7 +25,9 @@ use crate::search::{Ending, Summary};
 mod summary;
 
 /// Format that this program writes.
-const FORMAT: i64 = 2;
+const FORMAT: i64 = 3;
+/// Oldest format that this program brings up to date.
+const FORMAT_OLDEST: i64 = 2;
 /// Name of the file in the store's directory.
 const FILE: &str = "osteon.sqlite";
 /// How long to wait for a coordinator that is just ending.
@@ -48,6 +50,7 @@ const SCHEMA: &str = "
         point BLOB NOT NULL,             -- seven little-endian f64
         outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
         checksum BLOB NOT NULL,
+        estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
         PRIMARY KEY (job, number)
     );
     CREATE TABLE ending (
@@ -69,6 +72,12 @@ const SCHEMA: &str = "
         history BLOB NOT NULL,           -- osteon.v1.HistoryBlock
         checksum BLOB NOT NULL
     );
+";
+
+/// From format 2, which knew no estimated errors. The checksum of a row without one is the same.
+const FROM_FORMAT_2: &str = "
+    ALTER TABLE evaluation ADD COLUMN estimated_error BLOB;
+    UPDATE format SET version = 3;
 ";
 
 /// A store in a SQLite file.
@@ -192,7 +201,7 @@ impl Store for SqliteStore {
         first: u64,
         visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
     ) -> Result<(), StoreError> {
-        let sql = "SELECT number, point, outcomes, checksum FROM evaluation
+        let sql = "SELECT number, point, outcomes, checksum, estimated_error FROM evaluation
                    WHERE job = ?1 AND number >= ?2 ORDER BY number";
         let refused = |source| self.refused(source);
         let mut statement = self.connection.prepare(sql).map_err(refused)?;
@@ -242,9 +251,11 @@ impl Store for SqliteStore {
     fn put_evaluation(&mut self, record: &EvaluationRecord) -> Result<(), StoreError> {
         let point: Vec<u8> = record.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
         let outcomes = pack_outcomes(&record.outcomes);
-        let checksum = evaluation_checksum(record.job, record.number, &point, &outcomes);
-        let sql = "INSERT OR REPLACE INTO evaluation VALUES (?1, ?2, ?3, ?4, ?5)";
-        let values = params![record.job.0, record.number, point, outcomes, checksum];
+        let errors = record.estimated_error.map(pack_errors);
+        let checksum =
+            evaluation_checksum(record.job, record.number, &point, &outcomes, errors.as_deref());
+        let sql = "INSERT OR REPLACE INTO evaluation VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+        let values = params![record.job.0, record.number, point, outcomes, checksum, errors];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
@@ -281,7 +292,8 @@ impl Store for SqliteStore {
     }
 }
 
-/// Sets the modes, takes the lock and makes the tables of a new file.
+/// Sets the modes, takes the lock, makes the tables of a new file, and brings those of an old one
+/// up to date.
 fn prepare(connection: &mut Connection) -> rusqlite::Result<()> {
     connection.busy_timeout(BUSY_TIMEOUT)?;
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE")?;
@@ -300,6 +312,10 @@ fn prepare(connection: &mut Connection) -> rusqlite::Result<()> {
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
     }
+    let found: i64 = transaction.query_row("SELECT version FROM format", [], |row| row.get(0))?;
+    if found == FORMAT_OLDEST {
+        transaction.execute_batch(FROM_FORMAT_2)?;
+    }
     transaction.commit()
 }
 
@@ -315,11 +331,17 @@ fn refusal(path: &Path, source: rusqlite::Error) -> StoreError {
 fn evaluation(job: JobId, row: &Row<'_>) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
     let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
     let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
-    let intact = checksum == evaluation_checksum(job, number, point, outcomes);
-    let unpacked = intact.then(|| unpack(point).zip(unpack_outcomes(outcomes))).flatten();
-    let record =
-        unpacked.map(|(point, outcomes)| EvaluationRecord { job, number, point, outcomes });
-    Ok((number, record))
+    let errors = row.get_ref(4)?.as_blob_or_null()?;
+    let intact = checksum == evaluation_checksum(job, number, point, outcomes, errors);
+    let unpacked = || {
+        let (point, outcomes) = unpack(point).zip(unpack_outcomes(outcomes))?;
+        let estimated_error = match errors {
+            Some(packed) => Some(unpack_errors(packed)?),
+            None => None,
+        };
+        Some(EvaluationRecord { job, number, point, outcomes, estimated_error })
+    };
+    Ok((number, intact.then(unpacked).flatten()))
 }
 
 /// Nanoseconds as the file holds them: SQLite knows signed integers only.
@@ -338,8 +360,18 @@ fn job_checksum(
     checksum(&[&job, request_id.as_bytes(), &accepted, specification, fingerprint.as_bytes()])
 }
 
-fn evaluation_checksum(job: JobId, number: u64, point: &[u8], outcomes: &[u8]) -> Vec<u8> {
-    checksum(&[&job.0.to_le_bytes(), &number.to_le_bytes(), point, outcomes])
+/// What is absent has no field.
+fn evaluation_checksum(
+    job: JobId,
+    number: u64,
+    point: &[u8],
+    outcomes: &[u8],
+    errors: Option<&[u8]>,
+) -> Vec<u8> {
+    let (job, number) = (job.0.to_le_bytes(), number.to_le_bytes());
+    let mut fields: Vec<&[u8]> = vec![&job, &number, point, outcomes];
+    fields.extend(errors);
+    checksum(&fields)
 }
 
 fn end_checksum(end: &EndRecord) -> Vec<u8> {
@@ -386,6 +418,17 @@ fn unpack_outcomes(packed: &[u8]) -> Option<Arc<[Outcome]>> {
     let outcome =
         |[code, velocity @ ..]: &[u8; OUTCOME_BYTES]| decode(*code, f64::from_le_bytes(*velocity));
     rest.is_empty().then(|| records.iter().map(outcome).collect()).flatten()
+}
+
+fn pack_errors(errors: EstimatedError) -> Vec<u8> {
+    [errors.median, errors.largest].into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
+fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
+    let (values, rest) = packed.as_chunks::<8>();
+    let &[median, largest] = values else { return None };
+    let (median, largest) = (f64::from_le_bytes(median), f64::from_le_bytes(largest));
+    rest.is_empty().then_some(EstimatedError { median, largest })
 }
 
 fn unpack(point: &[u8]) -> Option<Point> {

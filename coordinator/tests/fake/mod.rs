@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
-use osteon_common::results::JobResult;
+use osteon_common::results::{EstimatedError, JobResult};
 use osteon_common::version::VERSION;
 use osteon_coordinator::search::{Search as Driven, Step};
 use osteon_proto::batch::Work;
@@ -54,22 +54,23 @@ pub(crate) fn propagation(realizations: u64, seed: u64) -> JobSpecification {
     }
 }
 
-/// All outcomes of a batch.
-pub(crate) fn outcomes(work: &Work) -> Vec<Outcome> {
-    (work.first..work.first + u64::from(work.count)).map(|index| outcome(work, index)).collect()
+/// All realizations of a batch.
+pub(crate) fn solved(work: &Work) -> Vec<Solved> {
+    (work.first..work.first + u64::from(work.count)).map(|index| realization(work, index)).collect()
 }
 
-/// The outcome at one index.
-pub(crate) fn outcome(work: &Work, index: u64) -> Outcome {
+/// The realization at one index.
+fn realization(work: &Work, index: u64) -> Solved {
     let noise = mix(work.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if noise.is_multiple_of(29) {
-        return Err(FailureKind::ALL[(noise / 29 % 5) as usize]);
+        return Solved::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
     }
     let uniform = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
     let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.point.0;
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
-    Ok(0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform))
+    let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
+    Solved { outcome: Ok(velocity), estimated_error: 1e-5 * (noise % 1000) as f64 / velocity }
 }
 
 /// A well mixed function of one number (splitmix64).
@@ -85,14 +86,20 @@ pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
     let mut search = Driven::new(Arc::new(specification.clone()));
     loop {
         match search.ask() {
-            Step::Evaluate(point) => search.tell(all_outcomes(specification, point)),
+            Step::Evaluate(point) => {
+                let (outcomes, estimated_error) = evaluation(specification, point);
+                search.tell(outcomes, estimated_error);
+            }
             Step::Done(ending) => return search.result(&ending, VERSION),
         }
     }
 }
 
-/// All outcomes at one point.
-pub(crate) fn all_outcomes(specification: &JobSpecification, point: Point) -> Arc<[Outcome]> {
+/// All outcomes at one point, with the median and the largest of their estimated errors.
+pub(crate) fn evaluation(
+    specification: &JobSpecification,
+    point: Point,
+) -> (Arc<[Outcome]>, Option<EstimatedError>) {
     let work = |first| Work {
         setup: specification.setup,
         point,
@@ -102,5 +109,18 @@ pub(crate) fn all_outcomes(specification: &JobSpecification, point: Point) -> Ar
         count: 1,
     };
     let indices = 0..specification.monte_carlo.realizations;
-    indices.map(|index| outcome(&work(index), index)).collect()
+    let solved: Vec<_> = indices.map(|index| realization(&work(index), index)).collect();
+    let successes = solved.iter().filter(|solved| solved.outcome.is_ok());
+    let mut errors: Vec<_> = successes.map(|solved| solved.estimated_error).collect();
+    errors.sort_by(f64::total_cmp);
+    let middle = errors.len() / 2;
+    let estimated_error = errors.last().map(|&largest| EstimatedError {
+        // Half-way between both middle ones where there are two.
+        median: match errors.len() % 2 {
+            0 => 0.5_f64.mul_add(errors[middle] - errors[middle - 1], errors[middle - 1]),
+            _ => errors[middle],
+        },
+        largest,
+    });
+    (solved.iter().map(|solved| solved.outcome).collect(), estimated_error)
 }

@@ -75,7 +75,8 @@ fn broken_run(specification: &JobSpecification, evaluations: usize, ending: &End
     let mut search = Search::new(Arc::new(specification.clone()));
     for _ in 0..evaluations {
         if let Step::Evaluate(point) = search.ask() {
-            search.tell(fake::all_outcomes(specification, point));
+            let (outcomes, estimated_error) = fake::evaluation(specification, point);
+            search.tell(outcomes, estimated_error);
         }
     }
     search.result(ending, VERSION)

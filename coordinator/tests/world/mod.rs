@@ -323,9 +323,9 @@ impl World {
 
     fn message(&mut self, worker: WorkerId, event: Event) {
         let known = self.workers.get_mut(&worker).unwrap();
-        if let Event::Answered { batch, outcomes, .. } = &event {
+        if let Event::Answered { batch, solved, .. } = &event {
             let held = known.holds.get(batch).copied();
-            let malformed = held.is_some_and(|work| outcomes.len() != work.count as usize);
+            let malformed = held.is_some_and(|work| solved.len() != work.count as usize);
             if malformed && !self.may_die(worker) {
                 let answer = answer(worker, *batch, &held.unwrap());
                 self.message(worker, answer);
@@ -399,10 +399,10 @@ impl World {
     fn lie(&mut self, worker: WorkerId, batch: BatchId, work: &Work) {
         let speaks = |worker: &Worker| !worker.stalled && !worker.holds.contains_key(&batch);
         if self.workers.get(&worker).is_some_and(speaks) {
-            let mut outcomes = fake::outcomes(work);
-            outcomes[0] = Ok(1.0);
+            let mut solved = fake::solved(work);
+            solved[0].outcome = Ok(1.0);
             self.lied = true;
-            self.message(worker, Event::Answered { worker, batch, outcomes, elapsed_s: 0.01 });
+            self.message(worker, Event::Answered { worker, batch, solved, elapsed_s: 0.01 });
         }
     }
 
@@ -526,7 +526,7 @@ fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
 }
 
 fn answer(worker: WorkerId, batch: BatchId, work: &Work) -> Event {
-    Event::Answered { worker, batch, outcomes: fake::outcomes(work), elapsed_s: 0.01 }
+    Event::Answered { worker, batch, solved: fake::solved(work), elapsed_s: 0.01 }
 }
 
 fn put(store: &mut MemoryStore, record: &Record) {

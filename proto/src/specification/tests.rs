@@ -1,4 +1,5 @@
 use osteon_common::case::Setup;
+use osteon_common::settings::{Method, SolverSettings};
 use proptest::prelude::*;
 
 use super::*;
@@ -43,6 +44,21 @@ fn data() -> impl Strategy<Value = Data> {
     ]
 }
 
+fn solver() -> impl Strategy<Value = SolverSettings> {
+    let exact = (0.5..1.5)
+        .prop_map(|refinement| SolverSettings { refinement, ..SolverSettings::default() });
+    let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(
+        |(element_size, element_order, time_step)| SolverSettings {
+            method: Method::Hybrid,
+            refinement: 1.0,
+            element_size,
+            element_order,
+            time_step,
+        },
+    );
+    prop_oneof![exact, hybrid]
+}
+
 prop_compose! {
     fn specification()(
         data in proptest::option::of(data()),
@@ -52,10 +68,11 @@ prop_compose! {
         max_failed_fraction in 0.0..1.0,
         max_evaluations in 1_u64..1000,
         initial_step in 0.01..0.5,
+        solver in solver(),
     ) -> JobSpecification {
         JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
-            setup: Setup::default(),
+            setup: Setup { solver, ..Setup::default() },
             data,
             parameters,
             monte_carlo: MonteCarlo {
@@ -124,6 +141,23 @@ fn faults(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     violations.iter().map(|violation| violation.field.clone()).collect()
 }
 
+/// Gives everything that belongs to the hybrid method.
+fn of_hybrid(
+    message: &mut v1::JobSpecification,
+    method: &str,
+    element_size: f64,
+    element_order: u32,
+    time_step: f64,
+) {
+    message.solver = Some(v1::SolverSettings {
+        method: Some(method.to_owned()),
+        refinement: None,
+        element_size: Some(element_size),
+        element_order: Some(element_order),
+        time_step: Some(time_step),
+    });
+}
+
 #[test]
 fn each_fault_is_named_by_its_path() {
     assert_eq!(faults(|m| m.kind = 0), ["kind"]);
@@ -143,6 +177,10 @@ fn each_fault_is_named_by_its_path() {
         faults(|m| m.solver.as_mut().unwrap().method = Some("guess".to_owned())),
         ["solver.method"]
     );
+    let fields = ["solver.element_size", "solver.element_order", "solver.time_step"];
+    assert_eq!(faults(|m| of_hybrid(m, "exact", 0.5e-3, 8, 1e-8)), fields);
+    assert_eq!(faults(|m| of_hybrid(m, "hybrid", 1.0, 1, -1e-8)), fields);
+    assert_eq!(faults(|m| of_hybrid(m, "guess", 1.0, 1, -1e-8)), ["solver.method"]);
     assert_eq!(
         faults(|m| m.parameters.as_mut().unwrap().dispersion = None),
         ["parameters.dispersion"]

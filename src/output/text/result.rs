@@ -6,7 +6,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results_json;
 use serde_json::Value;
 
-use super::{aligned, significant};
+use super::{aligned, significant, solver};
 use crate::output::ShownResult;
 use crate::verdict;
 
@@ -19,6 +19,10 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
     match shown.kind {
         JobKind::Identification => identification(&mut text, &value, shown),
         JobKind::Propagation => propagation(&mut text, &value, shown),
+    }
+    let solver = solver::line(&value["solver"]);
+    if !solver.is_empty() {
+        text.push_str(&format!("\n{solver}\n"));
     }
     if let Some(digest) = value["digest"].as_str() {
         text.push_str(&format!("\ndigest {digest}\n"));

@@ -13,23 +13,23 @@ fn work(point: Point, first: u64, count: u32) -> Work {
     Work { setup: Setup::default(), point, seed: 5, sampling: Sampling::MonteCarlo, first, count }
 }
 
-fn outcomes(threads: u32, work: Work) -> Vec<Outcome> {
+fn solved(threads: u32, work: Work) -> Vec<Solved> {
     let (sender, receiver) = mpsc::channel();
-    let cores = Cores::new(threads).unwrap();
+    let cores = Cores::new(threads, Isa::fastest()).unwrap();
     cores.start(work, StopFlag::default(), move |computed| sender.send(computed).unwrap());
     match receiver.recv_timeout(DEADLINE).unwrap() {
-        Computed::Complete { outcomes, .. } => outcomes,
+        Computed::Complete { solved, .. } => solved,
         other => panic!("{other:?}"),
     }
 }
 
 #[test]
 fn outcomes_do_not_depend_on_threads_or_batches() {
-    let whole = outcomes(1, work(POINT, 0, 12));
-    assert_eq!(outcomes(3, work(POINT, 0, 12)), whole);
+    let whole = solved(1, work(POINT, 0, 12));
+    assert_eq!(solved(3, work(POINT, 0, 12)), whole);
     let parts = [(0, 5), (5, 1), (6, 6)];
     let joined: Vec<_> =
-        parts.iter().flat_map(|&(first, count)| outcomes(2, work(POINT, first, count))).collect();
+        parts.iter().flat_map(|&(first, count)| solved(2, work(POINT, first, count))).collect();
     assert_eq!(joined, whole);
 }
 
@@ -38,22 +38,26 @@ fn outcomes_are_those_of_the_solver_alone() {
     let solver = Solver::new(&Setup::default());
     let ensemble = Ensemble::new(&POINT, 5).unwrap();
     let expected: Vec<_> = (3..7)
-        .map(|index| solver.outcome(&ensemble.bone(index).unwrap(), &mut Workspace::default()))
+        .map(|index| {
+            let bone = ensemble.bone(index).unwrap();
+            let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
+            Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+        })
         .collect();
-    assert_eq!(outcomes(2, work(POINT, 3, 4)), expected);
+    assert_eq!(solved(2, work(POINT, 3, 4)), expected);
 }
 
 #[test]
 fn a_point_without_an_ensemble_fails_at_every_index() {
     let mut inadmissible = POINT;
     inadmissible.0[5] = 1.2;
-    assert_eq!(outcomes(2, work(inadmissible, 0, 3)), [Err(FailureKind::NotFinite); 3]);
+    assert_eq!(solved(2, work(inadmissible, 0, 3)), [Solved::failed(FailureKind::NotFinite); 3]);
 }
 
 #[test]
 fn a_raised_flag_ends_the_computation() {
     let (sender, receiver) = mpsc::channel();
-    let cores = Cores::new(1).unwrap();
+    let cores = Cores::new(1, Isa::fastest()).unwrap();
     let stop = StopFlag::default();
     stop.raise();
     cores.start(work(POINT, 0, 65_536), stop, move |computed| sender.send(computed).unwrap());
@@ -62,7 +66,7 @@ fn a_raised_flag_ends_the_computation() {
 
 #[test]
 fn few_solvers_are_kept_and_each_is_made_once() {
-    let solvers = Solvers::default();
+    let solvers = Solvers::new(Isa::fastest());
     let setup = |thickness: f64| {
         let mut setup = Setup::default();
         setup.layers.bone_thickness = thickness;
@@ -78,7 +82,7 @@ fn few_solvers_are_kept_and_each_is_made_once() {
         assert!(Arc::ptr_eq(&first, &solvers.get(&setup(4e-3))));
     }
     solvers.get(&setup(3e-3));
-    assert_eq!(solvers.0.lock().unwrap().len(), SOLVERS_MAX);
+    assert_eq!(solvers.kept.lock().unwrap().len(), SOLVERS_MAX);
     assert!(Arc::ptr_eq(&first, &solvers.get(&setup(4e-3))));
     assert!(!Arc::ptr_eq(&second, &solvers.get(&others[0])));
 }

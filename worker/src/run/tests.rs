@@ -95,7 +95,13 @@ fn scene(name: &str, script: Script) -> Scene {
 
 fn config(scene: &Scene) -> WorkerConfig {
     let endpoint = scene.endpoint.clone();
-    WorkerConfig { endpoint, threads: 1, give_up_after: None, time_limit: None }
+    WorkerConfig {
+        endpoint,
+        threads: 1,
+        isa: Isa::fastest(),
+        give_up_after: None,
+        time_limit: None,
+    }
 }
 
 async fn reached(attachments: &AtomicU32, count: u32) {
@@ -137,7 +143,13 @@ async fn threads_have_bounds() {
     let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
     for threads in [0, WORKER_THREADS_MAX + 1] {
         let endpoint = endpoint.clone();
-        let config = WorkerConfig { endpoint, threads, give_up_after: None, time_limit: None };
+        let config = WorkerConfig {
+            endpoint,
+            threads,
+            isa: Isa::fastest(),
+            give_up_after: None,
+            time_limit: None,
+        };
         let error = run(config, pending()).await.unwrap_err();
         assert!(matches!(error, WorkerError::Threads { .. }), "{error}");
     }

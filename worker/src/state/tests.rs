@@ -1,6 +1,6 @@
 use osteon_common::case::Setup;
 use osteon_common::job::Sampling;
-use osteon_common::outcome::FailureKind;
+use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::parameters::Point;
 
 use super::*;
@@ -51,8 +51,7 @@ impl Recorder {
     }
 
     fn complete(&mut self, attachment: u64, batch: u64) {
-        let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
-        let computed = Computed::Complete { outcomes, elapsed_s: 0.5 };
+        let computed = Computed::Complete { solved: solved(), elapsed_s: 0.5 };
         self.event(Event::Computed(Task { attachment, batch }, computed));
     }
 
@@ -90,9 +89,19 @@ fn abandon(attachment: u64, batch: u64) -> Effect {
     Effect::Abandon(Task { attachment, batch })
 }
 
+fn solved() -> Vec<Solved> {
+    let success = Solved { outcome: Ok(3900.0), estimated_error: 2e-5 };
+    vec![success, Solved::failed(FailureKind::NoArrival)]
+}
+
 fn answer(batch: u64) -> Effect {
-    let (codes, velocities) = (vec![0, 1], vec![3900.0, 0.0]);
-    Effect::Send(Request::Result(v1::BatchResult { batch, codes, velocities, elapsed_s: 0.5 }))
+    Effect::Send(Request::Result(v1::BatchResult {
+        batch,
+        codes: vec![0, 1],
+        velocities: vec![3900.0, 0.0],
+        elapsed_s: 0.5,
+        estimated_errors: vec![2e-5, 0.0],
+    }))
 }
 
 const HEARTBEAT: Effect = Effect::Send(Request::Heartbeat(v1::Heartbeat {}));

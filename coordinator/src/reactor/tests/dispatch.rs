@@ -134,13 +134,23 @@ fn a_copy_outlives_its_original_and_the_other_way_round() {
 
 #[test]
 fn a_different_answer_for_the_same_index_fails_the_job() {
+    let next_up = f64::from_bits(3900_f64.to_bits() + 1);
+    check_contradiction(
+        Solved { outcome: Ok(next_up), estimated_error: 0.0 },
+        "3900.0000000000005 m/s",
+    );
+    check_contradiction(Solved { outcome: velocity(0), estimated_error: 1e-9 }, "error 1e-9)");
+}
+
+/// Against the first answer for index 0.
+fn check_contradiction(different: Solved, shown: &str) {
     let mut rig = with_idle_worker();
     rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
     rig.check(answer(2, 3, 0, 1), &["revoke 1: batch 1", "send 2: batch 4 = 1+1"]);
     let different = Event::Answered {
         worker: WorkerId(1),
         batch: BatchId(1),
-        outcomes: vec![Ok(f64::from_bits(3900_f64.to_bits() + 1))],
+        solved: vec![different],
         elapsed_s: 0.1,
     };
     let effects = rig.event(different);
@@ -148,7 +158,7 @@ fn a_different_answer_for_the_same_index_fails_the_job() {
     let reason = &effects[0];
     assert!(reason.starts_with("store job 1 end: failed integrity error: two workers"), "{reason}");
     assert!(reason.contains("realization 0"), "{reason}");
-    assert!(reason.contains("3900.0000000000005 m/s"), "{reason}");
+    assert!(reason.contains(shown), "{reason}");
 }
 
 #[test]

@@ -34,6 +34,9 @@ fn evaluation(job: u64, number: u64) -> EvaluationRecord {
         number,
         point: Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1 + number as f64]),
         outcomes: Arc::from([Ok(3900.1), Err(FailureKind::NoConvergence), Ok(f64::MIN_POSITIVE)]),
+        // The second one as an older version would have put it.
+        estimated_error: (number != 1)
+            .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
     }
 }
 
@@ -65,6 +68,7 @@ fn summary(job: u64) -> Summary {
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
         failures: FailureCounts::of(&evaluation(job, number).outcomes),
+        estimated_error: evaluation(job, number).estimated_error,
     };
     Summary { digest: format!("{job:064x}"), best: Some(1), history: (0..2).map(row).collect() }
 }
@@ -105,8 +109,8 @@ fn a_second_coordinator_is_refused() {
 #[test]
 fn another_format_is_refused() {
     for (version, expected) in [
-        (1, "has format 1 of an older version of osteon, this program writes format 2; finish"),
-        (3, "has format 3, this program writes format 2; use a newer version of osteon"),
+        (1, "has format 1 of an older version of osteon, this program writes format 3; finish"),
+        (4, "has format 4, this program writes format 3; use a newer version of osteon"),
     ] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
@@ -114,6 +118,40 @@ fn another_format_is_refused() {
         drop(store);
         let error = SqliteStore::open(directory.path()).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+/// The table of evaluations as format 2 had it.
+const EVALUATION_OF_FORMAT_2: &str = "
+    DROP TABLE evaluation;
+    CREATE TABLE evaluation (
+        job INTEGER NOT NULL REFERENCES job(id),
+        number INTEGER NOT NULL,
+        point BLOB NOT NULL,
+        outcomes BLOB NOT NULL,
+        checksum BLOB NOT NULL,
+        PRIMARY KEY (job, number)
+    );
+    UPDATE format SET version = 2;
+";
+
+#[test]
+fn a_file_of_format_2_is_brought_up_to_date() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    store.connection.execute_batch(EVALUATION_OF_FORMAT_2).unwrap();
+    let old = evaluation(1, 1);
+    let point: Vec<u8> = old.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let outcomes = pack_outcomes(&old.outcomes);
+    let fields: [&[u8]; 4] = [&1_u64.to_le_bytes(), &1_u64.to_le_bytes(), &point, &outcomes];
+    let sql = "INSERT INTO evaluation VALUES (1, 1, ?1, ?2, ?3)";
+    store.connection.execute(sql, params![point, outcomes, checksum(&fields)]).unwrap();
+    drop(store);
+    for _ in 0..2 {
+        let mut store = SqliteStore::open(directory.path()).unwrap();
+        store.put_evaluation(&evaluation(1, 2)).unwrap();
+        assert_eq!(evaluations(&mut store, 1).unwrap(), [old.clone(), evaluation(1, 2)]);
     }
 }
 
@@ -163,6 +201,8 @@ fn every_damaged_record_is_named() {
         ("UPDATE evaluation SET outcomes = zeroblob(27)", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET point = zeroblob(56)", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET number = 8", DamagedRecord::Evaluation(8)),
+        ("UPDATE evaluation SET estimated_error = zeroblob(16)", DamagedRecord::Evaluation(7)),
+        ("UPDATE evaluation SET estimated_error = NULL", DamagedRecord::Evaluation(7)),
         ("UPDATE ending SET status = 'done'", DamagedRecord::End),
         ("UPDATE ending SET status = 'converged'", DamagedRecord::End),
         ("UPDATE ending SET reason = NULL", DamagedRecord::End),

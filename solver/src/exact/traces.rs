@@ -5,13 +5,15 @@ use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::sampling::Sampling;
 use thiserror::Error;
 
-use crate::complex::Complex;
-use crate::direct;
+use crate::exact::plate::AccuratePlate;
+use crate::exact::response::Spectra;
+use crate::exact::signal::Signal;
+use crate::exact::tables::Tables;
+use crate::exact::{FillPlate, direct};
 use crate::isa::Kernel;
-use crate::medium::Medium;
-use crate::signal::Signal;
-use crate::solver::{Solver, Workspace};
-use crate::tables::Tables;
+use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::solver::Solver;
+use crate::vector::Vector;
 
 /// Most samples of one trace.
 const SAMPLES_MAX: f64 = 1e7;
@@ -55,19 +57,24 @@ pub enum TraceError {
     NotFinite,
 }
 
-/// Computes the spectra of a filled plate.
-struct FillSpectra<'a> {
-    tables: &'a Tables,
-    medium: &'a Medium,
-    workspace: &'a mut Workspace,
+/// Computes the pressure at many times.
+struct Sample<'a> {
+    signal: Signal<'a>,
+    times: &'a [f64],
 }
 
-impl Kernel for FillSpectra<'_> {
-    type Output = ();
+impl Kernel for Sample<'_> {
+    type Output = Vec<f64>;
 
     #[inline(always)]
-    fn run(self) {
-        self.workspace.spectra.fill(self.tables, self.medium, &mut self.workspace.plate);
+    fn run<V: Vector>(self) -> Vec<f64> {
+        let mut pressures = Vec::with_capacity(self.times.len());
+        for chunk in self.times.chunks(LANES) {
+            let mut times = Lanes::ZERO;
+            times.0[..chunk.len()].copy_from_slice(chunk);
+            pressures.extend_from_slice(&self.signal.at::<V>(&times).0[..chunk.len()]);
+        }
+        pressures
     }
 }
 
@@ -85,7 +92,9 @@ impl Solver {
         if !(duration > 0.0 && time_step > 0.0 && (1.0..=SAMPLES_MAX).contains(&samples)) {
             return Err(TraceError::Samples { duration, time_step });
         }
-        let medium = Medium::new(bone);
+        let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
+        let thickness = self.setup().layers.bone_thickness;
+        let medium = self.isa().run(FillPlate { bone, thickness, plate: &mut plate });
         let fluids =
             self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
         let sampling = Sampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
@@ -94,17 +103,21 @@ impl Solver {
             return Err(TraceError::TooLong { duration, pairs });
         }
         let tables = Tables::new(self.setup(), sampling, self.setup().probe.amplitude);
-        let mut workspace = Workspace::default();
-        workspace.plate.fill(&medium, self.setup().layers.bone_thickness);
-        self.isa().run(FillSpectra { tables: &tables, medium: &medium, workspace: &mut workspace });
+        let taper = tables.taper(sampling.taper_start, sampling.band);
+        spectra.fill(self.isa(), &tables, &medium, &mut plate);
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
         let pressures: Vec<Vec<f64>> = (0..tables.receivers())
             .map(|r| {
-                let mut spectrum = workspace.spectra.receiver(r).to_vec();
+                let mut spectrum = spectra.receiver(r).to_vec();
                 self.add_fluid_waves(r, &tables, &mut spectrum);
-                let signal = Signal { sampling: &tables.sampling, spectrum: &spectrum };
-                times.iter().map(|&t| signal.at(t)).collect()
+                for (run, weights) in spectrum.iter_mut().zip(&taper) {
+                    run.re = run.re * *weights;
+                    run.im = run.im * *weights;
+                }
+                let signal =
+                    Signal { sampling: &tables.sampling, runs: &tables.runs, spectrum: &spectrum };
+                self.isa().run(Sample { signal, times: &times })
             })
             .collect();
         if pressures.iter().flatten().any(|p| !p.is_finite()) {
@@ -114,7 +127,7 @@ impl Solver {
     }
 
     /// Adds the direct wave and its image in the coupling's outer face at receiver `r`.
-    fn add_fluid_waves(&self, r: usize, tables: &Tables, spectrum: &mut [Complex]) {
+    fn add_fluid_waves(&self, r: usize, tables: &Tables, spectrum: &mut [ComplexLanes]) {
         let setup = self.setup();
         let coupling = &setup.layers.coupling;
         let (source, receivers) = (setup.probe.source, setup.probe.receivers);
@@ -122,10 +135,13 @@ impl Solver {
         let travel = |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
-        for (value, frequency) in spectrum.iter_mut().zip(&tables.frequencies) {
-            let wave = direct::pressure(coupling.density, direct, frequency.s)
-                - direct::pressure(coupling.density, image, frequency.s);
-            *value = *value + wave * frequency.pulse;
+        for (i, line) in tables.lines.iter().enumerate() {
+            let wave = direct::pressure(coupling.density, direct, line.s)
+                - direct::pressure(coupling.density, image, line.s);
+            let pressure = wave * line.pulse;
+            let run = &mut spectrum[i / LANES];
+            run.re.0[i % LANES] += pressure.re;
+            run.im.0[i % LANES] += pressure.im;
         }
     }
 }

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{Sampling, distances};
+use osteon_common::sampling::{RUN, Run, Sampling, distances};
 
 use crate::complex::Complex;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -20,96 +20,114 @@ const TAPER_MIN: f64 = 1e-9;
 pub(crate) struct Tables {
     setup: Setup,
     pub(crate) sampling: Sampling,
-    pub(crate) frequencies: Vec<Frequency>,
+    /// Where the lines stand on the frequency axis: eight lines a run.
+    pub(crate) runs: Vec<Run>,
+    pub(crate) lines: Vec<Line>,
+    /// Wavenumbers, rad/m, in blocks.
+    wavenumbers: Vec<Lanes>,
     /// cos(k x) of wavenumber block b at receiver r, at `[r * blocks + b]`.
     cosines: Vec<Lanes>,
     receivers: usize,
-    /// Most blocks of a frequency.
+    /// Most blocks of a line.
     blocks: usize,
 }
 
 /// One complex frequency.
 #[derive(Debug)]
-pub(crate) struct Frequency {
+pub(crate) struct Line {
+    /// Number of the frequency.
+    pub(crate) n: usize,
     /// α + i ω, 1/s.
     pub(crate) s: Complex,
     /// ρ1 s², kg/m³/s².
     pub(crate) inertia: Complex,
-    /// F(s) times the taper.
+    /// F(s) times the line's share in the sum over frequencies; not yet tapered.
     pub(crate) pulse: Complex,
-    /// Number of the frequency.
-    n: usize,
-    /// Number of blocks of wavenumbers.
+    /// Number of blocks of wavenumbers; none where the line is not needed.
     pub(crate) blocks: usize,
     /// The blocks, unless there are too many to be kept.
     kept: Vec<Block>,
+    /// exp(-2 g h1) of the kept blocks where the outer face of the coupling is heard, else nothing.
+    echoes: Vec<ComplexLanes>,
 }
 
 /// Eight neighbouring wavenumbers of one frequency.
 #[derive(Debug)]
 pub(crate) struct Block {
-    /// k, rad/m; lanes beyond the last wavenumber repeat it with weight 0.
-    pub(crate) k: Lanes,
     /// g = √(k² + s²/c1²), rad/m.
     pub(crate) g: ComplexLanes,
     /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m: what loads the lower face.
     pub(crate) load: ComplexLanes,
     /// Everything that multiplies the reflection coefficient, with the measure of the sum over k.
     pub(crate) weight: ComplexLanes,
-    /// exp(-2 g h1) where the outer face of the coupling is heard, else 0.
-    pub(crate) echo: ComplexLanes,
 }
 
 impl Tables {
     /// Tables for a pulse of the given amplitude.
     pub(crate) fn new(setup: &Setup, sampling: Sampling, amplitude: f64) -> Self {
         let probe = &setup.probe;
-        let pulse = Pulse::new(amplitude, probe.center_frequency);
-        let count =
-            (0..sampling.frequencies()).take_while(|&n| sampling.taper(n) > TAPER_MIN).count();
-        let spectrum = pulse.spectrum(sampling.damping, sampling.period, count);
+        let runs = sampling.runs();
+        let numbers: Vec<usize> = runs.iter().flat_map(|run| run.frequencies()).collect();
+        let spectrum = Pulse::new(amplitude, probe.center_frequency).spectrum(
+            sampling.damping,
+            sampling.period,
+            &numbers,
+        );
         let keep = sampling.pairs() <= KEPT_PAIRS_MAX;
-        let frequencies: Vec<_> = spectrum
+        let lines: Vec<_> = numbers
             .iter()
-            .enumerate()
-            .map(|(n, pulse)| {
-                let mut frequency =
-                    Frequency::new(setup, &sampling, n, pulse.scale(sampling.taper(n)));
+            .zip(spectrum)
+            .map(|(&n, pulse)| {
+                let mut line = Line::new(setup, &sampling, n, pulse);
                 if keep {
-                    frequency.kept = (0..frequency.blocks)
-                        .map(|b| frequency.block(setup, &sampling, b))
-                        .collect();
+                    line.keep(setup, &sampling);
                 }
-                frequency
+                line
             })
             .collect();
-        let blocks = frequencies.iter().map(|f| f.blocks).max().unwrap_or(0);
+        let blocks = lines.iter().map(|line| line.blocks).max().unwrap_or(0);
         let positions: Vec<f64> = distances(setup).collect();
+        let wavenumbers: Vec<Lanes> = (0..blocks)
+            .map(|b| {
+                let first = b * LANES;
+                Lanes(std::array::from_fn(|lane| (first + lane) as f64 * sampling.wavenumber_step))
+            })
+            .collect();
         let cosines = positions
             .iter()
-            .flat_map(|&x| (0..blocks).map(move |b| (b, x)))
-            .map(|(b, x)| {
-                Lanes(std::array::from_fn(|lane| {
-                    let k = (b * LANES + lane) as f64 * sampling.wavenumber_step;
-                    libm::cos(k * x)
-                }))
-            })
+            .flat_map(|&x| wavenumbers.iter().map(move |k| Lanes(k.0.map(|k| libm::cos(k * x)))))
             .collect();
-        Self { setup: *setup, sampling, frequencies, cosines, receivers: positions.len(), blocks }
+        Self {
+            setup: *setup,
+            sampling,
+            runs,
+            lines,
+            wavenumbers,
+            cosines,
+            receivers: positions.len(),
+            blocks,
+        }
     }
 
-    /// Block `b` of a frequency, taken from the tables or made in `scratch`.
+    /// Block `b` of a line, taken from the tables or made in `scratch`.
     #[inline(always)]
     pub(crate) fn block<'a>(
         &'a self,
-        frequency: &'a Frequency,
+        line: &'a Line,
         b: usize,
-        scratch: &'a mut Option<Block>,
-    ) -> &'a Block {
-        match frequency.kept.get(b) {
-            Some(block) => block,
-            None => scratch.insert(frequency.block(&self.setup, &self.sampling, b)),
+        scratch: &'a mut Option<(Block, ComplexLanes)>,
+    ) -> (&'a Block, &'a ComplexLanes) {
+        if let Some(block) = line.kept.get(b) {
+            return (block, line.echoes.get(b).unwrap_or(&ComplexLanes::ZERO));
         }
+        let (block, echo) = scratch.insert(line.block(&self.setup, &self.sampling, b));
+        (block, echo)
+    }
+
+    /// The wavenumbers of block `b`, rad/m, the same at every frequency.
+    #[inline(always)]
+    pub(crate) fn wavenumbers(&self, b: usize) -> &Lanes {
+        &self.wavenumbers[b]
     }
 
     /// cos(k x) at receiver `r`, one entry per block of wavenumbers.
@@ -121,42 +139,69 @@ impl Tables {
     pub(crate) fn receivers(&self) -> usize {
         self.receivers
     }
+
+    /// Weights of the lines, eight at a time, that cut the band smoothly from `start` to `end` Hz.
+    pub(crate) fn taper(&self, start: f64, end: f64) -> Vec<Lanes> {
+        let weights = |run: &Run| {
+            let mut lanes = Lanes::ZERO;
+            for (lane, n) in lanes.0.iter_mut().zip(run.frequencies()) {
+                *lane = self.sampling.taper(n, start, end);
+            }
+            lanes
+        };
+        self.runs.iter().map(weights).collect()
+    }
 }
 
-impl Frequency {
+impl Line {
     fn new(setup: &Setup, sampling: &Sampling, n: usize, pulse: Complex) -> Self {
         let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
         let inertia = (s * s).scale(setup.layers.coupling.density);
-        let blocks = sampling.wavenumbers(n).div_ceil(LANES);
-        Self { s, inertia, pulse, n, blocks, kept: Vec::new() }
+        let computed = sampling.is_computed(n)
+            && sampling.taper(n, sampling.taper_start, sampling.band) > TAPER_MIN;
+        let blocks = if computed { sampling.wavenumbers(n) / LANES } else { 0 };
+        // Of the two signs of every frequency but zero, one is summed: the factor 2 is the sum's.
+        let share = if n == 0 { 0.5 } else { sampling.share(n) };
+        Self {
+            n,
+            s,
+            inertia,
+            pulse: pulse.scale(share),
+            blocks,
+            kept: Vec::new(),
+            echoes: Vec::new(),
+        }
     }
 
-    fn block(&self, setup: &Setup, sampling: &Sampling, b: usize) -> Block {
-        let count = sampling.wavenumbers(self.n);
-        let mut block = Block {
-            k: Lanes::ZERO,
-            g: ComplexLanes::ZERO,
-            load: ComplexLanes::ZERO,
-            weight: ComplexLanes::ZERO,
-            echo: ComplexLanes::ZERO,
-        };
+    /// Computes all blocks.
+    fn keep(&mut self, setup: &Setup, sampling: &Sampling) {
+        for b in 0..self.blocks {
+            let (block, echo) = self.block(setup, sampling, b);
+            self.kept.push(block);
+            if sampling.upper_echoes {
+                self.echoes.push(echo);
+            }
+        }
+    }
+
+    /// One block, and exp(-2 g h1) where the outer face of the coupling is heard, else 0.
+    fn block(&self, setup: &Setup, sampling: &Sampling, b: usize) -> (Block, ComplexLanes) {
+        let zero = ComplexLanes::ZERO;
+        let (mut block, mut echo) = (Block { g: zero, load: zero, weight: zero }, zero);
         for lane in 0..LANES {
             let m = b * LANES + lane;
-            let k = m.min(count - 1) as f64 * sampling.wavenumber_step;
+            let k = m as f64 * sampling.wavenumber_step;
             let point = spectral_point(setup, sampling, self.s, k);
             // The trapezoidal rule from k = 0 on, over (1/π) ∫ … cos(kx) dk.
-            let measure = match m {
-                0 => 0.5 * sampling.wavenumber_step / PI,
-                m if m < count => sampling.wavenumber_step / PI,
-                _ => 0.0,
-            };
-            block.k.0[lane] = k;
+            let end = if m == 0 { 0.5 } else { 1.0 };
+            let measure = end * sampling.wavenumber_step / PI;
+            let weight = measure * sampling.wavenumber_weight(self.n, k);
             set(&mut block.g, lane, point.g);
             set(&mut block.load, lane, point.load);
-            set(&mut block.weight, lane, (point.factor * self.pulse).scale(measure));
-            set(&mut block.echo, lane, point.echo);
+            set(&mut block.weight, lane, (point.factor * self.pulse).scale(weight));
+            set(&mut echo, lane, point.echo);
         }
-        block
+        (block, echo)
     }
 }
 
@@ -219,3 +264,6 @@ fn set(lanes: &mut ComplexLanes, lane: usize, value: Complex) {
     lanes.re.0[lane] = value.re;
     lanes.im.0[lane] = value.im;
 }
+
+/// Compile-time check: a run of frequencies fills the lanes.
+const _: () = assert!(RUN == LANES);

@@ -1,0 +1,91 @@
+//! Frequencies thinned out towards the top of the band.
+//!
+//! The sum over n is the trapezoidal rule of an integral over ω; a coarser step is a shorter
+//! period. Low in the band the period must take in every large wave. High in the band only the
+//! tail of the pulse's kink is left, of which a wave that comes τ later and wraps round keeps
+//! exp(-α τ): little for the large late ones, and what comes soon is small itself. So the step
+//! doubles a few times on the way up. Between a doubling's two frequencies every second sample fades
+//! out while its neighbours fade in: the sum of the weights stays the integral's.
+
+use crate::sampling::Sampling;
+
+/// Frequencies, over the centre frequency, between which the step doubles.
+const DOUBLINGS: [(f64, f64); 4] = [(2.0, 2.75), (3.25, 4.0), (6.0, 7.0), (10.0, 12.0)];
+
+/// Frequencies of a run.
+pub const RUN: usize = 8;
+
+/// Eight equidistant frequencies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Run {
+    /// Number of the first.
+    pub first: usize,
+    /// Distance of neighbours, a power of two.
+    pub stride: usize,
+}
+
+impl Run {
+    /// Numbers of its frequencies.
+    pub fn frequencies(self) -> impl Iterator<Item = usize> {
+        (0..RUN).map(move |i| self.first + i * self.stride)
+    }
+}
+
+impl Sampling {
+    /// The frequencies that are computed, in runs; [`Sampling::is_computed`] says which frequencies
+    /// of a run are not needed.
+    pub fn runs(&self) -> Vec<Run> {
+        let (mut first, mut stride) = (0, 1);
+        let mut doublings = DOUBLINGS.into_iter().peekable();
+        let mut runs = Vec::new();
+        while first < self.frequencies() {
+            while let Some(&(_, end)) = doublings.peek()
+                && self.frequency(first) >= end * self.unit
+                && first % (2 * stride) == 0
+            {
+                stride *= 2;
+                doublings.next();
+            }
+            runs.push(Run { first, stride });
+            first += RUN * stride;
+        }
+        runs
+    }
+
+    /// Whether frequency `n` counts: below the band's end, and not thinned out.
+    pub fn is_computed(&self, n: usize) -> bool {
+        n < self.frequencies() && self.share(n) > 0.0
+    }
+
+    /// Weight of frequency `n` in the sum: 1 where none is left out.
+    pub fn share(&self, n: usize) -> f64 {
+        let mut share = 1.0;
+        let mut stride = 1;
+        for (from, to) in DOUBLINGS {
+            if !n.is_multiple_of(stride) {
+                break;
+            }
+            let thinned = smooth_step((self.frequency(n) / self.unit - from) / (to - from));
+            let fades = !n.is_multiple_of(2 * stride);
+            share *= if fades { 1.0 - thinned } else { 1.0 + thinned };
+            stride *= 2;
+        }
+        share
+    }
+
+    fn frequency(&self, n: usize) -> f64 {
+        n as f64 / self.period
+    }
+}
+
+/// 0 up to x = 0, 1 from x = 1 on, infinitely smooth.
+pub(super) fn smooth_step(x: f64) -> f64 {
+    if x <= 0.0 {
+        0.0
+    } else if x >= 1.0 {
+        1.0
+    } else {
+        let (rising, falling) = (libm::exp(-1.0 / x), libm::exp(-1.0 / (1.0 - x)));
+        rising / (rising + falling)
+    }
+}

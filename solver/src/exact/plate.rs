@@ -1,0 +1,417 @@
+//! Admittance of the plate by doubling.
+//!
+//! A sublayer of thickness d = h/2ⁿ has, from its transfer matrix, the dynamic stiffness
+//! `[t_top; t_bottom] = K [u_top; u_bottom]` (outward tractions). For every triclinic tensor
+//! K_bb = K_ttᵀ, K_tb and K_bt are symmetric, and K_bt(k) = K_tb(-k). Two equal layers, one upon
+//! the other, are one of twice the thickness: with A = K_tt, D = -K_tb, U = -K_bt
+//!
+//! ```text
+//! S = A + Aᵀ,   A ← A - D S⁻¹ U,   D ← D S⁻¹ D,   U ← U S⁻¹ U
+//! ```
+//!
+//! S is complex symmetric and, s having a positive real part, its factorization needs no pivoting.
+//! The last doubling closes the lower face on the marrow and eliminates straight to the scalar
+//! 1/Y, Y = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
+//!
+//! Matrix entries are written out, and closures are avoided: what the compiler does not inline and
+//! unroll is not kept in registers, nor compiled for the instruction set (see [`crate::isa`]).
+
+use crate::complex::Complex;
+use crate::exact::growth::Growth;
+use crate::exact::series::{Polynomials, Series};
+use crate::medium::Medium;
+use crate::vector::{ComplexVector, Vector};
+
+/// Most doublings: a plate of 2⁴⁰ sublayers is beyond every admissible input.
+const DOUBLINGS_MAX: u32 = 40;
+
+/// A plate of one solid, with what was computed for the present frequency.
+#[derive(Debug)]
+pub(crate) struct Plate<const TERMS: usize> {
+    series: Series<TERMS>,
+    growth: Growth,
+    polynomials: Polynomials,
+    growth_max: f64,
+    thickness: f64,
+    /// What the polynomials were summed for.
+    prepared: Option<Prepared>,
+}
+
+/// The plate that velocities are computed with: 1/Y is right to 2e-7, in the mean, with an error as
+/// smooth as a slightly different solid's, which a velocity does not notice.
+pub(crate) type FastPlate = Plate<8>;
+
+/// The plate of single admittances, right to 1e-13.
+pub(crate) type AccuratePlate = Plate<11>;
+
+impl Default for FastPlate {
+    fn default() -> Self {
+        Self::new(3.0)
+    }
+}
+
+impl Default for AccuratePlate {
+    fn default() -> Self {
+        Self::new(2.0)
+    }
+}
+
+/// Frequency and sublayer of the present polynomials.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Prepared {
+    s: Complex,
+    doublings: u32,
+    /// Thickness of the sublayer, m.
+    sublayer: f64,
+    /// Pa/m that a scaled stiffness of one stands for.
+    stiffness: f64,
+}
+
+/// A general matrix, by rows.
+type Matrix<V> = [ComplexVector<V>; 9];
+/// The entries 11, 12, 13, 22, 23, 33 of a symmetric matrix.
+type Symmetric<V> = [ComplexVector<V>; 6];
+
+/// Dynamic stiffness of a layer, scaled.
+struct Layer<V> {
+    /// A = K_tt; K_bb is its transpose.
+    top: Matrix<V>,
+    /// D = -K_tb: minus the traction on top for a displacement below.
+    down: Symmetric<V>,
+    /// U = -K_bt: minus the traction below for a displacement on top.
+    up: Symmetric<V>,
+}
+
+impl<const TERMS: usize> Plate<TERMS> {
+    /// `growth_max`: largest |λ| d of a sublayer, below π, where the block that is inverted becomes
+    /// singular.
+    fn new(growth_max: f64) -> Self {
+        Self {
+            series: Series::default(),
+            growth: Growth::default(),
+            polynomials: Polynomials::default(),
+            growth_max,
+            thickness: 0.0,
+            prepared: None,
+        }
+    }
+
+    /// Makes this the plate of `medium`, `thickness` in m.
+    #[inline(always)]
+    pub(crate) fn fill<V: Vector>(&mut self, medium: &Medium, thickness: f64) {
+        self.series.fill(medium);
+        self.growth.fill::<V>(medium);
+        self.thickness = thickness;
+        self.prepared = None;
+    }
+
+    /// Prepares for complex frequency `s` (1/s) and wavenumbers from `k_min` to `k_max` (rad/m).
+    #[inline(always)]
+    pub(crate) fn prepare<V: Vector>(
+        &mut self,
+        medium: &Medium,
+        s: Complex,
+        (k_min, k_max): (f64, f64),
+    ) {
+        let growth = self.growth.at(k_min, k_max, s.abs());
+        let mut doublings = 1;
+        let mut sublayer = 0.5 * self.thickness;
+        while growth * sublayer > self.growth_max && doublings < DOUBLINGS_MAX {
+            doublings += 1;
+            sublayer *= 0.5;
+        }
+        if self.prepared.is_some_and(|p| p.s == s && p.doublings == doublings) {
+            return;
+        }
+        let stiffness = medium.stiffness / sublayer;
+        let sigma = (s * s).scale(medium.density * sublayer / stiffness);
+        self.series.at_frequency::<V>(sigma, &mut self.polynomials);
+        self.prepared = Some(Prepared { s, doublings, sublayer, stiffness });
+    }
+
+    /// -1/Y, Pa/m, at wavenumbers `k` (rad/m), the lower face loaded by τ3 = `load` u3 (Pa/m).
+    ///
+    /// [`Plate::prepare`] has been called for these wavenumbers; else the result is NaN.
+    #[inline(always)]
+    pub(crate) fn impedance<V: Vector>(&self, k: V, load: ComplexVector<V>) -> ComplexVector<V> {
+        let Some(prepared) = self.prepared else {
+            let nan = V::splat(f64::NAN);
+            return ComplexVector { re: nan, im: nan };
+        };
+        let mut layer = sublayer::<TERMS, V>(&self.polynomials, k.mul(V::splat(prepared.sublayer)));
+        for _ in 1..prepared.doublings {
+            layer = layer.doubled();
+        }
+        let load = load.scale(V::splat(1.0 / prepared.stiffness));
+        layer.closed(load).scale(V::splat(prepared.stiffness))
+    }
+}
+
+/// Stiffness of the thinnest sublayer: with the blocks X and Y of the transfer matrix,
+/// D = Y(-k)⁻¹, U = Y(k)⁻¹, A = (U X)ᵀ.
+#[inline(always)]
+fn sublayer<const TERMS: usize, V: Vector>(polynomials: &Polynomials, k: V) -> Layer<V> {
+    let mut plus = [ComplexVector::zero(); 6];
+    let mut minus = [ComplexVector::zero(); 6];
+    for i in 0..6 {
+        let entry = polynomials.entry::<TERMS, V>(9 + i, k);
+        plus[i] = entry.even.add(entry.odd);
+        minus[i] = entry.even.sub(entry.odd);
+    }
+    let up = inverse(&plus);
+    let down = inverse(&minus);
+    let mut x = [ComplexVector::zero(); 9];
+    for i in 0..9 {
+        let entry = polynomials.entry::<TERMS, V>(i, k);
+        x[i] = entry.even.add(entry.odd);
+    }
+    let (first, second, third) = ([x[0], x[3], x[6]], [x[1], x[4], x[7]], [x[2], x[5], x[8]]);
+    let rows = [[up[0], up[1], up[2]], [up[1], up[3], up[4]], [up[2], up[4], up[5]]];
+    let top = [
+        dot(rows[0], first),
+        dot(rows[1], first),
+        dot(rows[2], first),
+        dot(rows[0], second),
+        dot(rows[1], second),
+        dot(rows[2], second),
+        dot(rows[0], third),
+        dot(rows[1], third),
+        dot(rows[2], third),
+    ];
+    Layer { top, down, up }
+}
+
+impl<V: Vector> Layer<V> {
+    /// Two of these, one upon the other.
+    #[inline(always)]
+    fn doubled(&self) -> Self {
+        let factor = Factor::new(&self.joint());
+        let down = factor.forward(&self.down);
+        let up = factor.forward(&self.up);
+        let scaled = factor.scaled(&down);
+        let a = &self.top;
+        let top = [
+            dot_from(a[0], scaled[0], up[0]),
+            dot_from(a[1], scaled[0], up[1]),
+            dot_from(a[2], scaled[0], up[2]),
+            dot_from(a[3], scaled[1], up[0]),
+            dot_from(a[4], scaled[1], up[1]),
+            dot_from(a[5], scaled[1], up[2]),
+            dot_from(a[6], scaled[2], up[0]),
+            dot_from(a[7], scaled[2], up[1]),
+            dot_from(a[8], scaled[2], up[2]),
+        ];
+        Self { top, down: gram(&scaled, &down), up: gram(&factor.scaled(&up), &up) }
+    }
+
+    /// S = A + Aᵀ of the joint between two equal layers.
+    #[inline(always)]
+    fn joint(&self) -> Symmetric<V> {
+        let a = &self.top;
+        [
+            a[0].add(a[0]),
+            a[1].add(a[3]),
+            a[2].add(a[6]),
+            a[4].add(a[4]),
+            a[5].add(a[7]),
+            a[8].add(a[8]),
+        ]
+    }
+
+    /// Two of these, one upon the other, the lower face loaded by `load`: the last pivot of the
+    /// elimination of all displacements but u3 of the upper face.
+    #[inline(always)]
+    fn closed(&self, load: ComplexVector<V>) -> ComplexVector<V> {
+        let a = &self.top;
+        // Lower face: (K_bb + load e3 e3ᵀ) u_bottom = U u_middle.
+        let bottom = [a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8].add(load)];
+        let [s0, s1, s2, s3, s4, s5] = self.joint();
+        let joint = [s0, s1, s2, s1, s3, s4, s2, s4, s5];
+        let middle = self.eliminated(&bottom, &joint);
+        let top = self.eliminated(&middle, &self.top);
+        Lu::new(&top).last_pivot
+    }
+
+    /// target - D pivot⁻¹ U.
+    #[inline(always)]
+    fn eliminated(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
+        let lu = Lu::new(pivot);
+        let last = lu.last_pivot.recip();
+        let d = &self.down;
+        let first = lu.divided([d[0], d[1], d[2]], last);
+        let second = lu.divided([d[1], d[3], d[4]], last);
+        let third = lu.divided([d[2], d[4], d[5]], last);
+        let right = lu.forward(&self.up);
+        [
+            dot_from(target[0], first, right[0]),
+            dot_from(target[1], first, right[1]),
+            dot_from(target[2], first, right[2]),
+            dot_from(target[3], second, right[0]),
+            dot_from(target[4], second, right[1]),
+            dot_from(target[5], second, right[2]),
+            dot_from(target[6], third, right[0]),
+            dot_from(target[7], third, right[1]),
+            dot_from(target[8], third, right[2]),
+        ]
+    }
+}
+
+/// Σ a b.
+#[inline(always)]
+fn dot<V: Vector>(a: [ComplexVector<V>; 3], b: [ComplexVector<V>; 3]) -> ComplexVector<V> {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
+}
+
+/// minuend - Σ a b.
+#[inline(always)]
+fn dot_from<V: Vector>(
+    minuend: ComplexVector<V>,
+    a: [ComplexVector<V>; 3],
+    b: [ComplexVector<V>; 3],
+) -> ComplexVector<V> {
+    a[2].mul_sub_from(b[2], a[1].mul_sub_from(b[1], a[0].mul_sub_from(b[0], minuend)))
+}
+
+/// The symmetric product aᵀ b of matrices given by columns.
+#[inline(always)]
+fn gram<V: Vector>(a: &[[ComplexVector<V>; 3]; 3], b: &[[ComplexVector<V>; 3]; 3]) -> Symmetric<V> {
+    [
+        dot(a[0], b[0]),
+        dot(a[0], b[1]),
+        dot(a[0], b[2]),
+        dot(a[1], b[1]),
+        dot(a[1], b[2]),
+        dot(a[2], b[2]),
+    ]
+}
+
+/// L D Lᵀ of a complex symmetric 3×3 matrix.
+struct Factor<V> {
+    l10: ComplexVector<V>,
+    l20: ComplexVector<V>,
+    l21: ComplexVector<V>,
+    /// Inverses of the pivots.
+    inverse: [ComplexVector<V>; 3],
+}
+
+impl<V: Vector> Factor<V> {
+    #[inline(always)]
+    fn new(s: &Symmetric<V>) -> Self {
+        let first = s[0].recip();
+        let l10 = s[1].mul(first);
+        let l20 = s[2].mul(first);
+        let second = l10.mul_sub_from(s[1], s[3]).recip();
+        let below = l20.mul_sub_from(s[1], s[4]);
+        let l21 = below.mul(second);
+        let third = l21.mul_sub_from(below, l20.mul_sub_from(s[2], s[5])).recip();
+        Self { l10, l20, l21, inverse: [first, second, third] }
+    }
+
+    /// The columns of L⁻¹ b.
+    #[inline(always)]
+    fn forward(&self, b: &Symmetric<V>) -> [[ComplexVector<V>; 3]; 3] {
+        [
+            self.forward_column(b[0], b[1], b[2]),
+            self.forward_column(b[1], b[3], b[4]),
+            self.forward_column(b[2], b[4], b[5]),
+        ]
+    }
+
+    #[inline(always)]
+    fn forward_column(
+        &self,
+        x: ComplexVector<V>,
+        y: ComplexVector<V>,
+        z: ComplexVector<V>,
+    ) -> [ComplexVector<V>; 3] {
+        let second = self.l10.mul_sub_from(x, y);
+        [x, second, self.l21.mul_sub_from(second, self.l20.mul_sub_from(x, z))]
+    }
+
+    /// The columns of D⁻¹ b.
+    #[inline(always)]
+    fn scaled(&self, b: &[[ComplexVector<V>; 3]; 3]) -> [[ComplexVector<V>; 3]; 3] {
+        [self.scaled_column(b[0]), self.scaled_column(b[1]), self.scaled_column(b[2])]
+    }
+
+    #[inline(always)]
+    fn scaled_column(&self, b: [ComplexVector<V>; 3]) -> [ComplexVector<V>; 3] {
+        [b[0].mul(self.inverse[0]), b[1].mul(self.inverse[1]), b[2].mul(self.inverse[2])]
+    }
+}
+
+/// Inverse of a complex symmetric 3×3 matrix: L⁻ᵀ D⁻¹ L⁻¹.
+#[inline(always)]
+fn inverse<V: Vector>(s: &Symmetric<V>) -> Symmetric<V> {
+    let f = Factor::new(s);
+    // L⁻¹ = [1; -l10 1; m20 -l21 1]
+    let m20 = f.l10.mul_add(f.l21, f.l20.neg());
+    let [d0, d1, d2] = f.inverse;
+    let m20_d2 = m20.mul(d2);
+    let l21_d2 = f.l21.mul(d2);
+    let l10_d1 = f.l10.mul(d1);
+    [
+        m20_d2.mul_add(m20, l10_d1.mul_add(f.l10, d0)),
+        m20_d2.mul_add(f.l21, l10_d1).neg(),
+        m20_d2,
+        l21_d2.mul_add(f.l21, d1),
+        l21_d2.neg(),
+        d2,
+    ]
+}
+
+/// LU of a general complex 3×3 matrix without pivoting.
+struct Lu<V> {
+    l10: ComplexVector<V>,
+    l20: ComplexVector<V>,
+    l21: ComplexVector<V>,
+    u01: ComplexVector<V>,
+    u02: ComplexVector<V>,
+    u12: ComplexVector<V>,
+    /// Inverses of the first two pivots.
+    inverse: [ComplexVector<V>; 2],
+    last_pivot: ComplexVector<V>,
+}
+
+impl<V: Vector> Lu<V> {
+    #[inline(always)]
+    fn new(a: &Matrix<V>) -> Self {
+        let first = a[0].recip();
+        let (l10, l20) = (a[3].mul(first), a[6].mul(first));
+        let second = l10.mul_sub_from(a[1], a[4]).recip();
+        let u12 = l10.mul_sub_from(a[2], a[5]);
+        let l21 = l20.mul_sub_from(a[1], a[7]).mul(second);
+        let last_pivot = l21.mul_sub_from(u12, l20.mul_sub_from(a[2], a[8]));
+        Self { l10, l20, l21, u01: a[1], u02: a[2], u12, inverse: [first, second], last_pivot }
+    }
+
+    /// The columns of L⁻¹ b.
+    #[inline(always)]
+    fn forward(&self, b: &Symmetric<V>) -> [[ComplexVector<V>; 3]; 3] {
+        [
+            self.forward_column(b[0], b[1], b[2]),
+            self.forward_column(b[1], b[3], b[4]),
+            self.forward_column(b[2], b[4], b[5]),
+        ]
+    }
+
+    #[inline(always)]
+    fn forward_column(
+        &self,
+        x: ComplexVector<V>,
+        y: ComplexVector<V>,
+        z: ComplexVector<V>,
+    ) -> [ComplexVector<V>; 3] {
+        let second = self.l10.mul_sub_from(x, y);
+        [x, second, self.l21.mul_sub_from(second, self.l20.mul_sub_from(x, z))]
+    }
+
+    /// The row b U⁻¹; `last`: the inverse of the last pivot.
+    #[inline(always)]
+    fn divided(&self, b: [ComplexVector<V>; 3], last: ComplexVector<V>) -> [ComplexVector<V>; 3] {
+        let x = b[0].mul(self.inverse[0]);
+        let y = x.mul_sub_from(self.u01, b[1]).mul(self.inverse[1]);
+        let z = y.mul_sub_from(self.u12, x.mul_sub_from(self.u02, b[2])).mul(last);
+        [x, y, z]
+    }
+}

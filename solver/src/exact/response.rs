@@ -1,0 +1,177 @@
+//! The sum over wavenumbers: spectrum of the pressure at every receiver.
+
+use crate::complex::Complex;
+use crate::exact::plate::Plate;
+use crate::exact::tables::{Block, Tables};
+use crate::isa::{Isa, Kernel};
+use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::medium::Medium;
+use crate::vector::{ComplexVector, Vector};
+
+/// Receivers that are summed side by side.
+const GROUP: usize = 4;
+
+/// Spectra of the pressure less the direct wave, not yet tapered: one row of runs of eight lines
+/// per receiver, zero where a line is not computed.
+#[derive(Debug, Default)]
+pub(crate) struct Spectra {
+    rows: Vec<ComplexLanes>,
+    runs: usize,
+    /// What the cosines of one frequency's wavenumbers are weighted with.
+    responses: Vec<ComplexLanes>,
+}
+
+impl Spectra {
+    /// Spectrum at one receiver.
+    pub(crate) fn receiver(&self, r: usize) -> &[ComplexLanes] {
+        &self.rows[r * self.runs..(r + 1) * self.runs]
+    }
+
+    /// Whether every number is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.rows.iter().all(|l| l.re.0.iter().chain(&l.im.0).all(|value| value.is_finite()))
+    }
+
+    /// Computes the spectra of one plate.
+    ///
+    /// The parts are kernels of their own: in one large function the compiler has too few registers
+    /// for the innermost one.
+    pub(crate) fn fill<const TERMS: usize>(
+        &mut self,
+        isa: Isa,
+        tables: &Tables,
+        medium: &Medium,
+        plate: &mut Plate<TERMS>,
+    ) {
+        let receivers = tables.receivers();
+        self.runs = tables.runs.len();
+        self.rows.clear();
+        self.rows.resize(receivers * self.runs, ComplexLanes::ZERO);
+        for (i, line) in tables.lines.iter().enumerate() {
+            if line.blocks > 0 {
+                let responses = &mut self.responses;
+                responses.clear();
+                let mut scratch = None;
+                for b in 0..line.blocks {
+                    let k = tables.wavenumbers(b);
+                    isa.run(Prepare { plate, medium, s: line.s, k: (k.0[0], k.0[LANES - 1]) });
+                    let (block, echo) = tables.block(line, b, &mut scratch);
+                    let inertia = line.inertia;
+                    responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
+                }
+                isa.run(SumOverWavenumbers { tables, line: i, spectra: self });
+            }
+        }
+    }
+}
+
+/// Prepares a plate for one block of wavenumbers.
+struct Prepare<'a, const TERMS: usize> {
+    plate: &'a mut Plate<TERMS>,
+    medium: &'a Medium,
+    s: Complex,
+    k: (f64, f64),
+}
+
+impl<const TERMS: usize> Kernel for Prepare<'_, TERMS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        self.plate.prepare::<V>(self.medium, self.s, self.k);
+    }
+}
+
+/// What the cosines of one block of wavenumbers are weighted with.
+struct Respond<'a, const TERMS: usize> {
+    plate: &'a Plate<TERMS>,
+    k: &'a Lanes,
+    block: &'a Block,
+    echo: &'a ComplexLanes,
+    inertia: Complex,
+}
+
+impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
+    type Output = ComplexLanes;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> ComplexLanes {
+        let Self { plate, k, block, echo, inertia } = self;
+        let inertia = ComplexVector { re: V::splat(inertia.re), im: V::splat(inertia.im) };
+        let mut response = ComplexLanes::ZERO;
+        for part in 0..V::PARTS {
+            let load = ComplexVector::load(&block.load, part);
+            let impedance = plate.impedance::<V>(V::load(k, part), load);
+            // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division.
+            let gd = ComplexVector::load(&block.g, part).mul(impedance);
+            let numerator = gd.sub(inertia);
+            let echo = ComplexVector::load(echo, part);
+            let denominator = numerator.mul_add(echo, gd.add(inertia));
+            let weight = ComplexVector::<V>::load(&block.weight, part);
+            weight.mul(numerator).mul(denominator.recip()).store(&mut response, part);
+        }
+        response
+    }
+}
+
+/// Sums the responses of one line at every receiver.
+struct SumOverWavenumbers<'a> {
+    tables: &'a Tables,
+    line: usize,
+    spectra: &'a mut Spectra,
+}
+
+impl Kernel for SumOverWavenumbers<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Spectra { rows, runs, responses } = self.spectra;
+        let receivers = self.tables.receivers();
+        let (run, lane) = (self.line / LANES, self.line % LANES);
+        let mut r = 0;
+        while r < receivers {
+            let sums = cosine_sums::<V>(self.tables, r, responses);
+            for j in 0..GROUP.min(receivers - r) {
+                let row = &mut rows[(r + j) * *runs + run];
+                row.re.0[lane] = sums[j].re.sum();
+                row.im.0[lane] = sums[j].im.sum();
+            }
+            r += GROUP;
+        }
+    }
+}
+
+/// Σ response cos(k x), lane by lane, at receivers `r` … `r` + 3; beyond the last receiver the
+/// last one's.
+#[inline(always)]
+fn cosine_sums<V: Vector>(
+    tables: &Tables,
+    r: usize,
+    responses: &[ComplexLanes],
+) -> [ComplexLanes; GROUP] {
+    let last = tables.receivers() - 1;
+    let a = &tables.cosines(r.min(last))[..responses.len()];
+    let b = &tables.cosines((r + 1).min(last))[..responses.len()];
+    let c = &tables.cosines((r + 2).min(last))[..responses.len()];
+    let d = &tables.cosines((r + 3).min(last))[..responses.len()];
+    let mut sums = [ComplexLanes::ZERO; GROUP];
+    for part in 0..V::PARTS {
+        let mut sum = [ComplexVector::<V>::zero(); GROUP];
+        for (i, response) in responses.iter().enumerate() {
+            let (re, im) = (V::load(&response.re, part), V::load(&response.im, part));
+            for (sum, cosines) in sum.iter_mut().zip([a, b, c, d]) {
+                let cosine = V::load(&cosines[i], part);
+                sum.re = re.mul_add(cosine, sum.re);
+                sum.im = im.mul_add(cosine, sum.im);
+            }
+        }
+        for i in 0..GROUP {
+            sum[i].store(&mut sums[i], part);
+        }
+    }
+    sums
+}
+
+/// Compile-time check of the width that the sums over lanes assume.
+const _: () = assert!(LANES == 8 && size_of::<Lanes>() == 64);

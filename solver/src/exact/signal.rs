@@ -1,0 +1,404 @@
+//! From a spectrum to a signal: values, slopes, extrema.
+//!
+//! The pressure at one receiver is a damped trigonometric polynomial,
+//! p(t) = 2 e^{αt}/T Re Σ c_n e^{iω_n t}, and so is its slope.
+
+use osteon_common::case::Setup;
+use osteon_common::sampling::{Run, Sampling, direct_arrival, distances};
+
+use crate::complex::Complex;
+use crate::exact::tables::{Line, Tables};
+use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::picking::Extremum;
+use crate::vector::{ComplexVector, Vector};
+
+/// Grid points per period of the centre frequency on which extrema are bracketed.
+const POINTS_PER_CYCLE: f64 = 24.0;
+/// Most steps of the refinement of an extremum; bisection alone needs 40 to reach rounding.
+const REFINEMENTS_MAX: usize = 60;
+/// A step that moves an extremum by less than this fraction of a grid step, squared by the next
+/// one, is the last.
+const STEP_MIN: f64 = 1e-3;
+/// Blocks of times that are summed side by side.
+const GROUP: usize = 4;
+
+/// A grid of times, eight at a time: e^{iωt} at lane l of block b is `coarse` (the block's first
+/// time) times `fine` (the lane's delay).
+#[derive(Debug)]
+pub(crate) struct Grid {
+    step: f64,
+    blocks: usize,
+    /// α + iω of each line.
+    slopes: Vec<Complex>,
+    /// e^{iωt} of line i at the first time of block b: `[i * blocks + b]`.
+    coarse: Vec<Complex>,
+    /// e^{iωt} of each line at the lanes' delays.
+    fine: Vec<ComplexLanes>,
+}
+
+/// Scratch memory of the search for extrema.
+#[derive(Debug, Default)]
+pub(crate) struct Slopes {
+    /// Coefficients of the slope times `fine`, per line.
+    delayed: Vec<ComplexLanes>,
+    /// The slope on the grid, from its first block on.
+    values: Vec<Lanes>,
+    /// Extrema that were found but not yet refined.
+    brackets: Vec<Bracket>,
+}
+
+/// An extremum between two times of the grid.
+#[derive(Debug, Clone, Copy)]
+struct Bracket {
+    low: f64,
+    high: f64,
+    /// Where it is estimated to be.
+    time: f64,
+    /// Whether the slope rises: a minimum.
+    rising: bool,
+    done: bool,
+}
+
+impl Grid {
+    /// A grid that covers every window of the setup.
+    pub(crate) fn new(setup: &Setup, tables: &Tables) -> Self {
+        let step = 1.0 / (POINTS_PER_CYCLE * setup.probe.center_frequency);
+        let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
+        let blocks = ((last / step) as usize / LANES + 2).next_multiple_of(GROUP);
+        let wave = |line: &Line, j: usize| {
+            let (sin, cos) = libm::sincos(line.s.im * (j as f64 * step));
+            Complex::new(cos, sin)
+        };
+        let coarse = tables
+            .lines
+            .iter()
+            .flat_map(|line| (0..blocks).map(move |b| wave(line, b * LANES)))
+            .collect();
+        let fine = tables
+            .lines
+            .iter()
+            .map(|line| ComplexLanes {
+                re: Lanes(std::array::from_fn(|lane| wave(line, lane).re)),
+                im: Lanes(std::array::from_fn(|lane| wave(line, lane).im)),
+            })
+            .collect();
+        let slopes = tables.lines.iter().map(|line| line.s).collect();
+        Self { step, blocks, slopes, coarse, fine }
+    }
+
+    /// The slope, times e^{-αt} T/2, in the blocks from `first` to at least `last`.
+    #[inline(always)]
+    fn slopes<V: Vector>(
+        &self,
+        signal: &Signal<'_>,
+        first: usize,
+        last: usize,
+        slopes: &mut Slopes,
+    ) {
+        slopes.delayed.clear();
+        for (n, &derivative) in self.slopes.iter().enumerate() {
+            let run = &signal.spectrum[n / LANES];
+            let slope = derivative * Complex::new(run.re.0[n % LANES], run.im.0[n % LANES]);
+            let slope = ComplexVector { re: V::splat(slope.re), im: V::splat(slope.im) };
+            let mut delayed = ComplexLanes::ZERO;
+            for part in 0..V::PARTS {
+                slope.mul(ComplexVector::load(&self.fine[n], part)).store(&mut delayed, part);
+            }
+            slopes.delayed.push(delayed);
+        }
+        slopes.values.clear();
+        let mut b = first;
+        while b <= last {
+            // The last group may begin earlier, so as to end on the grid.
+            let start = b.min(self.blocks - GROUP);
+            let mut sums = [Lanes::ZERO; GROUP];
+            for part in 0..V::PARTS {
+                let mut sum = [V::splat(0.0); GROUP];
+                for (n, delayed) in slopes.delayed.iter().enumerate() {
+                    let wave = ComplexVector::<V>::load(delayed, part);
+                    let at = n * self.blocks + start;
+                    let coarse = &self.coarse[at..at + GROUP];
+                    for i in 0..GROUP {
+                        let c = coarse[i];
+                        let real = wave.re.mul_add(V::splat(c.re), sum[i]);
+                        sum[i] = wave.im.mul_sub_from(V::splat(c.im), real);
+                    }
+                }
+                for i in 0..GROUP {
+                    sum[i].store(&mut sums[i], part);
+                }
+            }
+            for i in b - start..GROUP {
+                slopes.values.push(sums[i]);
+            }
+            b = start + GROUP;
+        }
+    }
+}
+
+/// The pressure at one receiver.
+pub(crate) struct Signal<'a> {
+    pub(crate) sampling: &'a Sampling,
+    /// Where the lines stand.
+    pub(crate) runs: &'a [Run],
+    /// The lines, run by run, tapered; zero where a line is not computed.
+    pub(crate) spectrum: &'a [ComplexLanes],
+}
+
+/// e^{-αt} T/2 times the pressure and its first two derivatives, at eight times.
+struct Derivatives {
+    value: Lanes,
+    slope: Lanes,
+    curvature: Lanes,
+}
+
+impl Signal<'_> {
+    /// p, Pa, at eight times, s.
+    #[inline(always)]
+    pub(crate) fn at<V: Vector>(&self, times: &Lanes) -> Lanes {
+        let mut pressures = self.derivatives::<V, _>(&self.turns(times), &Unweighted).value;
+        for lane in 0..LANES {
+            pressures.0[lane] = self.pressure(times.0[lane], pressures.0[lane]);
+        }
+        pressures
+    }
+
+    #[inline(always)]
+    fn pressure(&self, t: f64, value: f64) -> f64 {
+        2.0 * value * libm::exp(self.sampling.damping * t) / self.sampling.period
+    }
+
+    /// All local extrema in `from` ≤ t < `to` (s), in order of time, into `extrema`; returns p(`to`),
+    /// Pa.
+    #[inline(always)]
+    pub(crate) fn extrema<V: Vector>(
+        &self,
+        grid: &Grid,
+        from: f64,
+        to: f64,
+        slopes: &mut Slopes,
+        extrema: &mut Vec<Extremum>,
+    ) -> f64 {
+        let first = (from / grid.step) as usize / LANES;
+        let last = ((to / grid.step) as usize / LANES + 1).min(grid.blocks - 1);
+        grid.slopes::<V>(self, first, last, slopes);
+        slopes.values.truncate(last - first + 1);
+        find_brackets(grid.step, first, slopes);
+        slopes.brackets.push(Bracket { low: to, high: to, time: to, rising: true, done: true });
+        extrema.clear();
+        let mut last = 0.0;
+        for brackets in slopes.brackets.chunks_mut(LANES) {
+            let values = self.refine::<V>(brackets, STEP_MIN * grid.step);
+            for (bracket, value) in brackets.iter().zip(values.0) {
+                let time = bracket.time;
+                last = self.pressure(time, value);
+                if time >= from && time < to {
+                    extrema.push(Extremum { time, pressure: last });
+                }
+            }
+        }
+        last
+    }
+
+    /// Moves the times of up to eight brackets to the zeros of the slope: Newton's method, kept
+    /// inside the brackets by bisection; those that are done stay. Returns the pressures there, times
+    /// e^{-αt} T/2.
+    #[inline(always)]
+    fn refine<V: Vector>(&self, brackets: &mut [Bracket], step_min: f64) -> Lanes {
+        let mut values = None;
+        let mut times = Lanes::ZERO;
+        for _ in 0..REFINEMENTS_MAX {
+            for (time, bracket) in times.0.iter_mut().zip(&*brackets) {
+                *time = bracket.time;
+            }
+            let at = self.derivatives::<V, _>(&self.turns(&times), &Unweighted);
+            let values = values.get_or_insert(at.value);
+            let mut all_done = true;
+            for (lane, bracket) in brackets.iter_mut().enumerate() {
+                if bracket.done {
+                    continue;
+                }
+                values.0[lane] = at.value.0[lane];
+                let (t, slope) = (bracket.time, at.slope.0[lane]);
+                if (slope > 0.0) == bracket.rising {
+                    bracket.high = t;
+                } else {
+                    bracket.low = t;
+                }
+                let mut next = t - self.newton_step(slope, at.curvature.0[lane]);
+                if !(next > bracket.low && next < bracket.high) {
+                    next = 0.5 * (bracket.low + bracket.high);
+                }
+                bracket.done = (next - t).abs() <= step_min;
+                bracket.time = next;
+                all_done &= bracket.done;
+            }
+            if all_done {
+                break;
+            }
+        }
+        values.unwrap_or(Lanes::ZERO)
+    }
+
+    /// Where one step of Newton's method puts the extremum near `time` (s) once the lines are
+    /// weighted: `weights` holds, run by run and line by line, eight weightings side by side.
+    #[inline(always)]
+    pub(crate) fn moved_extrema<V: Vector>(&self, time: f64, weights: &[[Lanes; LANES]]) -> Lanes {
+        let (sin, cos) = libm::sincos(self.sampling.frequency_step * time);
+        let turns = ComplexLanes { re: Lanes([cos; LANES]), im: Lanes([sin; LANES]) };
+        let at = self.derivatives::<V, _>(&turns, weights);
+        let mut times = Lanes([time; LANES]);
+        for lane in 0..LANES {
+            times.0[lane] -= self.newton_step(at.slope.0[lane], at.curvature.0[lane]);
+        }
+        times
+    }
+
+    /// The factor e^{αt} has no share in the zero: this is Newton's step for the rest.
+    #[inline(always)]
+    fn newton_step(&self, slope: f64, curvature: f64) -> f64 {
+        slope / self.sampling.damping.mul_add(-slope, curvature)
+    }
+
+    /// e^{iωt} of the first frequency above zero.
+    #[inline(always)]
+    fn turns(&self, times: &Lanes) -> ComplexLanes {
+        let mut turns = ComplexLanes::ZERO;
+        for lane in 0..LANES {
+            let (sin, cos) = libm::sincos(self.sampling.frequency_step * times.0[lane]);
+            turns.re.0[lane] = cos;
+            turns.im.0[lane] = sin;
+        }
+        turns
+    }
+
+    /// At eight times, given by their [`Signal::turns`].
+    #[inline(always)]
+    fn derivatives<V: Vector, W: Weights + ?Sized>(
+        &self,
+        turns: &ComplexLanes,
+        weights: &W,
+    ) -> Derivatives {
+        let (alpha, omega) = (self.sampling.damping, self.sampling.frequency_step);
+        let zero = Lanes::ZERO;
+        let mut derivatives = Derivatives { value: zero, slope: zero, curvature: zero };
+        for part in 0..V::PARTS {
+            let mut turn = ComplexVector::<V>::load(turns, part);
+            let mut phase = ComplexVector { re: V::splat(1.0), im: V::splat(0.0) };
+            let mut stride = 1;
+            // Σ Re, Σ n Im, Σ n² Re of c e^{iωt}.
+            let (mut a, mut b, mut c) = (V::splat(0.0), V::splat(0.0), V::splat(0.0));
+            for (i, (run, spectrum)) in self.runs.iter().zip(self.spectrum).enumerate() {
+                while stride < run.stride {
+                    turn = turn.mul(turn);
+                    stride *= 2;
+                }
+                for lane in 0..LANES {
+                    let n = (run.first + lane * run.stride) as f64;
+                    let (re, im) = (spectrum.re.0[lane], spectrum.im.0[lane]);
+                    let (re, im) = weights.apply::<V>(i, lane, part, (re, im));
+                    let value = phase.im.mul_sub_from(im, phase.re.mul(re));
+                    let other = phase.im.mul_add(re, phase.re.mul(im));
+                    a = a.add(value);
+                    b = other.mul_add(V::splat(n), b);
+                    c = value.mul_add(V::splat(n * n), c);
+                    phase = phase.mul(turn);
+                }
+            }
+            let turned = b.mul(V::splat(-omega));
+            let bent = c.mul(V::splat(-(omega * omega)));
+            let (alpha, twice) = (V::splat(alpha), V::splat(2.0 * alpha));
+            a.store(&mut derivatives.value, part);
+            alpha.mul_add(a, turned).store(&mut derivatives.slope, part);
+            let curvature = alpha.mul(alpha).mul_add(a, twice.mul_add(turned, bent));
+            curvature.store(&mut derivatives.curvature, part);
+        }
+        derivatives
+    }
+}
+
+/// What a line's coefficient is multiplied by in each of eight lanes.
+trait Weights {
+    /// The coefficient of line `line` of run `run`, in part `part` of the lanes.
+    fn apply<V: Vector>(&self, run: usize, line: usize, part: usize, c: (f64, f64)) -> (V, V);
+}
+
+/// By 1.
+struct Unweighted;
+
+impl Weights for Unweighted {
+    #[inline(always)]
+    fn apply<V: Vector>(&self, _: usize, _: usize, _: usize, (re, im): (f64, f64)) -> (V, V) {
+        (V::splat(re), V::splat(im))
+    }
+}
+
+impl Weights for [[Lanes; LANES]] {
+    #[inline(always)]
+    fn apply<V: Vector>(
+        &self,
+        run: usize,
+        line: usize,
+        part: usize,
+        (re, im): (f64, f64),
+    ) -> (V, V) {
+        let weight = V::load(&self[run][line], part);
+        (weight.mul(V::splat(re)), weight.mul(V::splat(im)))
+    }
+}
+
+/// Lists the sign changes of the slope on the grid, whose values begin at block `first`.
+#[inline(always)]
+fn find_brackets(step: f64, first: usize, slopes: &mut Slopes) {
+    let Slopes { values, brackets, .. } = slopes;
+    brackets.clear();
+    let count = values.len() * LANES;
+    let mut before = values[0].0[0];
+    for (block, lanes) in values.iter().enumerate() {
+        let mut negative = 0_u32;
+        for lane in 0..LANES {
+            negative |= u32::from(lanes.0[lane] < 0.0) << lane;
+        }
+        // Bit i: the sign changes between value i - 1 and i.
+        let mut changes = (negative ^ (negative << 1 | u32::from(before < 0.0))) & 0xff;
+        before = lanes.0[LANES - 1];
+        while changes != 0 {
+            let i = block * LANES + changes.trailing_zeros() as usize;
+            changes &= changes - 1;
+            let at = |i: usize| values[i / LANES].0[i % LANES];
+            let (a, b) = (at(i - 1), at(i));
+            let within = if i >= 2 && i + 1 < count {
+                cubic_root([at(i - 2), a, b, at(i + 1)])
+            } else {
+                a / (a - b)
+            };
+            let start = (first * LANES + i - 1) as f64;
+            brackets.push(Bracket {
+                low: start * step,
+                high: (start + 1.0) * step,
+                time: (start + within) * step,
+                rising: b > a,
+                done: false,
+            });
+        }
+    }
+}
+
+/// Where the cubic through values at -1, 0, 1, 2 vanishes between 0 and 1, given that the middle
+/// values differ in sign; nearly: two Newton steps from the secant's root.
+#[inline(always)]
+fn cubic_root([a, b, c, d]: [f64; 4]) -> f64 {
+    // The Newton form at 0, 1, -1, 2.
+    let (first, second) = (c - b, 0.5 * (c - 2.0 * b + a));
+    let third = (d - a - 3.0 * (c - b)) / 6.0;
+    let secant = b / (b - c);
+    let mut x = secant;
+    for _ in 0..2 {
+        let (p, q) = (x * (x - 1.0), x + 1.0);
+        let value = third.mul_add(p * q, second.mul_add(p, first.mul_add(x, b)));
+        let bend = 2.0 * x - 1.0;
+        let slope = third.mul_add(bend.mul_add(q, p), second.mul_add(bend, first));
+        x -= value / slope;
+    }
+    if (0.0..=1.0).contains(&x) { x } else { secant }
+}

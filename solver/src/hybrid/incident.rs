@@ -1,0 +1,198 @@
+//! The pressure that the source alone exerts on the bone's face, held rigid.
+//!
+//! Fluid 1 carries, besides the waves that the bone's motion makes, the source's wave and its mirror
+//! image in the rigid face. At one wavenumber the source's wave at height z obeys a Klein-Gordon
+//! equation, whose solution is a convolution,
+//!
+//! ```text
+//! p(z, t) = (ρ c / 2) ∫ F(τ) J0(c k √((t - τ)² - z²/c²)) dτ,    0 < τ < t - z/c,
+//! ```
+//!
+//! and at the rigid face the mirror image doubles it. Before the direct wave arrives neither of the
+//! two is heard at a receiver, so that the picked pressure is that of the bone's motion alone. The
+//! fluid's outer face adds images of the source where their waves, by way of the bone, can be heard.
+
+use std::f64::consts::PI;
+
+use osteon_common::case::Setup;
+
+use super::mesh::path_heard;
+use crate::lanes::{LANES, Lanes};
+use crate::pulse::Pulse;
+
+/// Pulses are cut where they are below 1e-10 of their amplitude.
+const PULSE_PERIODS: f64 = 3.4;
+/// Points of interpolation between samples.
+const POINTS: usize = 6;
+/// Most images of the source.
+const IMAGES_MAX: usize = 64;
+
+/// An image of the source: its height above the bone's face, m, and its sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Image {
+    pub(super) height: f64,
+    pub(super) sign: f64,
+}
+
+/// The source, and its images in fluid 1's outer face whose waves can be heard before the direct
+/// wave in a bone of waves up to `speed` (m/s).
+pub(super) fn images(setup: &Setup, speed: f64) -> Vec<Image> {
+    let (source, depth) = (setup.probe.source.x3, setup.layers.coupling.thickness);
+    let heard = path_heard(setup, speed) - setup.probe.receivers.x3;
+    let mut images = vec![Image { height: source, sign: 1.0 }];
+    let mut sign = -1.0;
+    for n in 1..=IMAGES_MAX / 2 {
+        let middle = 2.0 * n as f64 * depth;
+        for height in [middle - source, middle + source] {
+            if height < heard {
+                images.push(Image { height, sign });
+            }
+        }
+        sign = -sign;
+    }
+    images
+}
+
+/// Makes the load for one block of wavenumbers after another.
+#[derive(Debug)]
+pub(super) struct Incident {
+    /// The source first.
+    images: Vec<Image>,
+    sound_speed: f64,
+    density: f64,
+    /// Spacing of samples, s.
+    step: f64,
+    /// F at multiples of the spacing.
+    pulse: Vec<f64>,
+    /// F' at 0 and at multiples of the spacing.
+    pulse_slope: Vec<f64>,
+    kernel: Vec<Lanes>,
+    table: Vec<Lanes>,
+}
+
+impl Incident {
+    /// For samples `step` (s) apart.
+    pub(super) fn new(setup: &Setup, speed: f64, step: f64) -> Self {
+        let fc = setup.probe.center_frequency;
+        let samples = (PULSE_PERIODS / fc / step) as usize + 1;
+        // A velocity does not depend on the pulse's amplitude, not even in its last bit.
+        let pulse = Pulse::new(1.0, fc);
+        let at = |i: usize| i as f64 * step;
+        Self {
+            images: images(setup, speed),
+            sound_speed: setup.layers.coupling.sound_speed,
+            density: setup.layers.coupling.density,
+            step,
+            pulse: (0..samples).map(|i| pulse.at(at(i))).collect(),
+            pulse_slope: (0..samples).map(|i| pulse_slope(fc, at(i))).collect(),
+            kernel: Vec::new(),
+            table: Vec::new(),
+        }
+    }
+
+    /// The pressure on the face at n substeps after the source's wave has reached it, for every n of
+    /// `load`; `ratio` substeps make a step, `k` is in rad/m.
+    #[inline(always)]
+    pub(super) fn fill(&mut self, k: Lanes, ratio: usize, load: &mut [Lanes]) {
+        load.fill(Lanes::ZERO);
+        let substep = self.step / ratio as f64;
+        for i in 0..self.images.len() {
+            let image = self.images[i];
+            let late = (image.height - self.images[0].height) / self.sound_speed;
+            self.tabulate(k, image, load.len() / ratio + POINTS);
+            for (n, load) in load.iter_mut().enumerate() {
+                let position = (n as f64).mul_add(substep, -late) / self.step;
+                if position > 0.0 {
+                    *load = interpolate(&self.table, position, *load);
+                }
+            }
+        }
+    }
+
+    /// The wave of one image at multiples of the step after its arrival: the trapezoidal rule with
+    /// the first Euler-Maclaurin correction at both ends, of fourth order in the step.
+    #[inline(always)]
+    fn tabulate(&mut self, k: Lanes, image: Image, count: usize) {
+        let delay = image.height / self.sound_speed;
+        self.kernel.clear();
+        for j in 0..count {
+            let t = j as f64 * self.step;
+            // t (t + 2 z/c) = (t + z/c)² - z²/c² without cancellation.
+            let root = self.sound_speed * (t * (t + 2.0 * delay)).sqrt();
+            let mut value = Lanes::ZERO;
+            for lane in 0..LANES {
+                value.0[lane] = libm::j0(k.0[lane] * root);
+            }
+            self.kernel.push(value);
+        }
+        let correction = self.step * self.step / 12.0;
+        // J0's slope in t at the front, over k².
+        let front = -0.5 * self.sound_speed * image.height;
+        let scale = Lanes::splat(image.sign * self.density * self.sound_speed);
+        self.table.clear();
+        for j in 0..count {
+            let last = j.min(self.pulse.len() - 1);
+            let sum = convolve(&self.pulse[..=last], &self.kernel[j - last..=j]);
+            let mut ends = Lanes::splat(self.pulse_slope[0]) * self.kernel[j];
+            if j == last {
+                let slope = Lanes::splat(self.pulse[j] * front) * (k * k);
+                ends = ends + (slope - Lanes::splat(self.pulse_slope[j]));
+            }
+            let sum = Lanes::splat(self.step).mul_add(sum, Lanes::splat(correction) * ends);
+            self.table.push(scale * sum);
+        }
+    }
+}
+
+/// Trapezoidal Σ pulse_i kernel_(n-i) over i = 0 … n, in four interleaved sums.
+#[inline(always)]
+fn convolve(pulse: &[f64], kernel: &[Lanes]) -> Lanes {
+    let n = pulse.len() - 1;
+    // The last term counts half; so does the first, but the pulse starts at zero.
+    let mut sums =
+        [Lanes::splat(-0.5 * pulse[n]) * kernel[0], Lanes::ZERO, Lanes::ZERO, Lanes::ZERO];
+    let mut i = 0;
+    while i + 4 <= n + 1 {
+        for a in 0..4 {
+            sums[a] = Lanes::splat(pulse[i + a]).mul_add(kernel[n - i - a], sums[a]);
+        }
+        i += 4;
+    }
+    while i <= n {
+        sums[0] = Lanes::splat(pulse[i]).mul_add(kernel[n - i], sums[0]);
+        i += 1;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// F'(t) of amplitude 1, t ≥ 0.
+fn pulse_slope(center_frequency: f64, t: f64) -> f64 {
+    let (sin, cos) = libm::sincos(2.0 * PI * center_frequency * t);
+    let from_center = center_frequency * t - 1.0;
+    let envelope = libm::exp(-4.0 * from_center * from_center);
+    center_frequency * envelope * (2.0 * PI * cos - 8.0 * from_center * sin)
+}
+
+/// Adds to `sum` the table's value at `position` > 0, counted in samples; before the first there
+/// is nothing.
+#[inline(always)]
+fn interpolate(table: &[Lanes], position: f64, sum: Lanes) -> Lanes {
+    let first = position as usize;
+    let t = position - first as f64;
+    let mut sum = sum;
+    for a in 0..POINTS {
+        // Nodes -2 … 3 around the interval.
+        let node = a as f64 - 2.0;
+        let mut weight = 1.0;
+        for b in 0..POINTS {
+            if b != a {
+                let other = b as f64 - 2.0;
+                weight *= (t - other) / (node - other);
+            }
+        }
+        if first + a >= 2 && first + a - 2 < table.len() {
+            sum = Lanes::splat(weight).mul_add(table[first + a - 2], sum);
+        }
+    }
+    sum
+}

@@ -1,0 +1,189 @@
+//! Elements and depths: how far the fluids are meshed, and into how many elements each layer is
+//! cut.
+//!
+//! A fluid is cut off, with p = 0, where no echo of the cut can reach a receiver before the direct
+//! wave: what is looked at is as if the fluid were whole.
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::layers::Fluid;
+use osteon_common::sampling::{direct_arrival, distances};
+
+use super::element::Element;
+use crate::medium::Medium;
+
+/// The slowest wavelength at the centre frequency, m, for which `element_size` is meant.
+const WAVELENGTH: f64 = 1.5e-3;
+/// In a plate thinner than this many metres at 1 Hz (m·Hz) the first extremum lies close to the
+/// wave of the pulse's kink at t = 0, which takes more of everything to follow.
+const THIN_PLATE: f64 = 3000.0;
+/// Most refinement for a thin plate.
+const THIN_PLATE_MAX: f64 = 2.0;
+/// Depths are made larger by this share, so that an echo comes clearly late.
+const DEPTH_MARGIN: f64 = 1.02;
+/// Most elements of a layer that are counted; beyond, the work is over its bound anyway.
+const ELEMENTS_MAX: f64 = 1e9;
+
+/// Equal elements of one layer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LayerMesh {
+    pub(super) elements: usize,
+    /// m.
+    pub(super) size: f64,
+}
+
+/// The mesh of one bone between its fluids.
+#[derive(Debug, Clone)]
+pub(super) struct Mesh {
+    pub(super) element: Element,
+    pub(super) coupling: LayerMesh,
+    pub(super) bone: LayerMesh,
+    pub(super) marrow: LayerMesh,
+}
+
+impl LayerMesh {
+    /// As few equal elements as make none larger than `size` (m).
+    pub(super) fn new(thickness: f64, size: f64) -> Self {
+        // A thickness that is a whole number of sizes but for rounding is one.
+        let elements = (thickness / size * (1.0 - 1e-12)).ceil().clamp(1.0, ELEMENTS_MAX);
+        Self { elements: elements as usize, size: thickness / elements }
+    }
+}
+
+impl Mesh {
+    /// The mesh that the setup asks for, for a bone of waves up to `speed` (m/s) along x1.
+    pub(super) fn new(setup: &Setup, bone: &Bone, speed: f64) -> Self {
+        let fc = setup.probe.center_frequency;
+        let size = |slowest: f64| {
+            let share = (slowest / fc / WAVELENGTH).min(1.0);
+            setup.solver.element_size * share / setup.solver.refinement.sqrt()
+        };
+        let fluid = |fluid: &Fluid| size(fluid.sound_speed) / thin_plate(setup);
+        let sizes = [
+            fluid(&setup.layers.coupling),
+            size(slowest_across(bone)),
+            fluid(&setup.layers.marrow),
+        ];
+        Self::with_sizes(setup, speed, setup.solver.element_order as usize, sizes)
+    }
+
+    /// A mesh of elements of degree `order`, none larger than `sizes` (m) in fluid 1, bone and
+    /// fluid 2.
+    pub(super) fn with_sizes(setup: &Setup, speed: f64, order: usize, sizes: [f64; 3]) -> Self {
+        let [coupling, bone, marrow] = sizes;
+        Self {
+            element: Element::new(order),
+            coupling: LayerMesh::new(coupling_depth(setup, speed), coupling),
+            bone: LayerMesh::new(setup.layers.bone_thickness, bone),
+            marrow: LayerMesh::new(marrow_depth(setup, speed, marrow), marrow),
+        }
+    }
+
+    /// Elements of all layers.
+    pub(super) fn elements(&self) -> usize {
+        self.coupling.elements + self.bone.elements + self.marrow.elements
+    }
+
+    /// Node and weights by which the pressure at height `x3` (m) in fluid 1 is interpolated.
+    pub(super) fn receiver(&self, x3: f64) -> (usize, Vec<f64>) {
+        let mesh = &self.coupling;
+        let e = ((x3 / mesh.size) as usize).min(mesh.elements - 1);
+        let local = 2.0 * (x3 / mesh.size - e as f64) - 1.0;
+        (e * (self.element.count() - 1), self.element.polynomials_at(local))
+    }
+}
+
+/// Speed, m/s, of the slowest wave across the layer: √(λmin(A33)/ρ).
+pub(super) fn slowest_across(bone: &Bone) -> f64 {
+    let medium = Medium::new(bone);
+    (medium.stiffness / (medium.dynamic_growth * medium.density)).sqrt()
+}
+
+/// How much finer than usual a thin plate is computed, ≥ 1.
+pub(super) fn thin_plate(setup: &Setup) -> f64 {
+    let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
+    (THIN_PLATE / thickness).clamp(1.0, THIN_PLATE_MAX)
+}
+
+/// √(1/c² - 1/v²), s/m, of waves that travel along the layer at `speed` at most.
+pub(super) fn slowness_across(sound_speed: f64, speed: f64) -> f64 {
+    (1.0 / (sound_speed * sound_speed) - 1.0 / (speed * speed)).max(0.0).sqrt()
+}
+
+/// Longest path, m, across the coupling fluid in which a wave can arrive before the direct wave.
+pub(super) fn path_heard(setup: &Setup, speed: f64) -> f64 {
+    let across = slowness_across(setup.layers.coupling.sound_speed, speed);
+    distances(setup)
+        .fold(0.0, |path: f64, x| path.max((direct_arrival(setup, x) - x / speed) / across))
+}
+
+/// Depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then up to the
+/// cut and down to the receiver.
+fn coupling_depth(setup: &Setup, speed: f64) -> f64 {
+    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+    let heard = 0.5 * (path_heard(setup, speed) + receivers - source);
+    (DEPTH_MARGIN * heard.max(receivers)).min(setup.layers.coupling.thickness)
+}
+
+/// Depth of fluid 2 that is meshed, m; at least one element of `size`.
+fn marrow_depth(setup: &Setup, speed: f64, size: f64) -> f64 {
+    let (coupling, marrow) = (&setup.layers.coupling, &setup.layers.marrow);
+    let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
+    let above = heights * slowness_across(coupling.sound_speed, speed);
+    let across = slowness_across(marrow.sound_speed, speed);
+    let heard = distances(setup).fold(0.0, |depth: f64, x| {
+        depth.max(0.5 * (direct_arrival(setup, x) - x / speed - above) / across)
+    });
+    (DEPTH_MARGIN * heard).max(size).min(marrow.thickness)
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::elasticity::EngineeringConstants;
+
+    use super::*;
+
+    fn bone() -> Bone {
+        let constants = EngineeringConstants {
+            longitudinal_young_modulus: 17.717e9,
+            longitudinal_poisson_ratio: 0.3816,
+            longitudinal_shear_modulus: 4.795e9,
+            transverse_young_modulus: 9.8254e9,
+            transverse_poisson_ratio: 0.4495,
+        };
+        Bone { density: 1598.8, elasticity: constants.elasticity().unwrap() }
+    }
+
+    #[test]
+    fn the_slowest_wave_across_is_the_transverse_shear_wave() {
+        assert!((slowest_across(&bone()) - (3.389e9_f64 / 1598.8).sqrt()).abs() < 0.1);
+    }
+
+    #[test]
+    fn layers_are_cut_into_equal_elements_none_larger() {
+        for (thickness, size, elements) in
+            [(4e-3, 0.5e-3, 8), (4.01e-3, 0.5e-3, 9), (1e-6, 0.5e-3, 1), (0.3, 0.1, 3)]
+        {
+            let mesh = LayerMesh::new(thickness, size);
+            assert_eq!(mesh.elements, elements);
+            assert!(mesh.size <= size * (1.0 + 1e-9));
+        }
+    }
+
+    #[test]
+    fn fluids_end_where_no_echo_is_heard() {
+        let setup = Setup::default();
+        let mesh = Mesh::new(&setup, &bone(), 3960.1);
+        // By hand, at the farthest receiver: (14.267 - 5.404) µs / 616.99 µs/m is a path of
+        // 14.36 mm, half of it 7.18 mm; below, (14.267 - 5.404 - 2.468) µs leaves 5.18 mm.
+        let depth = |mesh: &LayerMesh| mesh.elements as f64 * mesh.size;
+        assert!((depth(&mesh.coupling) - 1.02 * 7.182e-3).abs() < 1e-5);
+        assert!((depth(&mesh.marrow) - 1.02 * 5.182e-3).abs() < 1e-5);
+        // Thin fluids are meshed whole.
+        let mut thin = setup;
+        thin.layers.coupling.thickness = 4e-3;
+        thin.layers.marrow.thickness = 2e-3;
+        let mesh = Mesh::new(&thin, &bone(), 3960.1);
+        assert!((depth(&mesh.coupling) - 4e-3).abs() < 1e-12);
+        assert!((depth(&mesh.marrow) - 2e-3).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,203 @@
+use osteon_common::parameters::Point;
+use osteon_common::realization::Ensemble;
+
+use super::*;
+use crate::hybrid::stepping::{State, stability_limit};
+use crate::lanes::LANES;
+
+/// A triclinic draw.
+fn bone() -> Bone {
+    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+    Ensemble::new(&point, 11).unwrap().bone(0).unwrap()
+}
+
+/// Two unlike fluids, and layers of unlike elements.
+fn setup() -> Setup {
+    let mut setup = Setup::default();
+    setup.layers.marrow = Fluid { thickness: 3e-3, density: 930.0, sound_speed: 1440.0 };
+    setup.layers.coupling.thickness = 5e-3;
+    setup
+}
+
+fn mesh() -> Mesh {
+    Mesh::with_sizes(&setup(), 4500.0, 6, [0.7e-3, 0.9e-3, 0.8e-3])
+}
+
+fn wavenumbers() -> Lanes {
+    Lanes(std::array::from_fn(|lane| 700.0 * lane as f64))
+}
+
+/// A state without symmetry, zero at the free ends.
+fn noise<const C: usize>(operator: &Operator<C>, seed: u64) -> Vec<Lanes> {
+    let mut state = seed;
+    let mut next = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut x: Vec<Lanes> =
+        (0..operator.len()).map(|_| Lanes(std::array::from_fn(|_| next()))).collect();
+    let (coupling, solid, _) = operator.lengths();
+    x[coupling - C..coupling].fill(Lanes::ZERO);
+    x[coupling + solid..coupling + solid + MARROW].fill(Lanes::ZERO);
+    x
+}
+
+fn applied<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes]) -> Vec<Lanes> {
+    let mut scratch = Scratch::default();
+    scratch.resize(operator.element_nodes());
+    let mut out = vec![Lanes::ZERO; x.len()];
+    operator.apply(k, x, Lanes::ZERO, &mut scratch, &mut out, &mut Keep);
+    out
+}
+
+/// Masses of the nodes of one layer, per unit of `factor`.
+fn masses(mesh: &LayerMesh, element: &Element, factor: f64) -> Vec<f64> {
+    let count = element.count();
+    let mut masses = vec![0.0; mesh.elements * (count - 1) + 1];
+    for e in 0..mesh.elements {
+        for i in 0..count {
+            masses[e * (count - 1) + i] += factor * element.weights[i] * 0.5 * mesh.size;
+        }
+    }
+    masses
+}
+
+/// The inner product diag(Ks, Mf), lane by lane: the solid's own stiffness, taken from the operator
+/// with no pressure, and the fluids' masses.
+fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lanes]) -> Lanes {
+    let (setup, mesh, bone) = (setup(), mesh(), bone());
+    let (coupling, solid, _) = operator.lengths();
+    let mut u = y.to_vec();
+    u[..coupling].fill(Lanes::ZERO);
+    u[coupling + solid..].fill(Lanes::ZERO);
+    let forces = applied(operator, k, &u);
+    let scale = setup.layers.coupling.density
+        * setup.layers.coupling.sound_speed
+        * setup.layers.coupling.sound_speed
+        / LENGTH;
+    let mut sum = Lanes::ZERO;
+    let mut add = |i: usize, mass: f64, with: Lanes| {
+        sum = (Lanes::splat(mass) * x[i]).mul_add(with, sum);
+    };
+    // Displacements carry `scale`, once in each factor.
+    let solid_masses = masses(&mesh.bone, &mesh.element, bone.density / (scale * scale));
+    for (node, &mass) in solid_masses.iter().enumerate() {
+        for c in 0..SOLID {
+            let i = coupling + node * SOLID + c;
+            add(i, mass, -forces[i]);
+        }
+    }
+    for (fluid, layer, from, c) in [
+        (&setup.layers.coupling, &mesh.coupling, 0, C),
+        (&setup.layers.marrow, &mesh.marrow, coupling + solid, MARROW),
+    ] {
+        let factor = 1.0 / (fluid.density * fluid.sound_speed * fluid.sound_speed);
+        for (node, &mass) in masses(layer, &mesh.element, factor).iter().enumerate() {
+            for i in from + node * c..from + (node + 1) * c {
+                add(i, mass, y[i]);
+            }
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_operator_is_self_adjoint_and_not_positive() {
+    let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
+    let k = wavenumbers();
+    let (x, y) = (noise(&operator, 1), noise(&operator, 2));
+    let one = inner(&operator, k, &x, &applied(&operator, k, &y));
+    let other = inner(&operator, k, &y, &applied(&operator, k, &x));
+    let own = inner(&operator, k, &x, &applied(&operator, k, &x));
+    for lane in 0..LANES {
+        assert!(own.0[lane] < 0.0);
+        assert!((one.0[lane] - other.0[lane]).abs() < 1e-11 * own.0[lane].abs(), "lane {lane}");
+    }
+}
+
+#[test]
+fn energy_without_source_is_conserved() {
+    let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
+    let k = wavenumbers();
+    let mut state = State::default();
+    let step = 0.9 * stability_limit(&operator, k.0[LANES - 1], &mut state);
+    state.rest(&operator);
+    state.now = noise(&operator, 3);
+    state.before = noise(&operator, 4);
+    // The scheme is x⁺ - 2x + x⁻ = step² B x with B = A + step²/12 A², and keeps
+    // |x⁺ - x|² - step² (x⁺, B x).
+    let energy = |state: &State| {
+        let once = applied(&operator, k, &state.before);
+        let twice = applied(&operator, k, &once);
+        let bent: Vec<Lanes> = once
+            .iter()
+            .zip(&twice)
+            .map(|(&a, &b)| Lanes::splat(step * step / 12.0).mul_add(b, a))
+            .collect();
+        let change: Vec<Lanes> =
+            state.now.iter().zip(&state.before).map(|(&now, &before)| now - before).collect();
+        inner(&operator, k, &change, &change)
+            - Lanes::splat(step * step) * inner(&operator, k, &state.now, &bent)
+    };
+    let before = energy(&state);
+    for _ in 0..2000 {
+        state.step(&operator, k, [Lanes::ZERO; 3], step);
+    }
+    let after = energy(&state);
+    for lane in 0..LANES {
+        assert!(before.0[lane] > 0.0);
+        let drift = after.0[lane] / before.0[lane] - 1.0;
+        assert!(drift.abs() < 1e-9, "lane {lane}: {drift:e}");
+    }
+}
+
+/// Drives the bone's face by a smooth load; the states of fluid 1 at the end.
+fn driven<const C: usize>() -> Vec<Lanes> {
+    let operator = Operator::<C>::new(&setup(), &bone(), &mesh());
+    let k = wavenumbers();
+    let mut state = State::default();
+    let step = stability_limit(&operator, k.0[LANES - 1], &mut state);
+    let load = |n: usize| {
+        let t = n as f64 * step / 0.3e-6 - 6.1;
+        Lanes::splat(libm::exp(-t * t))
+    };
+    state.start(&operator, k, [load(1), load(2)], step);
+    for n in 1..600 {
+        state.step(&operator, k, [load(n - 1), load(n), load(n + 1)], step);
+    }
+    state.now[..operator.lengths().0].to_vec()
+}
+
+#[test]
+fn the_pressure_in_fluid_1_is_real_for_a_triclinic_bone() {
+    let complex = driven::<2>();
+    let real = driven::<1>();
+    let largest = real.iter().flat_map(|p| p.0).fold(0.0, |max: f64, p| max.max(p.abs()));
+    for (node, &alone) in complex.chunks_exact(2).zip(&real) {
+        for lane in 0..LANES {
+            assert!(node[1].0[lane].abs() < 1e-11 * largest, "{}", node[1].0[lane] / largest);
+            assert!((node[0].0[lane] - alone.0[lane]).abs() < 1e-11 * largest);
+        }
+    }
+    // And is not so by accident: the bone's motion does depend on the sign of k.
+    let u2 = bone().elasticity.component(2, 2, 1, 2);
+    assert!(u2.abs() > 1e7, "{u2}");
+}
+
+#[test]
+fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
+    let operator = Operator::<1>::new(&setup(), &bone(), &mesh());
+    let k = Lanes::splat(4900.0);
+    let mut state = State::default();
+    let limit = stability_limit(&operator, 4900.0, &mut state);
+    for (share, stable) in [(1.0, true), (1.05, false)] {
+        state.rest(&operator);
+        state.now = noise(&operator, 5);
+        for _ in 0..3000 {
+            state.step(&operator, k, [Lanes::ZERO; 3], share * limit);
+        }
+        let bounded = state.now.iter().flat_map(|p| p.0).all(|p| p.abs() < 1e6);
+        assert_eq!(bounded, stable, "{share} of the limit");
+    }
+}

@@ -1,0 +1,181 @@
+//! Extrema of an equally sampled signal.
+
+use crate::picking::Extremum;
+
+/// Samples of one interpolating polynomial.
+const POINTS: usize = 8;
+/// Bisections of an interval; then Newton's method could not tell more.
+const BISECTIONS: usize = 44;
+
+/// Half periods on either side that [`low_pass`] looks at.
+pub(super) const REACH: usize = 4;
+/// The eighth difference, over 2⁸.
+const EIGHTH_DIFFERENCE: [f64; 2 * REACH + 1] = [
+    1.0 / 256.0,
+    -8.0 / 256.0,
+    28.0 / 256.0,
+    -56.0 / 256.0,
+    70.0 / 256.0,
+    -56.0 / 256.0,
+    28.0 / 256.0,
+    -8.0 / 256.0,
+    1.0 / 256.0,
+];
+
+/// `values` without what swings with the period of two `half_period`s (in samples), into `out`:
+/// frequencies ω pass by 1 - sin⁸(ω half_period / 2), without delay. The last [`REACH`] half periods
+/// are left as they are; before the first sample there is nothing.
+pub(super) fn low_pass(values: &[f64], half_period: usize, out: &mut [f64]) {
+    out.copy_from_slice(values);
+    for i in 0..values.len().saturating_sub(REACH * half_period) {
+        let mut sum = 0.0;
+        for (j, &factor) in EIGHTH_DIFFERENCE.iter().enumerate() {
+            if let Some(place) = (i + j * half_period).checked_sub(REACH * half_period) {
+                sum = f64::mul_add(factor, values[place], sum);
+            }
+        }
+        out[i] -= sum;
+    }
+}
+
+/// A signal sampled from `start` on every `step` (s).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub(super) start: f64,
+    pub(super) step: f64,
+    pub(super) values: &'a [f64],
+}
+
+impl Samples<'_> {
+    /// All local extrema in `from` ≤ t < `to` (s), in order of time, into `extrema`.
+    pub(super) fn extrema(&self, from: f64, to: f64, extrema: &mut Vec<Extremum>) {
+        extrema.clear();
+        if self.values.len() < POINTS {
+            return;
+        }
+        let position = |t: f64| ((t - self.start) / self.step).max(0.0);
+        let first = position(from) as usize;
+        let last = (position(to) as usize).min(self.values.len() - 2);
+        let mut next = self.piece(first.min(last));
+        for i in first..=last {
+            let piece = next;
+            next = self.piece(i + 1);
+            // One slope for each sample, so that no extremum is seen twice or overlooked.
+            let (low, high) = (piece.at(0.0).1, next.at(0.0).1);
+            if (low < 0.0) == (high < 0.0) {
+                continue;
+            }
+            let place = piece.flat_place(low < 0.0);
+            let time = (i as f64 + place).mul_add(self.step, self.start);
+            if time >= from && time < to {
+                extrema.push(Extremum { time, pressure: piece.at(place).0 });
+            }
+        }
+    }
+
+    /// The value at `t` (s).
+    pub(super) fn at(&self, t: f64) -> f64 {
+        let position = ((t - self.start) / self.step).max(0.0);
+        let i = (position as usize).min(self.values.len().saturating_sub(2));
+        if self.values.len() < POINTS { 0.0 } else { self.piece(i).at(position - i as f64).0 }
+    }
+
+    /// The polynomial around the interval from sample `i` to the next.
+    fn piece(&self, i: usize) -> Piece {
+        let first = i.saturating_sub(POINTS / 2 - 1).min(self.values.len() - POINTS);
+        let mut differences = [0.0; POINTS];
+        differences.copy_from_slice(&self.values[first..first + POINTS]);
+        for order in 1..POINTS {
+            for j in (order..POINTS).rev() {
+                differences[j] = (differences[j] - differences[j - 1]) / order as f64;
+            }
+        }
+        Piece { differences, offset: (i - first) as f64 }
+    }
+}
+
+/// An interpolating polynomial in Newton's form, in units of samples.
+struct Piece {
+    differences: [f64; POINTS],
+    /// Place of the interval's lower end among the polynomial's nodes.
+    offset: f64,
+}
+
+impl Piece {
+    /// Value and slope at `x`, 0 to 1 in the interval.
+    fn at(&self, x: f64) -> (f64, f64) {
+        let x = x + self.offset;
+        let (mut value, mut slope) = (self.differences[POINTS - 1], 0.0);
+        for j in (0..POINTS - 1).rev() {
+            let distance = x - j as f64;
+            slope = distance.mul_add(slope, value);
+            value = distance.mul_add(value, self.differences[j]);
+        }
+        (value, slope)
+    }
+
+    /// Where the slope, `rising` through zero or falling, is zero.
+    fn flat_place(&self, rising: bool) -> f64 {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if (self.at(middle).1 < 0.0) == rising {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn extrema_of_a_sine_are_found_far_below_the_sample() {
+        // 2.5 MHz every 10 ns: 40 samples a period.
+        let omega = 2.0 * PI * 2.5e6;
+        let values: Vec<f64> =
+            (0..120).map(|i| libm::sin(omega * (f64::from(i) * 10e-9 + 3e-9))).collect();
+        let samples = Samples { start: 3e-9, step: 10e-9, values: &values };
+        let mut extrema = Vec::new();
+        samples.extrema(0.15e-6, 0.95e-6, &mut extrema);
+        let expected = [0.3e-6, 0.5e-6, 0.7e-6, 0.9e-6];
+        assert_eq!(extrema.len(), expected.len());
+        for (extremum, time) in extrema.iter().zip(expected) {
+            assert!((extremum.time - time).abs() < 1e-13, "{extremum:?}");
+            assert!((extremum.pressure.abs() - 1.0).abs() < 1e-9);
+        }
+        assert!((samples.at(0.25e-6) - libm::sin(omega * 0.25e-6)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_low_pass_takes_one_frequency_and_leaves_the_low_ones() {
+        for (samples_per_period, gain) in [(10.0, 0.0), (20.0, 0.9375), (100.0, 1.0)] {
+            let wave = |i: usize| libm::cos(2.0 * PI * i as f64 / samples_per_period);
+            let values: Vec<f64> = (0..100).map(wave).collect();
+            let mut out = vec![0.0; 100];
+            low_pass(&values, 5, &mut out);
+            for i in 20..80 {
+                assert!((out[i] - gain * values[i]).abs() < 1e-6, "{samples_per_period}, {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn extrema_are_listed_once_and_only_in_the_window() {
+        let parabola: Vec<f64> =
+            (0..40).map(|i| 1.0 - f64::from(i - 20) * f64::from(i - 20)).collect();
+        let samples = Samples { start: 0.0, step: 1.0, values: &parabola };
+        let mut extrema = Vec::new();
+        for (from, to, count) in [(0.0, 39.0, 1), (20.5, 39.0, 0), (0.0, 19.5, 0), (50.0, 60.0, 0)]
+        {
+            samples.extrema(from, to, &mut extrema);
+            assert_eq!(extrema.len(), count, "{from} to {to}");
+        }
+    }
+}

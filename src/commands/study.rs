@@ -1,0 +1,62 @@
+//! `study`: tables of how the solvers do over many draws.
+
+use osteon_common::realization::PointError;
+use osteon_common::version;
+use osteon_solver::Isa;
+use osteon_study::{Draws, Progress, Table, accuracy, continuity, convergence, failures, methods};
+
+use crate::arguments::{DrawsArguments, Study};
+use crate::ending::{Ending, Failure, stdout_failure};
+use crate::output;
+use crate::progress::say;
+use crate::resolved::Format;
+
+/// A study over draws.
+struct OverDraws {
+    name: &'static str,
+    realizations: u64,
+    table: fn(&Draws, Progress<'_>) -> Result<Table, PointError>,
+}
+
+const FAILURES: OverDraws =
+    OverDraws { name: "failures", realizations: failures::REALIZATIONS, table: failures::table };
+const ACCURACY: OverDraws =
+    OverDraws { name: "accuracy", realizations: accuracy::REALIZATIONS, table: accuracy::table };
+const METHODS: OverDraws =
+    OverDraws { name: "methods", realizations: methods::REALIZATIONS, table: methods::table };
+const CONTINUITY: OverDraws = OverDraws {
+    name: "continuity",
+    realizations: continuity::REALIZATIONS,
+    table: continuity::table,
+};
+
+/// Measures, and prints the table under the command line that makes it again.
+pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
+    let measured = tokio::task::spawn_blocking(move || match study {
+        Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
+        Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
+        Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
+        Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
+        Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
+    });
+    let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
+    output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+fn over_draws(
+    study: &OverDraws,
+    arguments: DrawsArguments,
+    isa: Isa,
+) -> Result<String, PointError> {
+    let realizations = arguments.realizations.unwrap_or(study.realizations);
+    let draws = Draws { realizations, seed: arguments.seed, isa };
+    let table = (study.table)(&draws, &say)?;
+    let (name, seed) = (study.name, arguments.seed);
+    Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
+}
+
+/// A table under what makes it again.
+fn titled(arguments: &str, table: &Table) -> String {
+    format!("`osteon study {arguments}` ({})\n\n{table}", version::fingerprint())
+}

@@ -1,0 +1,40 @@
+//! The table of a check: one case solved in several ways.
+
+use osteon_study::Difference;
+use osteon_study::check::{Check, Solution};
+
+use super::{aligned, significant};
+
+/// The table, and whether the check was passed.
+pub(super) fn table(check: &Check) -> String {
+    let header = ["solver", "velocity (m/s)", "difference", "time (s)", "estimated error"];
+    let mut rows = vec![header.map(str::to_owned)];
+    rows.extend(check.solutions().map(row));
+    let verdict = if check.passed() {
+        "the methods agree".to_owned()
+    } else if check.solutions().iter().any(|one| one.difference == Difference::Picks) {
+        "THE PICKS DIFFER".to_owned()
+    } else {
+        format!("THE EXACT METHOD IS OFF by more than {:e}", check.error_max())
+    };
+    let refined = significant(check.refined.setup.solver.refinement, 3);
+    format!("against exact, refinement {refined}:\n{}{verdict}\n", aligned(&rows))
+}
+
+fn row(solution: &Solution) -> [String; 5] {
+    let settings = &solution.setup.solver;
+    let name =
+        format!("{}, refinement {}", settings.method.name(), significant(settings.refinement, 3));
+    let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| significant(value, 2));
+    let (velocity, estimated) = match &solution.arrival {
+        Ok(arrival) => (significant(arrival.velocity, 8), Some(arrival.estimated_error)),
+        Err(failure) => (failure.kind.name().to_owned(), None),
+    };
+    let difference = match solution.difference {
+        Difference::Picks => "other pick".to_owned(),
+        Difference::BothFailed | Difference::Numbers { .. } => {
+            number(solution.difference.velocity())
+        }
+    };
+    [name, velocity, difference, number(solution.difference.time()), number(estimated)]
+}

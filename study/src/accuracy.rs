@@ -1,0 +1,123 @@
+//! Errors of the exact method at default settings, and how well it estimates them.
+
+use osteon_common::quantile::quantile;
+use osteon_common::realization::PointError;
+use osteon_common::settings::SolverSettings;
+
+use crate::Progress;
+use crate::difference::{Difference, Spread, difference};
+use crate::draws::{Cell, Draws, arrival, cells};
+use crate::table::{Table, millimetres, percent, two_digits};
+
+/// Thicknesses of the plates, m.
+const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
+/// Dispersions.
+const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
+/// Realizations of each row, unless chosen otherwise.
+pub const REALIZATIONS: u64 = 1000;
+/// Refinement of the reference.
+pub(crate) const REFERENCE: f64 = 5.0;
+
+/// Relative errors of velocities against refinement 5, and the ratio of the estimated error to
+/// the true one, by thickness and dispersion.
+///
+/// # Errors
+/// When there are no draws at a dispersion.
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+    let mut table = Table::new(&[
+        "plate (mm)",
+        "dispersion",
+        "median error",
+        "99 %",
+        "largest",
+        "different picks (%)",
+        "estimate / error 5 %",
+        "median",
+        "95 %",
+    ]);
+    for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
+        table.push(row(&cell));
+        progress(&table.last_row());
+    }
+    Ok(table)
+}
+
+fn row(cell: &Cell) -> Vec<String> {
+    let settings = SolverSettings::default();
+    let setup = cell.setup(settings);
+    let default = cell.solver(settings);
+    let reference = cell.solver(SolverSettings { refinement: REFERENCE, ..settings });
+    let measured: Vec<Measured> = cell.each(|_, bone, workspace| {
+        let found = arrival(&default, bone, workspace);
+        let reference = arrival(&reference, bone, workspace);
+        Measured {
+            difference: difference(&setup, &found, &reference),
+            estimated_error: found.map_or(0.0, |found| found.estimated_error),
+        }
+    });
+    let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
+    row.extend(summary(&measured));
+    row
+}
+
+/// One draw.
+struct Measured {
+    difference: Difference,
+    estimated_error: f64,
+}
+
+fn summary(measured: &[Measured]) -> Vec<String> {
+    let differences: Vec<_> = measured.iter().map(|draw| draw.difference).collect();
+    let spread = Spread::of(&differences);
+    let mut cells: Vec<_> = [0.5, 0.99, 1.0].map(|p| two_digits(spread.velocity(p))).into();
+    cells.push(percent(spread.different_picks as u64, measured.len() as u64));
+    let ratios = ratios(measured);
+    cells.extend([0.05, 0.5, 0.95].map(|p| two_digits(quantile(&ratios, p))));
+    cells
+}
+
+/// Estimated over true error, ascending, of the draws with the same pick and an error at all.
+fn ratios(measured: &[Measured]) -> Vec<f64> {
+    let mut ratios: Vec<f64> = measured
+        .iter()
+        .filter_map(|draw| {
+            let error = draw.difference.velocity().filter(|&error| error > 0.0)?;
+            Some(draw.estimated_error / error)
+        })
+        .collect();
+    ratios.sort_unstable_by(f64::total_cmp);
+    ratios
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_solver::Isa;
+
+    use super::*;
+
+    #[test]
+    fn estimates_are_compared_where_there_is_an_error() {
+        let same = |velocity, estimated_error| Measured {
+            difference: Difference::Numbers { velocity, time: 0.0 },
+            estimated_error,
+        };
+        let measured = [
+            same(1e-5, 4e-5),
+            same(2e-5, 2e-5),
+            same(0.0, 1e-5),
+            Measured { difference: Difference::Picks, estimated_error: 1e-5 },
+        ];
+        assert_eq!(ratios(&measured), [1.0, 4.0]);
+        let cells = summary(&measured);
+        assert_eq!(cells, ["1.0e-5", "2.0e-5", "2.0e-5", "25.000", "1.1", "2.5", "3.8"]);
+    }
+
+    #[test]
+    fn default_settings_are_not_the_reference() {
+        let draws = Draws { realizations: 4, seed: 1, isa: Isa::fastest() };
+        let row = row(&Cell::new(4e-3, 0.1, &draws).unwrap());
+        assert_eq!(row.len(), 9);
+        let largest: f64 = row[4].parse().unwrap();
+        assert!(largest > 0.0 && largest < 1e-3, "{row:?}");
+    }
+}

@@ -1,0 +1,133 @@
+//! One case, solved by both methods and by a refined exact one.
+
+use osteon_common::case::{Case, Setup};
+use osteon_common::limits::REFINEMENT_MAX;
+use osteon_common::settings::{Method, SolverSettings};
+use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
+
+use crate::difference::{Difference, difference};
+
+/// Refinement of the reference over the case's.
+const REFERENCE: f64 = 5.0;
+/// Largest relative error of the exact method's velocity.
+const ERROR_MAX: f64 = 1e-4;
+/// The same in a thin plate: its first extremum lies closer to the wave of the pulse's kink.
+const ERROR_MAX_THIN: f64 = 3e-4;
+/// Plates below this are thin, m.
+const THIN: f64 = 2e-3;
+
+/// One solution of the case.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The setup, with the settings that were used.
+    pub setup: Setup,
+    /// What was picked.
+    pub arrival: Result<Arrival, Failure>,
+    /// How it differs from the refined solution.
+    pub difference: Difference,
+}
+
+/// The solutions of one case.
+#[derive(Debug, Clone)]
+pub struct Check {
+    /// The exact method at the case's refinement.
+    pub exact: Solution,
+    /// The hybrid method, as the case discretises it.
+    pub hybrid: Solution,
+    /// The exact method at five times the case's refinement, at most 16.
+    pub refined: Solution,
+}
+
+impl Check {
+    /// Solves `case` three times, on `isa`.
+    pub fn of(case: &Case, isa: Isa) -> Self {
+        let mut workspace = Workspace::default();
+        let mut solve = |solver| {
+            let setup = Setup { solver, ..case.setup };
+            let arrival = Solver::with_isa(&setup, isa).arrival(&case.bone, &mut workspace);
+            (setup, arrival)
+        };
+        let [exact, hybrid, refined] = settings(&case.setup.solver).map(&mut solve);
+        let reference = refined.1.clone();
+        let solution = |(setup, arrival): (Setup, _)| {
+            let difference = difference(&setup, &arrival, &reference);
+            Solution { setup, arrival, difference }
+        };
+        Self { exact: solution(exact), hybrid: solution(hybrid), refined: solution(refined) }
+    }
+
+    /// All solutions, the reference last.
+    pub fn solutions(&self) -> [&Solution; 3] {
+        [&self.exact, &self.hybrid, &self.refined]
+    }
+
+    /// Largest accepted relative difference between exact and refined velocity.
+    pub fn error_max(&self) -> f64 {
+        if self.exact.setup.layers.bone_thickness < THIN { ERROR_MAX_THIN } else { ERROR_MAX }
+    }
+
+    /// Whether all picked the same extremum, and the exact velocity is within its bound.
+    pub fn passed(&self) -> bool {
+        let picks = self.solutions().iter().all(|one| one.difference != Difference::Picks);
+        let error = self.exact.difference.velocity();
+        picks && error.is_none_or(|error| error <= self.error_max())
+    }
+}
+
+/// Exact, hybrid and refined settings for a case with `given` ones.
+fn settings(given: &SolverSettings) -> [SolverSettings; 3] {
+    let default = SolverSettings::default();
+    let exact = SolverSettings { refinement: given.refinement, ..default };
+    let refinement = (REFERENCE * given.refinement).min(REFINEMENT_MAX);
+    let hybrid = SolverSettings { method: Method::Hybrid, ..*given };
+    [exact, hybrid, SolverSettings { refinement, ..exact }]
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::case::Bone;
+
+    use crate::OPTIMUM;
+
+    use super::*;
+
+    #[test]
+    fn settings_follow_the_cases() {
+        let hybrid = SolverSettings {
+            method: Method::Hybrid,
+            refinement: 4.0,
+            element_order: 6,
+            ..SolverSettings::default()
+        };
+        let [exact, second, refined] = settings(&hybrid);
+        assert_eq!(second, hybrid);
+        assert_eq!((exact.method, exact.refinement, exact.element_order), (Method::Exact, 4.0, 8));
+        assert_eq!((refined.method, refined.refinement), (Method::Exact, 16.0));
+        let [_, hybrid, refined] = settings(&SolverSettings::default());
+        assert_eq!((hybrid.method, refined.refinement), (Method::Hybrid, 5.0));
+    }
+
+    fn check(thickness: f64) -> Check {
+        let elasticity = OPTIMUM.constants().elasticity().unwrap();
+        let mut case =
+            Case { setup: Setup::default(), bone: Bone { density: OPTIMUM.density(), elasticity } };
+        case.setup.layers.bone_thickness = thickness;
+        Check::of(&case, Isa::fastest())
+    }
+
+    #[test]
+    fn the_papers_optimum_passes_and_errors_are_judged_by_thickness() {
+        let mut thick = check(4e-3);
+        assert!(thick.passed(), "{thick:?}");
+        assert_eq!(thick.refined.difference, Difference::Numbers { velocity: 0.0, time: 0.0 });
+        let error = thick.exact.difference.velocity().unwrap();
+        assert!(error > 0.0, "the default is not the refined one");
+        thick.exact.difference = Difference::Numbers { velocity: 2e-4, time: 0.0 };
+        assert!(!thick.passed());
+        let mut thin = thick.clone();
+        thin.exact.setup.layers.bone_thickness = 1e-3;
+        assert!(thin.passed());
+        thin.hybrid.difference = Difference::Picks;
+        assert!(!thin.passed());
+    }
+}

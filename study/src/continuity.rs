@@ -1,0 +1,130 @@
+//! How far a velocity jumps when the elasticity hardly changes.
+
+use osteon_common::case::Bone;
+use osteon_common::elasticity::Elasticity;
+use osteon_common::realization::PointError;
+use osteon_common::settings::SolverSettings;
+use osteon_solver::Failure;
+
+use crate::Progress;
+use crate::difference::{Difference, Spread, difference};
+use crate::draws::{Draws, arrival, cells};
+use crate::table::{Table, millimetres, two_digits};
+
+/// Thicknesses of the plates, m.
+const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
+/// Dispersions.
+const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
+/// Realizations of each row, unless chosen otherwise.
+pub const REALIZATIONS: u64 = 20_000;
+/// Largest relative change of an entry of the elasticity.
+const CHANGE: f64 = 1e-9;
+/// A velocity that keeps its extremum may not jump further, relative.
+const JUMP_MAX: f64 = 1e-5;
+
+/// Pairs of bones whose entries differ by up to 1e-9, relative: largest jump of a velocity that
+/// keeps its extremum, how many such jumps are above 1e-5, and how many pairs change their
+/// extremum or the kind of their failure.
+///
+/// # Errors
+/// When there are no draws at a dispersion.
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+    let mut table = Table::new(&[
+        "plate (mm)",
+        "dispersion",
+        "pairs",
+        "largest jump",
+        "jumps above 1e-5",
+        "other extremum or failure",
+    ]);
+    for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
+        let setup = cell.setup(SolverSettings::default());
+        let solver = cell.solver(setup.solver);
+        let differences: Vec<Difference> = cell.each(|index, bone, workspace| {
+            let moved = bone.as_ref().map_err(Clone::clone).and_then(|bone| moved(bone, index));
+            let first = arrival(&solver, bone, workspace);
+            difference(&setup, &arrival(&solver, &moved, workspace), &first)
+        });
+        let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
+        row.extend(summary(&differences));
+        table.push(row);
+        progress(&table.last_row());
+    }
+    Ok(table)
+}
+
+fn summary(differences: &[Difference]) -> Vec<String> {
+    let spread = Spread::of(differences);
+    let jumps = differences.iter().filter_map(|difference| difference.velocity());
+    vec![
+        differences.len().to_string(),
+        two_digits(spread.velocity(1.0)),
+        jumps.filter(|&jump| jump > JUMP_MAX).count().to_string(),
+        spread.different_picks.to_string(),
+    ]
+}
+
+/// The bone with each of its 21 entries changed by a share between ±[`CHANGE`] that follows from
+/// `index`.
+fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
+    let mut rows = *bone.elasticity.rows();
+    let mut state = index;
+    for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
+        rows[i][j] *= 1.0 + CHANGE * symmetric(&mut state);
+        rows[j][i] = rows[i][j];
+    }
+    let elasticity = Elasticity::new(rows).map_err(|error| Failure {
+        kind: osteon_common::outcome::FailureKind::NotFinite,
+        detail: error.to_string(),
+    })?;
+    Ok(Bone { density: bone.density, elasticity })
+}
+
+/// The next number of a splitmix64 generator, from -1 to 1.
+fn symmetric(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^= z >> 31;
+    ((z >> 11) as f64 / (1_u64 << 52) as f64) - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_solver::Isa;
+
+    use crate::OPTIMUM;
+
+    use super::*;
+
+    #[test]
+    fn every_entry_moves_a_little_and_not_the_same_way() {
+        let elasticity = OPTIMUM.constants().elasticity().unwrap();
+        let bone = Bone { density: OPTIMUM.density(), elasticity };
+        let (one, other) = (moved(&bone, 1).unwrap(), moved(&bone, 2).unwrap());
+        assert_ne!(one, other);
+        for i in 0..6 {
+            for j in 0..6 {
+                let (from, to) = (bone.elasticity.rows()[i][j], one.elasticity.rows()[i][j]);
+                assert!((to - from).abs() <= 1.001 * CHANGE * from.abs(), "{i} {j}");
+                assert!(from == 0.0 || to != from, "{i} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn jumps_are_counted_apart_from_changed_picks() {
+        let numbers = |velocity| Difference::Numbers { velocity, time: 0.0 };
+        let differences = [numbers(2e-5), Difference::Picks, numbers(1e-9), Difference::BothFailed];
+        assert_eq!(summary(&differences), ["4", "2.0e-5", "1", "1"]);
+    }
+
+    #[test]
+    fn few_draws_do_not_jump() {
+        let draws = Draws { realizations: 20, seed: 1, isa: Isa::fastest() };
+        for row in table(&draws, &|_| ()).unwrap().rows() {
+            assert_eq!(row[4], "0", "{row:?}");
+        }
+    }
+}

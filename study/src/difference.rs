@@ -1,0 +1,149 @@
+//! How two solutions of one case differ.
+
+use osteon_common::case::Setup;
+use osteon_common::quantile::quantile;
+use osteon_solver::{Arrival, Failure};
+
+/// Picked times further apart than this, in periods of the centre frequency, are not those of one
+/// extremum: neighbouring extrema are about half a period apart, and discretisation moves one by a
+/// thousandth.
+const SAME_EXTREMUM: f64 = 0.1;
+
+/// How a solution differs from a reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Difference {
+    /// Neither has a velocity, for the same reason.
+    BothFailed,
+    /// They picked different extrema, failed for different reasons, or only one failed.
+    Picks,
+    /// They picked the same extremum.
+    Numbers {
+        /// |V - V_ref| / V_ref.
+        velocity: f64,
+        /// Largest difference of a receiver's picked times, s.
+        time: f64,
+    },
+}
+
+impl Difference {
+    /// Relative difference of the velocities, where the picks are the same.
+    pub fn velocity(self) -> Option<f64> {
+        match self {
+            Self::Numbers { velocity, .. } => Some(velocity),
+            Self::BothFailed | Self::Picks => None,
+        }
+    }
+
+    /// Largest difference of the times, s, where the picks are the same.
+    pub fn time(self) -> Option<f64> {
+        match self {
+            Self::Numbers { time, .. } => Some(time),
+            Self::BothFailed | Self::Picks => None,
+        }
+    }
+}
+
+/// How `found` differs from `reference`, both of a case of `setup`.
+pub fn difference(
+    setup: &Setup,
+    found: &Result<Arrival, Failure>,
+    reference: &Result<Arrival, Failure>,
+) -> Difference {
+    match (found, reference) {
+        (Ok(found), Ok(reference)) => of_arrivals(setup, found, reference),
+        (Err(found), Err(reference)) if found.kind == reference.kind => Difference::BothFailed,
+        _ => Difference::Picks,
+    }
+}
+
+fn of_arrivals(setup: &Setup, found: &Arrival, reference: &Arrival) -> Difference {
+    let times = found.times.iter().zip(&reference.times);
+    let time = times.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    if time * setup.probe.center_frequency > SAME_EXTREMUM {
+        return Difference::Picks;
+    }
+    let velocity = (found.velocity - reference.velocity).abs() / reference.velocity;
+    Difference::Numbers { velocity, time }
+}
+
+/// Many differences in a few numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Spread {
+    /// Relative differences of velocities, ascending.
+    velocities: Vec<f64>,
+    /// Largest difference of picked times, s.
+    pub(crate) largest_time: Option<f64>,
+    /// How many picked differently.
+    pub(crate) different_picks: usize,
+}
+
+impl Spread {
+    pub(crate) fn of(differences: &[Difference]) -> Self {
+        let mut velocities: Vec<f64> =
+            differences.iter().filter_map(|difference| difference.velocity()).collect();
+        velocities.sort_unstable_by(f64::total_cmp);
+        let times = differences.iter().filter_map(|difference| difference.time());
+        Self {
+            velocities,
+            largest_time: times.reduce(f64::max),
+            different_picks: differences.iter().filter(|&&it| it == Difference::Picks).count(),
+        }
+    }
+
+    /// Quantile of the relative differences of velocities.
+    pub(crate) fn velocity(&self, p: f64) -> Option<f64> {
+        quantile(&self.velocities, p)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::outcome::FailureKind;
+
+    use super::*;
+
+    fn arrival(velocity: f64, times: [f64; 3]) -> Result<Arrival, Failure> {
+        Ok(Arrival { velocity, times: times.to_vec(), estimated_error: 0.0 })
+    }
+
+    fn failure(kind: FailureKind) -> Result<Arrival, Failure> {
+        Err(Failure { kind, detail: String::new() })
+    }
+
+    #[test]
+    fn picks_differ_when_times_or_reasons_do() {
+        let reference = arrival(4000.0, [5e-6, 6e-6, 7e-6]);
+        let check = |found: &Result<Arrival, Failure>, reference, expected| {
+            assert_eq!(difference(&Setup::default(), found, reference), expected, "{found:?}");
+        };
+        let near = arrival(4004.0, [5e-6, 6e-6, 7.05e-6]);
+        let Difference::Numbers { velocity, time } =
+            difference(&Setup::default(), &near, &reference)
+        else {
+            panic!("the picks are the same");
+        };
+        assert_eq!(velocity, 1e-3);
+        assert!((time - 5e-8).abs() < 1e-15, "{time}");
+        check(&arrival(4000.0, [5e-6, 6e-6, 7.11e-6]), &reference, Difference::Picks);
+        let (none, late) = (failure(FailureKind::NoArrival), failure(FailureKind::NotFinite));
+        check(&none, &reference, Difference::Picks);
+        check(&reference, &none, Difference::Picks);
+        check(&none, &late, Difference::Picks);
+        check(&none, &none, Difference::BothFailed);
+    }
+
+    #[test]
+    fn a_spread_counts_picks_apart() {
+        let numbers = |velocity, time| Difference::Numbers { velocity, time };
+        let spread = Spread::of(&[
+            numbers(3e-5, 1e-10),
+            Difference::Picks,
+            numbers(1e-5, 4e-10),
+            Difference::BothFailed,
+        ]);
+        assert_eq!(spread.velocity(1.0), Some(3e-5));
+        assert_eq!(spread.velocity(0.0), Some(1e-5));
+        assert_eq!((spread.largest_time, spread.different_picks), (Some(4e-10), 1));
+        assert_eq!(Spread::of(&[Difference::Picks]).velocity(0.5), None);
+    }
+}

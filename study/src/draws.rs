@@ -1,0 +1,138 @@
+//! Bones to study: draws of the paper's optimum, by dispersion and thickness of the plate.
+
+use std::ops::Range;
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::outcome::FailureKind;
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::realization::{Ensemble, PointError};
+use osteon_common::settings::SolverSettings;
+use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
+use rayon::prelude::*;
+
+/// The paper's optimum.
+pub const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+
+/// How many bones to draw, with which seed, and what computes.
+#[derive(Debug, Clone, Copy)]
+pub struct Draws {
+    /// Realizations of each row.
+    pub realizations: u64,
+    /// Seed of the germs.
+    pub seed: u64,
+    /// Instruction set; nothing depends on it but the time.
+    pub isa: Isa,
+}
+
+/// One row of a study: the paper's geometry with a plate of this thickness, bones of this
+/// dispersion around the optimum's mean model.
+#[derive(Debug, Clone)]
+pub(crate) struct Cell {
+    /// Thickness of the plate, m.
+    pub(crate) thickness: f64,
+    /// Dispersion of the ensemble.
+    pub(crate) dispersion: f64,
+    ensemble: Ensemble,
+    draws: Draws,
+}
+
+impl Cell {
+    /// A cell of `draws`.
+    ///
+    /// # Errors
+    /// When no bone has that dispersion.
+    pub(crate) fn new(thickness: f64, dispersion: f64, draws: &Draws) -> Result<Self, PointError> {
+        let mut point = OPTIMUM;
+        point.0[Parameter::Dispersion as usize] = dispersion;
+        let ensemble = Ensemble::new(&point, draws.seed)?;
+        Ok(Self { thickness, dispersion, ensemble, draws: *draws })
+    }
+
+    /// The setup with these settings.
+    pub(crate) fn setup(&self, solver: SolverSettings) -> Setup {
+        let mut setup = Setup { solver, ..Setup::default() };
+        setup.layers.bone_thickness = self.thickness;
+        setup
+    }
+
+    /// A solver with these settings.
+    pub(crate) fn solver(&self, settings: SolverSettings) -> Solver {
+        Solver::with_isa(&self.setup(settings), self.draws.isa)
+    }
+
+    /// `measure` of the bone at every index, in index order; what cannot be drawn is the failure
+    /// of its index.
+    pub(crate) fn each<T: Send>(
+        &self,
+        measure: impl Fn(u64, &Result<Bone, Failure>, &mut Workspace) -> T + Sync,
+    ) -> Vec<T> {
+        let indices: Range<u64> = 0..self.draws.realizations;
+        indices
+            .into_par_iter()
+            .map_init(Workspace::default, |workspace, index| {
+                measure(index, &self.bone(index), workspace)
+            })
+            .collect()
+    }
+
+    /// The bone at `index`; what cannot be drawn is the failure of its index.
+    pub(crate) fn bone(&self, index: u64) -> Result<Bone, Failure> {
+        self.ensemble
+            .bone(index)
+            .map_err(|error| Failure { kind: FailureKind::NotFinite, detail: error.to_string() })
+    }
+}
+
+/// The arrival of a bone that may not be one.
+pub(crate) fn arrival(
+    solver: &Solver,
+    bone: &Result<Bone, Failure>,
+    workspace: &mut Workspace,
+) -> Result<Arrival, Failure> {
+    bone.as_ref().map_err(Clone::clone).and_then(|bone| solver.arrival(bone, workspace))
+}
+
+/// The cells of all thicknesses (m) and dispersions, dispersions running faster.
+pub(crate) fn cells(
+    thicknesses: &[f64],
+    dispersions: &[f64],
+    draws: &Draws,
+) -> Result<Vec<Cell>, PointError> {
+    let of_thickness =
+        |&thickness| dispersions.iter().map(move |&delta| Cell::new(thickness, delta, draws));
+    thicknesses.iter().flat_map(of_thickness).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_do_not_depend_on_threads() {
+        let draws = Draws { realizations: 40, seed: 3, isa: Isa::fastest() };
+        let cell = Cell::new(4e-3, 0.3, &draws).unwrap();
+        let solver = cell.solver(SolverSettings::default());
+        let velocities = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                cell.each(|_, bone, workspace| {
+                    arrival(&solver, bone, workspace).map(|arrival| arrival.velocity.to_bits())
+                })
+            })
+        };
+        let one = velocities(1);
+        assert_eq!(velocities(3), one);
+        assert_eq!(one.len(), 40);
+    }
+
+    #[test]
+    fn cells_take_their_thickness_and_dispersion() {
+        let draws = Draws { realizations: 1, seed: 1, isa: Isa::fastest() };
+        let all = cells(&[1e-3, 2e-3], &[0.1, 0.2, 0.3], &draws).unwrap();
+        let shapes: Vec<_> = all.iter().map(|cell| (cell.thickness, cell.dispersion)).collect();
+        assert_eq!(shapes[..2], [(1e-3, 0.1), (1e-3, 0.2)]);
+        assert_eq!((shapes.len(), shapes[3]), (6, (2e-3, 0.1)));
+        assert_eq!(all[5].setup(SolverSettings::default()).layers.bone_thickness, 2e-3);
+        assert!(cells(&[1e-3], &[0.8], &draws).is_err());
+    }
+}

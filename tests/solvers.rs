@@ -1,0 +1,123 @@
+//! Solvers as a user meets them: instruction sets by name, checks, studies, estimated errors.
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use osteon_solver::Isa;
+use support::{Coordinator, Scratch, job, run, run_with, text};
+
+const VARIABLE: &str = "OSTEON_INSTRUCTION_SET";
+
+fn case(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cases").join(name);
+    text(&path).to_owned()
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(8, 1));
+    let (mut simulations, mut digests) = (BTreeSet::new(), BTreeSet::new());
+    for isa in Isa::available() {
+        let with = (VARIABLE, isa.name());
+        let simulated = run_with(with, &["simulate", &case("D.toml"), "--json"]);
+        simulations.insert(simulated.succeeded().to_owned());
+        let propagated = run_with(with, &["propagate", text(&job), "--json", "--workers", "1"]);
+        digests.insert(propagated.json()["digest"].as_str().unwrap().to_owned());
+    }
+    assert_eq!((simulations.len(), digests.len()), (1, 1), "{simulations:?} {digests:?}");
+}
+
+#[test]
+fn an_unknown_instruction_set_is_refused_wherever_something_is_computed() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(8, 1));
+    let case = case("A.toml");
+    for arguments in [
+        &["simulate", &case][..],
+        &["propagate", text(&job)],
+        &["identify", text(&job)],
+        &["worker", "--coordinator", "unix:nowhere"],
+        &["study", "failures"],
+    ] {
+        let refused = run_with((VARIABLE, "sse9"), arguments);
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(refused.stderr.contains("\"sse9\" is no instruction set"), "{}", refused.stderr);
+        for isa in Isa::available() {
+            assert!(refused.stderr.contains(isa.name()), "{}", refused.stderr);
+        }
+    }
+    // Nothing is computed here.
+    assert_eq!(run_with((VARIABLE, "sse9"), &["draw", text(&job), "--index", "0"]).code, Some(0));
+}
+
+#[test]
+fn a_worker_says_what_it_computes_on() {
+    let gone = ["worker", "--coordinator", "unix:nowhere", "--give-up-after", "0.01"];
+    let finished = run_with((VARIABLE, "baseline"), &gone);
+    assert_eq!(finished.code, Some(1));
+    assert!(finished.stderr.contains("instruction_set=\"baseline\""), "{}", finished.stderr);
+}
+
+#[test]
+fn a_check_compares_both_methods_with_a_refined_solution() {
+    let json = run(&["simulate", &case("A.toml"), "--check", "--json"]).json();
+    let check = json["check"].as_array().unwrap();
+    let methods: Vec<_> = check.iter().map(|one| one["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["exact", "hybrid", "exact"]);
+    assert_eq!(check[0]["velocity"], json["velocity"]);
+    assert_eq!(check[2]["refinement"], 5.0);
+    assert_eq!(check[2]["relative_difference"], 0.0);
+    assert!(check[0]["estimated_error"].as_f64().unwrap() >= 0.0);
+    let mut velocities = BTreeSet::new();
+    for one in check {
+        let (difference, time) = (&one["relative_difference"], &one["time_difference"]);
+        assert!(difference.as_f64().unwrap() < 1e-4 && time.as_f64().unwrap() < 1e-9, "{one}");
+        velocities.insert(one["velocity"].to_string());
+    }
+    assert_eq!(velocities.len(), 3, "three solutions: {velocities:?}");
+    let shown = run(&["simulate", &case("A.toml"), "--check"]);
+    assert!(shown.succeeded().contains("the methods agree\n"), "{}", shown.stdout);
+}
+
+#[test]
+fn a_hybrid_job_runs_on_workers_and_states_its_discretisation() {
+    let scratch = Scratch::new();
+    let settings = "[solver]\nmethod = \"hybrid\"\nelement_order = 6\n";
+    let text_of_job = format!("{settings}{}", job(3, 1));
+    let file = scratch.write("job.toml", &text_of_job);
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let _worker = coordinator.worker(2);
+    let result = coordinator.client(&["propagate", text(&file), "--json"]).json();
+    let solver = &result["solver"];
+    assert_eq!((&solver["method"], &solver["element_order"]), (&"hybrid".into(), &6.into()));
+    let errors = &solver["estimated_error"];
+    let (median, largest) = (errors["median"].as_f64(), errors["largest"].as_f64());
+    assert!(0.0 <= median.unwrap() && median <= largest, "{errors}");
+    let drawn = run(&["draw", text(&file), "--index", "2"]).succeeded().to_owned();
+    assert!(drawn.contains("method = \"hybrid\""), "{drawn}");
+    // The exact method's digest is another one.
+    let exact = scratch.write("exact.toml", &job(3, 1));
+    let exact = coordinator.client(&["propagate", text(&exact), "--json"]).json();
+    assert_ne!(exact["digest"], result["digest"]);
+    assert_eq!(exact["solver"]["method"], "exact");
+    assert!(exact["solver"]["pairs"].as_u64().unwrap() > 100);
+}
+
+#[test]
+fn a_study_is_the_same_on_any_number_of_threads() {
+    let study = ["study", "failures", "--realizations", "3", "--seed", "5"];
+    let finished = run(&study);
+    let lines: Vec<&str> = finished.succeeded().lines().collect();
+    assert!(lines[0].starts_with("`osteon study failures --realizations 3 --seed 5` (osteon "));
+    assert_eq!(lines.len(), 2 + 2 + 15, "{}", finished.stdout);
+    assert_eq!(finished.stderr.lines().count(), 15, "progress: {}", finished.stderr);
+    for threads in ["1", "3"] {
+        let again = run_with(("RAYON_NUM_THREADS", threads), &study);
+        assert_eq!(again.stdout, finished.stdout);
+    }
+}
