@@ -216,8 +216,14 @@ pub(crate) enum Study {
     Accuracy(DrawsArguments),
     /// Both methods against the exact one at refinement 5
     Methods(DrawsArguments),
+    /// How the exact method's error falls with refinement
+    Refinement(DrawsArguments),
+    /// Errors of the exact method with random layers, probes and bones
+    Setups(DrawsArguments),
     /// Jumps of the velocity between bones whose elasticity differs by 1e-9
     Continuity(DrawsArguments),
+    /// Digest of a batch on every instruction set of this machine
+    Digest(DrawsArguments),
     /// How the hybrid method's error falls with element size, order and time step
     Convergence,
 }

@@ -25,7 +25,10 @@ fn help_of_every_command() {
         "study failures",
         "study accuracy",
         "study methods",
+        "study refinement",
+        "study setups",
         "study continuity",
+        "study digest",
         "study convergence",
     ] {
         text.push_str(&format!("\n==== osteon {command}\n"));

@@ -175,9 +175,25 @@ fn links_in_the_documentation_lead_somewhere() {
                 continue;
             }
             count += 1;
-            let linked = path.parent().unwrap().join(target);
+            let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+            let linked = path.parent().unwrap().join(file);
             assert!(linked.exists(), "{}: {target} does not exist", path.display());
+            if !heading.is_empty() {
+                let text = fs::read_to_string(&linked).unwrap();
+                let mut headings = text.lines().filter(|line| line.starts_with('#'));
+                let found = headings.any(|line| anchor(line.trim_start_matches('#')) == heading);
+                assert!(found, "{}: {target} is no heading", path.display());
+            }
         }
     }
     assert!(count > 5, "only {count} links were found");
+}
+
+/// The anchor of a heading: in lower case, words joined by hyphens.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().to_lowercase();
+    kept.chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+        .map(|c| if c == ' ' { '-' } else { c })
+        .collect()
 }

@@ -88,9 +88,9 @@ pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
     match settings.method {
         Method::Exact => {
             let sampling = sampling::nominal(setup);
-            put("band", json!(sampling.band));
+            put("band", json!(sampling.first_band));
             put("period", json!(sampling.period));
-            put("pairs", json!(sampling.pairs().round() as u64));
+            put("pairs", json!(sampling.pairs(sampling.first_band).round() as u64));
         }
         Method::Hybrid => {
             put("element_size", json!(settings.element_size));

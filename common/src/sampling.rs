@@ -10,8 +10,8 @@
 //! - T: from a receiver's earliest possible arrival on, one period takes in the first packet
 //!   and the large wave that the bone's face reflects: were that to wrap round, it would come down
 //!   on the first arrival, a thousand times smaller;
-//! - band: the pulse's spectrum is cut smoothly between [`Sampling::taper_start`] and
-//!   [`Sampling::band`];
+//! - band: the pulse's spectrum is cut smoothly below [`Sampling::first_band`] at a first look and,
+//!   where that is not enough, below [`Sampling::band`]: the same lines and more;
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
 //! High in the band nothing is left but the tail of the pulse's kink at t = 0. There a shorter
@@ -51,8 +51,18 @@ const TAPER_START: f64 = 0.5;
 /// α T: what wraps round is weaker by exp(-this). More amplifies rounding and truncation, which
 /// grow as e^(αt), beyond what it gains.
 const WRAP_DAMPING: f64 = 12.0;
+/// Largest α t at which an extremum is picked: whatever is left out or rounded off in a spectrum grows
+/// as e^(αt).
+const GROWTH_MAX: f64 = 13.5;
+/// Shortest period, in periods of the centre frequency.
+const SHORTEST_PERIOD: f64 = 6.0;
+/// Period, in periods of the centre frequency, of which the thinning of frequencies takes away what is
+/// not needed high in the band; a shorter one is thinned later.
+const THINNED_PERIOD: f64 = 8.0;
 /// Exponent at which the sum over wavenumbers ends, at refinement 1.
 const EVANESCENCE: f64 = 18.5;
+/// Frequencies whose weight is below this are left out.
+const TAPER_MIN: f64 = 1e-9;
 /// Share of the period left free after what it has to take in.
 const PERIOD_MARGIN: f64 = 1.03;
 /// The same for traces.
@@ -86,10 +96,10 @@ pub struct Sampling {
     pub frequency_step: f64,
     /// α, 1/s.
     pub damping: f64,
+    /// Highest frequency of a first look, Hz.
+    pub first_band: f64,
     /// Highest frequency, Hz.
     pub band: f64,
-    /// Frequency at which the taper starts, Hz.
-    pub taper_start: f64,
     /// Δk, rad/m.
     pub wavenumber_step: f64,
     /// √(k² - (ω/c1)²) at which the sum over wavenumbers ends, rad/m.
@@ -118,9 +128,11 @@ pub fn first_grade(setup: &Setup) -> Grade {
     if setup.solver.refinement > 1.0 { Grade::Thorough } else { Grade::Quick }
 }
 
-/// Number of (frequency, wavenumber) pairs of one realization, at the usual speeds of bone.
+/// Number of (frequency, wavenumber) pairs of one realization that a first look is enough for, at the
+/// usual speeds of bone.
 pub fn pair_count(setup: &Setup) -> f64 {
-    nominal(setup).pairs()
+    let sampling = nominal(setup);
+    sampling.pairs(sampling.first_band)
 }
 
 /// The lowest rung whose speed is at least `speed` (m/s); `None` above the ladder, or if `speed`
@@ -171,19 +183,25 @@ impl Sampling {
     pub fn at_rung(setup: &Setup, rung: usize, grade: Grade) -> Self {
         let speed = (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO);
         let fc = setup.probe.center_frequency;
-        // Length of the reflected wave, and of the first packet, in periods.
-        let (reflected_periods, packet_periods) = match grade {
-            Grade::Quick => (1.0, 1.4),
-            Grade::Thorough => (4.0, f64::INFINITY),
+        // In periods: length of the reflected wave; how late after the earliest possible arrival a
+        // picked extremum is provided for, and how late a repeated source may be heard.
+        let (reflected_length, latest_pick, latest_source) = match grade {
+            Grade::Quick => (1.0, 1.4, 1.4),
+            Grade::Thorough => (4.0, 2.5, f64::INFINITY),
         };
-        let (mut longest, mut last) = (0.0_f64, 0.0_f64);
+        let mut longest = SHORTEST_PERIOD / fc;
+        let mut last = 0.0_f64;
         for x in distances(setup) {
-            let reflected = reflected_arrival(setup, x) + reflected_periods / fc;
             let earliest = earliest_arrival(setup, x, speed);
-            longest = longest.max(reflected - earliest);
-            last = last.max(direct_arrival(setup, x).min(earliest + packet_periods / fc));
+            let direct = direct_arrival(setup, x);
+            let reflected = reflected_arrival(setup, x) + reflected_length / fc;
+            let pick = direct.min(earliest + latest_pick / fc);
+            longest = longest
+                .max(PERIOD_MARGIN * (reflected - earliest))
+                .max(pick * WRAP_DAMPING / GROWTH_MAX);
+            last = last.max(direct.min(earliest + latest_source / fc));
         }
-        Self::new(setup, grade, speed, PERIOD_MARGIN * longest, last)
+        Self::new(setup, grade, speed, longest, last)
     }
 
     /// The sampling for traces from 0 to `duration` (s) of bones whose waves are no faster than
@@ -193,7 +211,7 @@ impl Sampling {
         let period = TRACE_MARGIN * duration;
         let mut sampling = Self::new(setup, Grade::Thorough, speed, period, duration);
         sampling.band = TRACE_BAND * setup.solver.refinement * thinness(setup) * fc;
-        sampling.taper_start = TRACE_TAPER_START * sampling.band;
+        sampling.first_band = sampling.band;
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
         sampling.unit = f64::INFINITY;
@@ -206,9 +224,9 @@ impl Sampling {
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let fc = setup.probe.center_frequency;
-        let band = relative_band(grade, refinement, thinness(setup)) * fc;
+        let (first_band, band) = relative_bands(grade, refinement, thinness(setup));
         let (unit, evanescence) = match grade {
-            Grade::Quick => (1.0, EVANESCENCE),
+            Grade::Quick => (thinness(setup).min(1.4), EVANESCENCE),
             // Finer sampling is also less truncated, slowly.
             Grade::Thorough => (1.5, EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))),
         };
@@ -219,14 +237,14 @@ impl Sampling {
             period,
             frequency_step: 2.0 * PI / period,
             damping: WRAP_DAMPING / period,
-            band,
-            taper_start: TAPER_START * band,
+            first_band: first_band * fc,
+            band: band * fc,
             wavenumber_step: 2.0 * PI / length,
             evanescent_limit: evanescence / heights,
             upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
             lower_echoes: lower_echoes(setup, speed),
             sound_speed: coupling.sound_speed,
-            unit: unit * refinement.max(1.0) * fc,
+            unit: unit * refinement.max(1.0) * (THINNED_PERIOD / (period * fc)).max(1.0) * fc,
         }
     }
 
@@ -255,8 +273,13 @@ impl Sampling {
     }
 
     /// Smooth weight of frequency `n` that cuts the band: 1 up to `start` Hz, 0 from `end` Hz on.
-    pub fn taper(&self, n: usize, start: f64, end: f64) -> f64 {
+    pub fn taper(&self, n: usize, (start, end): (f64, f64)) -> f64 {
         smooth_step((end - n as f64 / self.period) / (end - start))
+    }
+
+    /// Whether frequency `n` counts in a signal whose band is cut by a taper.
+    pub fn is_within(&self, n: usize, taper: (f64, f64)) -> bool {
+        self.share(n) > 0.0 && self.taper(n, taper) > TAPER_MIN
     }
 
     /// Wavenumbers, rad/m, at which the sum at frequency `n` begins to fade and ends.
@@ -285,28 +308,42 @@ impl Sampling {
         propagating.mul_add(propagating, self.evanescent_limit * self.evanescent_limit).sqrt()
     }
 
-    /// Number of (frequency, wavenumber) pairs, estimated without a loop over frequencies when
-    /// there are very many.
-    pub fn pairs(&self) -> f64 {
-        let frequencies = self.band * self.period;
-        let highest = 2.0 * PI * self.band / self.sound_speed;
+    /// Number of (frequency, wavenumber) pairs up to `band` (Hz), estimated from above, without a loop
+    /// over frequencies, when there are very many.
+    pub fn pairs(&self, band: f64) -> f64 {
+        let frequencies = band * self.period;
+        let highest = 2.0 * PI * band / self.sound_speed;
         let per_frequency = (0.5 * highest + self.evanescent_limit) / self.wavenumber_step;
         if frequencies * per_frequency > 20.0 * SAMPLING_PAIRS_MAX || frequencies.is_nan() {
             return frequencies * per_frequency;
         }
         let runs = self.runs();
         let computed = runs.iter().flat_map(|run| run.frequencies());
-        computed.filter(|&n| self.is_computed(n)).map(|n| self.wavenumbers(n) as f64).sum()
+        computed
+            .filter(|&n| self.is_within(n, velocity_taper(band)))
+            .map(|n| self.wavenumbers(n) as f64)
+            .sum()
     }
 }
 
-/// Highest frequency over the centre frequency.
-fn relative_band(grade: Grade, refinement: f64, thinness: f64) -> f64 {
+/// Highest frequencies of the first look, and at all, over the centre frequency.
+fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> (f64, f64) {
+    let wide = (10.5 * thinness).min(24.0);
     match grade {
-        Grade::Quick => 5.25 * refinement * thinness,
-        // Twice the quick one at refinement 1, 23 at refinement 5.
-        Grade::Thorough => (10.5 * thinness).min(24.0) * refinement.sqrt(),
+        Grade::Quick => (5.25 * thinness * refinement, wide * refinement),
+        // 23 for a thick plate at refinement 5.
+        Grade::Thorough => (wide * refinement.sqrt(), wide * refinement.sqrt()),
     }
+}
+
+/// The taper that cuts a velocity's band, given where it ends: start and end, Hz.
+pub fn velocity_taper(band: f64) -> (f64, f64) {
+    (TAPER_START * band, band)
+}
+
+/// The taper that cuts a trace's band, given where it ends: start and end, Hz.
+pub fn trace_taper(band: f64) -> (f64, f64) {
+    (TRACE_TAPER_START * band, band)
 }
 
 /// How much wider the band has to be than that of a thick plate.
@@ -404,7 +441,7 @@ mod tests {
     fn the_taper_falls_from_one_to_nothing() {
         let sampling = Sampling::at_rung(&Setup::default(), 18, Grade::Quick);
         let weights: Vec<f64> = (0..sampling.frequencies())
-            .map(|n| sampling.taper(n, sampling.taper_start, sampling.band))
+            .map(|n| sampling.taper(n, velocity_taper(sampling.band)))
             .collect();
         assert_eq!(weights[0], 1.0);
         assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]));
@@ -418,7 +455,8 @@ mod tests {
             let sampling = Sampling::for_traces(&setup, 4000.0, 16e-6);
             let per_frequency = (PI * sampling.band / 1500.0 + sampling.evanescent_limit)
                 / sampling.wavenumber_step;
-            let ratio = sampling.band * sampling.period * per_frequency / sampling.pairs();
+            let ratio =
+                sampling.band * sampling.period * per_frequency / sampling.pairs(sampling.band);
             assert!((0.9..1.7).contains(&ratio), "{ratio}");
         }
         assert!(pair_count(&setup(|s| s.probe.receivers.pitch = 10.0)) > SAMPLING_PAIRS_MAX);

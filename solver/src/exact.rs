@@ -1,20 +1,24 @@
 //! Exact layers in (frequency, wavenumber).
 //!
-//! A bone is first computed with a quick sampling. Where that leaves a doubt (a large estimated
-//! error, a ratio near the threshold, picks off their line, no pick at all) it is computed again
-//! with a thorough one, which then decides; between doubt and none the two picks are blended, so that
-//! the velocity stays a continuous function of the bone. All of this depends on the bone alone.
+//! A bone is looked at up to three times. The first look is quick and enough for most. Where its
+//! estimated error is large, the band is widened. Where a doubt remains (a late or weak pick, picks
+//! off their line, no pick at all) the bone is computed again with a thorough sampling, which
+//! decides. Between doubt and none two looks are blended, so that the velocity stays a continuous
+//! function of the bone. All of this depends on the bone alone.
 
 pub(crate) mod direct;
 pub(crate) mod growth;
+pub(crate) mod look;
 pub(crate) mod plate;
 pub(crate) mod response;
 pub(crate) mod series;
 pub(crate) mod signal;
+pub mod stages;
 pub(crate) mod tables;
 pub(crate) mod traces;
 
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
@@ -22,44 +26,33 @@ use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{self, Grade, RUNGS, Sampling};
 
 use crate::complex::Complex;
-use crate::exact::plate::{AccuratePlate, FastPlate, Plate};
-use crate::exact::response::Spectra;
-use crate::exact::signal::{Grid, Signal, Slopes};
-use crate::exact::tables::Tables;
+use crate::exact::look::{Estimated, ExactWorkspace, Look, Rung};
+use crate::exact::plate::{AccuratePlate, Plate};
 use crate::isa::{Isa, Kernel};
-use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
-use crate::picking::{self, Pick, Window, pick};
+use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, not_finite};
 use crate::vector::{ComplexVector, Scalar, Vector};
 
 /// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
 const PAIRS_MARGIN: f64 = 8.0;
-/// The tapers that the estimate of the error compares with: start and end over the band.
-const NARROW_TAPERS: [(f64, f64); LANES] = [
-    (0.4, 0.8),
-    (0.5, 0.8),
-    (0.6, 0.8),
-    (0.4, 0.9),
-    (0.5, 0.9),
-    (0.6, 0.9),
-    (0.4, 1.0),
-    (0.7, 1.0),
-];
-/// Estimated error over the root mean square change of the velocity by the narrow tapers.
-const ESTIMATE_FACTOR: f64 = 1.5;
-/// Estimated errors, at refinement 1, between which a doubt grows from none to full.
-const DOUBT_ERROR: (f64, f64) = (1e-4, 2e-4);
+/// Pairs whose tables one solver keeps, 30 MB; those of further rungs are made when needed.
+const KEPT_PAIRS_MAX: u64 = 600_000;
+/// Estimated errors between which the doubt whether the band is wide enough grows from none to full.
+const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
+/// Estimated errors between which a doubt grows.
+const LARGE_ERROR: (f64, f64) = (1e-4, 2e-4);
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency, between
 /// which a doubt grows: a quick period has little room for a late packet.
-const DOUBT_DELAY: (f64, f64) = (0.62, 0.72);
+const LATE: (f64, f64) = (0.62, 0.72);
 /// Times from a pick to the direct wave, in periods, between which a doubt shrinks.
-const DOUBT_MARGIN: (f64, f64) = (1.1, 1.25);
-/// Ratios over the threshold between which a doubt shrinks from full to none.
-const DOUBT_RATIO: (f64, f64) = (1.2, 1.6);
-/// Residuals, in periods of the centre frequency, between which a doubt grows.
-const DOUBT_RESIDUAL: (f64, f64) = (0.02, 0.03);
-/// Picks of two samplings that differ by more than this, in periods, are different extrema.
+const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
+/// Ratios over the threshold between which a doubt shrinks.
+const WEAK: (f64, f64) = (1.2, 1.6);
+/// Distances from the line, in periods, between which a doubt grows.
+const OFF_LINE: (f64, f64) = (0.02, 0.03);
+/// Picks of two looks that differ by more than this, in periods, are different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
 /// The exact method for one setup, with the tables that all its realizations share.
@@ -71,34 +64,8 @@ pub(crate) struct Exact {
     /// One entry per rung of the speed ladder, made when a bone first needs it.
     quick: [OnceLock<Option<Box<Rung>>>; RUNGS],
     thorough: [OnceLock<Option<Box<Rung>>>; RUNGS],
-}
-
-/// Shared tables of one rung.
-#[derive(Debug)]
-struct Rung {
-    tables: Tables,
-    grid: Grid,
-    taper: Vec<Lanes>,
-    /// The tapers of the error estimate, side by side, per run and line.
-    narrow: Vec<[Lanes; LANES]>,
-}
-
-/// Scratch memory of one thread; its contents never reach a result.
-#[derive(Debug, Default)]
-pub(crate) struct ExactWorkspace {
-    plate: FastPlate,
-    /// The plate of refinements above 1.
-    accurate: AccuratePlate,
-    spectra: Spectra,
-    windows: Vec<Window>,
-    slopes: Slopes,
-    tapered: Vec<ComplexLanes>,
-}
-
-/// A pick with the estimate of its relative error.
-struct Estimated {
-    pick: Pick,
-    error: f64,
+    /// Pairs whose tables are kept.
+    kept: AtomicU64,
 }
 
 impl Exact {
@@ -109,6 +76,7 @@ impl Exact {
             isa,
             quick: [const { OnceLock::new() }; RUNGS],
             thorough: [const { OnceLock::new() }; RUNGS],
+            kept: AtomicU64::new(0),
         }
     }
 
@@ -117,105 +85,34 @@ impl Exact {
         bone: &Bone,
         workspace: &mut ExactWorkspace,
     ) -> Result<Arrival, Failure> {
+        let (medium, speed) = self.filled(bone, false, workspace)?;
+        let mut sight = Sight { exact: self, bone, medium: &medium, speed, workspace };
+        let estimated = match sampling::first_grade(&self.setup) {
+            Grade::Quick => sight.quick()?,
+            Grade::Thorough => sight.thorough()?,
+        };
+        Ok(estimated.into())
+    }
+
+    /// Fills the plate that is asked for; returns its solid and the bound of every wave's speed, m/s.
+    fn filled(
+        &self,
+        bone: &Bone,
+        accurate: bool,
+        workspace: &mut ExactWorkspace,
+    ) -> Result<(Medium, f64), Failure> {
         let thickness = self.setup.layers.bone_thickness;
-        let grade = sampling::first_grade(&self.setup);
-        let medium = match grade {
-            Grade::Quick => {
-                self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.plate })
-            }
-            Grade::Thorough => {
-                self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.accurate })
-            }
+        let medium = if accurate {
+            self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.accurate })
+        } else {
+            self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.fast })
         };
         let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
             return Err(not_finite("the bone's wave speeds"));
         }
         check_direct_wave(&self.setup, speed)?;
-        let first = self.picked(&medium, speed, grade, workspace);
-        if grade == Grade::Thorough {
-            return first.map(Estimated::arrival);
-        }
-        let doubt = first.as_ref().map_or(1.0, |first| self.doubt(first, speed));
-        match first {
-            Ok(first) if doubt == 0.0 => Ok(first.arrival()),
-            first => {
-                let second = self.picked(&medium, speed, Grade::Thorough, workspace)?;
-                match first {
-                    Ok(first) if self.same_extremum(&first.pick, &second.pick) => {
-                        self.blended(&first, &second, doubt)
-                    }
-                    _ => Ok(second.arrival()),
-                }
-            }
-        }
-    }
-
-    /// How much a quick pick is doubted, 0 to 1, continuously.
-    fn doubt(&self, first: &Estimated, speed: f64) -> f64 {
-        let fc = self.setup.probe.center_frequency;
-        let (mut delay, mut margin) = (0.0_f64, f64::INFINITY);
-        for (&x, t) in self.distances.iter().zip(&first.pick.times) {
-            delay = delay.max(t - sampling::earliest_arrival(&self.setup, x, speed));
-            margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
-        }
-        let ratio = first.pick.ratio / self.setup.picking.threshold;
-        rise(first.error, DOUBT_ERROR)
-            .max(rise(delay * fc, DOUBT_DELAY))
-            .max(rise(first.pick.residual * fc, DOUBT_RESIDUAL))
-            .max(1.0 - rise(margin * fc, DOUBT_MARGIN))
-            .max(1.0 - rise(ratio, DOUBT_RATIO))
-    }
-
-    fn same_extremum(&self, first: &Pick, second: &Pick) -> bool {
-        let most = SAME_EXTREMUM / self.setup.probe.center_frequency;
-        first.times.iter().zip(&second.times).all(|(a, b)| (a - b).abs() <= most)
-    }
-
-    fn blended(
-        &self,
-        first: &Estimated,
-        second: &Estimated,
-        doubt: f64,
-    ) -> Result<Arrival, Failure> {
-        let blend = |a: f64, b: f64| (b - a).mul_add(doubt, a);
-        let times: Vec<f64> =
-            first.pick.times.iter().zip(&second.pick.times).map(|(&a, &b)| blend(a, b)).collect();
-        let fc = self.setup.probe.center_frequency;
-        let (velocity, _) = picking::line(&self.distances, &times, fc)?;
-        Ok(Arrival { velocity, times, estimated_error: blend(first.error, second.error) })
-    }
-
-    /// The pick of a plate that fills the workspace.
-    fn picked(
-        &self,
-        medium: &Medium,
-        speed: f64,
-        grade: Grade,
-        workspace: &mut ExactWorkspace,
-    ) -> Result<Estimated, Failure> {
-        let rung = self.rung(speed, grade)?;
-        let ExactWorkspace { plate, accurate, spectra, .. } = workspace;
-        match sampling::first_grade(&self.setup) {
-            Grade::Quick => spectra.fill(self.isa, &rung.tables, medium, plate),
-            Grade::Thorough => spectra.fill(self.isa, &rung.tables, medium, accurate),
-        }
-        if !spectra.is_finite() {
-            return Err(not_finite("the pressure"));
-        }
-        self.isa.run(Observe { exact: self, rung, speed, workspace });
-        let fc = self.setup.probe.center_frequency;
-        let pick = pick(&self.setup.picking, fc, &self.distances, &workspace.windows)?;
-        let moved = self.isa.run(Repick { rung, times: &pick.times, workspace });
-        let mut square = 0.0;
-        for taper in 0..LANES {
-            let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
-            let change = picking::slope(&self.distances, &times) / pick.velocity - 1.0;
-            square = change.mul_add(change, square);
-        }
-        let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
-        // A signal that changes past recognition makes the largest error, not a failure.
-        Ok(Estimated { pick, error: if error <= 1.0 { error } else { 1.0 } })
+        Ok((medium, speed))
     }
 
     fn rung(&self, speed: f64, grade: Grade) -> Result<&Rung, Failure> {
@@ -233,17 +130,77 @@ impl Exact {
         };
         let rung = rungs[index].get_or_init(|| {
             let sampling = Sampling::at_rung(&self.setup, index, grade);
-            if sampling.pairs() > PAIRS_MARGIN * SAMPLING_PAIRS_MAX {
+            let pairs = sampling.pairs(sampling.band);
+            if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
                 return None;
             }
-            // A velocity does not depend on the pulse's amplitude, not even in its last bit.
-            let tables = Tables::new(&self.setup, sampling, 1.0);
-            let grid = Grid::new(&self.setup, &tables);
-            let taper = tables.taper(sampling.taper_start, sampling.band);
-            let narrow = narrow_tapers(&tables);
-            Some(Box::new(Rung { tables, grid, taper, narrow }))
+            let keep = self.kept.fetch_add(pairs as u64, Ordering::Relaxed) + pairs as u64
+                <= KEPT_PAIRS_MAX;
+            if !keep {
+                self.kept.fetch_sub(pairs as u64, Ordering::Relaxed);
+            }
+            Some(Box::new(Rung::new(&self.setup, sampling, keep)))
         });
         rung.as_deref().ok_or_else(too_large)
+    }
+
+    /// How much a pick is doubted, 0 to 1, continuously.
+    fn doubt(&self, found: &Estimated, speed: f64) -> f64 {
+        let fc = self.setup.probe.center_frequency;
+        let (mut delay, mut margin) = (0.0_f64, f64::INFINITY);
+        for (&x, t) in self.distances.iter().zip(&found.pick.times) {
+            delay = delay.max(t - sampling::earliest_arrival(&self.setup, x, speed));
+            margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
+        }
+        let ratio = found.pick.ratio / self.setup.picking.threshold;
+        rise(found.error, LARGE_ERROR)
+            .max(rise(delay * fc, LATE))
+            .max(rise(found.pick.residual * fc, OFF_LINE))
+            .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))
+            .max(1.0 - rise(ratio, WEAK))
+    }
+
+    /// What two looks at one bone say together, the second with the weight of the doubt in the
+    /// first.
+    fn merged(
+        &self,
+        first: Result<Estimated, Failure>,
+        second: Result<Estimated, Failure>,
+        doubt: f64,
+    ) -> Result<Estimated, Failure> {
+        match (first, second) {
+            (Ok(first), Ok(second)) if doubt < 1.0 && self.same_extremum(&first, &second) => {
+                self.blended(&first, &second, doubt)
+            }
+            (_, second) => second,
+        }
+    }
+
+    fn same_extremum(&self, first: &Estimated, second: &Estimated) -> bool {
+        let most = SAME_EXTREMUM / self.setup.probe.center_frequency;
+        first.pick.times.iter().zip(&second.pick.times).all(|(a, b)| (a - b).abs() <= most)
+    }
+
+    fn blended(
+        &self,
+        first: &Estimated,
+        second: &Estimated,
+        weight: f64,
+    ) -> Result<Estimated, Failure> {
+        let blend = |a: f64, b: f64| (b - a).mul_add(weight, a);
+        let pairs = first.pick.times.iter().zip(&second.pick.times);
+        let times: Vec<f64> = pairs.map(|(&a, &b)| blend(a, b)).collect();
+        let fc = self.setup.probe.center_frequency;
+        let (velocity, residual) = picking::line(&self.distances, &times, fc)?;
+        let ratio = blend(first.pick.ratio, second.pick.ratio);
+        let error = blend(first.error, second.error);
+        Ok(Estimated { pick: Pick { velocity, times, ratio, residual }, error })
+    }
+}
+
+impl From<Estimated> for Arrival {
+    fn from(Estimated { pick, error }: Estimated) -> Self {
+        Self { velocity: pick.velocity, times: pick.times, estimated_error: error }
     }
 }
 
@@ -252,28 +209,59 @@ fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-impl Estimated {
-    fn arrival(self) -> Arrival {
-        let Self { pick, error } = self;
-        Arrival { velocity: pick.velocity, times: pick.times, estimated_error: error }
-    }
+/// One bone, its fast plate filled, about to be looked at.
+struct Sight<'a> {
+    exact: &'a Exact,
+    bone: &'a Bone,
+    medium: &'a Medium,
+    /// Bound of every wave's speed, m/s.
+    speed: f64,
+    workspace: &'a mut ExactWorkspace,
 }
 
-impl Rung {
-    /// The signal at receiver `r` with its band cut by `taper`, in the memory of `tapered`.
-    #[inline(always)]
-    fn signal<'a>(
-        &'a self,
-        spectra: &Spectra,
-        r: usize,
-        taper: &[Lanes],
-        tapered: &'a mut Vec<ComplexLanes>,
-    ) -> Signal<'a> {
-        tapered.clear();
-        for (run, &weights) in spectra.receiver(r).iter().zip(taper) {
-            tapered.push(ComplexLanes { re: run.re * weights, im: run.im * weights });
+impl Sight<'_> {
+    /// As many looks as the bone needs.
+    fn quick(&mut self) -> Result<Estimated, Failure> {
+        let exact = self.exact;
+        let rung = exact.rung(self.speed, Grade::Quick)?;
+        self.workspace.spectra.clear(&rung.tables);
+        self.fill(rung, 0, rung.first.lines);
+        let mut found = self.look(rung, &rung.first);
+        let doubt = found.as_ref().map_or(1.0, |found| rise(found.error, NARROW_BAND));
+        if doubt > 0.0 {
+            self.fill(rung, rung.first.lines, rung.whole.lines);
+            let wider = self.look(rung, &rung.whole);
+            found = exact.merged(found, wider, doubt);
         }
-        Signal { sampling: &self.tables.sampling, runs: &self.tables.runs, spectrum: tapered }
+        let doubt = found.as_ref().map_or(1.0, |found| exact.doubt(found, self.speed));
+        if doubt > 0.0 {
+            let thorough = self.thorough();
+            found = exact.merged(found, thorough, doubt);
+        }
+        found
+    }
+
+    /// One look, and a good one.
+    fn thorough(&mut self) -> Result<Estimated, Failure> {
+        let rung = self.exact.rung(self.speed, Grade::Thorough)?;
+        let isa = self.exact.isa;
+        let thickness = self.exact.setup.layers.bone_thickness;
+        let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
+        isa.run(FillPlate { bone: self.bone, thickness, plate: accurate });
+        spectra.clear(&rung.tables);
+        spectra.fill(isa, &rung.tables, self.medium, accurate, 0..rung.whole.lines);
+        self.look(rung, &rung.whole)
+    }
+
+    /// Computes lines `from` … `to` - 1 of a quick sampling's spectra.
+    fn fill(&mut self, rung: &Rung, from: usize, to: usize) {
+        let ExactWorkspace { fast, spectra, .. } = &mut *self.workspace;
+        spectra.fill(self.exact.isa, &rung.tables, self.medium, fast, from..to);
+    }
+
+    fn look(&mut self, rung: &Rung, look: &Look) -> Result<Estimated, Failure> {
+        let Exact { setup, distances, isa, .. } = self.exact;
+        look::look(setup, distances, *isa, self.speed, rung, look, self.workspace)
     }
 }
 
@@ -293,70 +281,6 @@ impl<const TERMS: usize> Kernel for FillPlate<'_, TERMS> {
         self.plate.fill::<V>(&medium, self.thickness);
         medium
     }
-}
-
-/// Lists the extrema of the pressure at every receiver.
-struct Observe<'a> {
-    exact: &'a Exact,
-    rung: &'a Rung,
-    /// Bound of every wave's speed, m/s.
-    speed: f64,
-    workspace: &'a mut ExactWorkspace,
-}
-
-impl Kernel for Observe<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Vector>(self) {
-        let ExactWorkspace { spectra, windows, slopes, tapered, .. } = self.workspace;
-        let setup = &self.exact.setup;
-        windows.resize_with(self.exact.distances.len(), Window::default);
-        for (r, (window, &x)) in windows.iter_mut().zip(&self.exact.distances).enumerate() {
-            let signal = self.rung.signal(spectra, r, &self.rung.taper, tapered);
-            let from = sampling::earliest_arrival(setup, x, self.speed);
-            let to = sampling::direct_arrival(setup, x);
-            let last = signal.extrema::<V>(&self.rung.grid, from, to, slopes, &mut window.extrema);
-            window.last = last.abs();
-            window.drop_noise();
-        }
-    }
-}
-
-/// The same extrema, s, of the spectra in the workspace cut by each of the narrow tapers.
-struct Repick<'a> {
-    rung: &'a Rung,
-    times: &'a [f64],
-    workspace: &'a ExactWorkspace,
-}
-
-impl Kernel for Repick<'_> {
-    type Output = Vec<Lanes>;
-
-    #[inline(always)]
-    fn run<V: Vector>(self) -> Vec<Lanes> {
-        let Tables { sampling, runs, .. } = &self.rung.tables;
-        let mut moved = Vec::with_capacity(self.times.len());
-        for (r, &time) in self.times.iter().enumerate() {
-            let signal = Signal { sampling, runs, spectrum: self.workspace.spectra.receiver(r) };
-            moved.push(signal.moved_extrema::<V>(time, &self.rung.narrow));
-        }
-        moved
-    }
-}
-
-/// The tapers of the error estimate, side by side, per run and line.
-fn narrow_tapers(tables: &Tables) -> Vec<[Lanes; LANES]> {
-    let band = tables.sampling.band;
-    let mut tapers = vec![[Lanes::ZERO; LANES]; tables.runs.len()];
-    for (lane, (start, end)) in NARROW_TAPERS.into_iter().enumerate() {
-        for (taper, weights) in tapers.iter_mut().zip(tables.taper(start * band, end * band)) {
-            for (line, weight) in taper.iter_mut().zip(weights.0) {
-                line.0[lane] = weight;
-            }
-        }
-    }
-    tapers
 }
 
 /// Admittance Y(k, s) = û3(0)/p̂(0), m/Pa, of the bone on its marrow.

@@ -27,6 +27,7 @@ mod vector;
 
 pub use complex::Complex;
 pub use exact::admittance;
+pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::Isa;

@@ -7,7 +7,7 @@ use osteon_common::settings::{self, Picking};
 use crate::Failure;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
-const FLOOR: f64 = 1e-3;
+pub(crate) const FLOOR: f64 = 1e-3;
 /// A packet's peak is looked for up to this many periods of the centre frequency after an extremum.
 const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.

@@ -5,7 +5,8 @@ use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::sampling;
 use osteon_common::settings::Method;
 
-use crate::exact::{Exact, ExactWorkspace};
+use crate::exact::Exact;
+use crate::exact::look::ExactWorkspace;
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 

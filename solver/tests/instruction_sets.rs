@@ -1,30 +1,64 @@
 //! A velocity has the same bits on every instruction set.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 use osteon_solver::{Isa, Solver, Workspace};
 
-#[test]
-fn every_instruction_set_gives_the_same_bits() {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
+/// The first `count` draws at a dispersion, on every instruction set: all numbers of an arrival.
+fn check(change: impl Fn(&mut Setup), dispersion: f64, count: u64) {
+    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
     let ensemble = Ensemble::new(&point, 2).unwrap();
-    let setup = Setup::default();
-    let outcomes = |isa: Isa| -> Vec<_> {
+    let mut setup = Setup::default();
+    change(&mut setup);
+    let arrivals = |isa: Isa| -> Vec<_> {
         let solver = Solver::with_isa(&setup, isa);
         let mut workspace = Workspace::default();
-        (0..12)
-            .map(|i| {
-                let outcome = solver.outcome(&ensemble.bone(i).unwrap(), &mut workspace);
-                outcome.map(f64::to_bits)
-            })
+        (0..count)
+            .map(|index| solver.arrival(&ensemble.bone(index).unwrap(), &mut workspace))
             .collect()
     };
     let sets = Isa::available();
-    let expected = outcomes(sets[0]);
+    let expected = arrivals(sets[0]);
     assert!(expected.iter().any(Result::is_ok));
     for isa in &sets[1..] {
-        assert_eq!(outcomes(*isa), expected, "{} against {}", isa.name(), sets[0].name());
+        assert_eq!(arrivals(*isa), expected, "{} against {}", isa.name(), sets[0].name());
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    check(|_| (), 0.25, 12);
+}
+
+#[test]
+fn and_so_it_does_where_bones_are_computed_again() {
+    check(|setup| setup.layers.bone_thickness = 1e-3, 0.6, 6);
+}
+
+#[test]
+fn and_when_refined_with_echoes() {
+    let change = |setup: &mut Setup| {
+        setup.solver.refinement = 2.0;
+        setup.layers.coupling.thickness = 4e-3;
+        setup.layers.marrow.thickness = 3e-3;
+    };
+    check(change, 0.1, 3);
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_traces() {
+    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
+    let bone = Ensemble::new(&point, 4).unwrap().bone(0).unwrap();
+    let sets = Isa::available();
+    // The set without fused multiply-adds takes minutes for a trace.
+    let traces =
+        |isa: Isa| Solver::with_isa(&Setup::default(), isa).traces(&bone, 8e-6, 50e-9).unwrap();
+    let fastest = traces(Isa::fastest());
+    for isa in sets.into_iter().skip(1) {
+        assert_eq!(traces(isa), fastest, "{}", isa.name());
     }
 }
 

@@ -5,6 +5,7 @@
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
+use osteon_common::layers::Fluid;
 use osteon_common::parameters::Point;
 use osteon_common::probe::Source;
 use osteon_common::realization::Ensemble;
@@ -26,6 +27,19 @@ fn isotropic(density: f64, longitudinal_speed: f64, shear_speed: f64) -> Bone {
         rows[i + 3][i + 3] = 2.0 * shear;
     }
     Bone { density, elasticity: Elasticity::new(rows).unwrap() }
+}
+
+/// The bone's part that is symmetric in depth: the mean of it and its mirror image.
+fn symmetric_in_depth(bone: &Bone) -> Bone {
+    let mut rows = *bone.elasticity.rows();
+    // Odd numbers of indices 3 are in 23 and 31.
+    for i in [0, 1, 2, 5] {
+        for j in [3, 4] {
+            rows[i][j] = 0.0;
+            rows[j][i] = 0.0;
+        }
+    }
+    Bone { elasticity: Elasticity::new(rows).unwrap(), ..*bone }
 }
 
 fn arrival(setup: &Setup, bone: &Bone) -> Arrival {
@@ -136,15 +150,119 @@ fn random_plates_are_passive_and_reciprocal() {
 }
 
 #[test]
+fn thickness_of_marrow_may_be_called_plate() {
+    // Two layers of one fluid are one; the plate is the fluid with next to no shear stiffness.
+    let bone = isotropic(1300.0, 1700.0, 0.15);
+    let setup = |plate: f64, marrow: f64| {
+        let mut setup = Setup::default();
+        setup.layers.bone_thickness = plate;
+        setup.layers.marrow = Fluid { thickness: marrow, density: 1300.0, sound_speed: 1700.0 };
+        setup
+    };
+    for k in [0.0, 900.0, 4000.0] {
+        for omega in [1e6, 7e6] {
+            let s = Complex::new(1e6, omega);
+            let expected = admittance(&setup(2e-3, 3e-3), &bone, k, s);
+            for moved in [-1.2e-3, 0.7e-3, 2.9e-3] {
+                let found = admittance(&setup(2e-3 + moved, 3e-3 - moved), &bone, k, s);
+                let error = (found - expected).abs() / expected.abs();
+                // The shear boundary layer has a relative thickness of c_T/c = 1e-4.
+                assert!(error < 1e-3, "k {k}, omega {omega}, {moved} m: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_half_layers_are_one() {
+    // What a solid that is symmetric about the plane x3 = const does under equal pressures on both
+    // faces is what its upper half does on a smooth rigid base: u3 and the tractions σ13, σ23 vanish
+    // in the middle. With a the admittance of a free plate and b that from face to face, it is
+    // a + b; on the base itself, a - b²/a.
+    let admittance = |bone: &Bone, thickness: f64, marrow_density: f64, k: f64, s: Complex| {
+        let mut setup = Setup::default();
+        setup.layers.bone_thickness = thickness;
+        setup.layers.marrow.density = marrow_density;
+        admittance(&setup, bone, k, s)
+    };
+    let (free, rigid) = (1e-12, 1e24);
+    for index in 0..20 {
+        let bone = symmetric_in_depth(&draws(0.5, 14).bone(index).unwrap());
+        for (k, omega) in [(200.0, 3e5), (1500.0, 5e6), (-3000.0, 9e6)] {
+            let s = Complex::new(1.2e6, omega);
+            let h = 1.3e-3;
+            let a = admittance(&bone, 2.0 * h, free, k, s);
+            let half = admittance(&bone, h, rigid, k, s);
+            let whole = admittance(&bone, 2.0 * h, rigid, k, s);
+            let error = ((half - a) * (half - a) - a * (a - whole)).abs() / (a * a).abs();
+            assert!(error < 1e-10, "index {index}, k {k}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn a_closed_system_without_damping_takes_no_power() {
+    let setup = Setup::default();
+    for index in 0..20 {
+        let bone = draws(0.5, 15).bone(index).unwrap();
+        for (k, omega) in [(100.0, 1e6), (2500.0, 5e6), (9000.0, 1.1e7)] {
+            // So little damping that what it takes can only be seen close to a resonance.
+            let s = Complex::new(1e-9 * omega, omega);
+            let y = admittance(&setup, &bone, k, s);
+            assert!(y.im.abs() < 1e-5 * y.abs(), "index {index}, k {k}, omega {omega}: {y:?}");
+        }
+    }
+}
+
+#[test]
+fn power_into_the_plate_is_radiated_into_the_marrow() {
+    for index in 0..20 {
+        let bone = draws(0.5, 16).bone(index).unwrap();
+        for (k, omega) in [(100.0, 2e6), (1500.0, 5e6), (4000.0, 1.1e7)] {
+            let s = Complex::new(1e-9 * omega, omega);
+            // No echo comes back from a face that far away.
+            let on = |density: f64| {
+                let mut setup = Setup::default();
+                setup.layers.marrow.thickness = 1e15;
+                setup.layers.marrow.density = density;
+                admittance(&setup, &bone, k, s)
+            };
+            // The marrow's load Z = ρ s²/g is imaginary and proportional to its density, and
+            // |∂Y/∂Z| is |u3(-h)/p(0)|² by reciprocity: so this is |Im Z| |u3(-h)|².
+            let step = 1e-4;
+            let change = on(1000.0 * (1.0 + step)) - on(1000.0 * (1.0 - step));
+            let radiated = change.abs() / (2.0 * step);
+            let taken = on(1000.0).im.abs();
+            let error = (taken - radiated).abs() / radiated;
+            // The central difference is right to the square of its step over the resonance's width.
+            assert!(error < 1e-5, "index {index}, k {k}, omega {omega}: {error:e}");
+        }
+    }
+}
+
+#[test]
 fn source_and_receivers_may_be_exchanged() {
-    let bone = draws(0.1029, 3).bone(5).unwrap();
-    let mut setup = Setup::default();
-    setup.probe.source.x3 = 1e-3;
-    setup.probe.receivers.x3 = 3e-3;
-    let there = arrival(&setup, &bone);
-    setup.probe.source.x3 = 3e-3;
-    setup.probe.receivers.x3 = 1e-3;
-    assert_eq!(there, arrival(&setup, &bone));
+    for index in 0..5 {
+        let bone = draws(0.3, 3).bone(index).unwrap();
+        let mut setup = Setup::default();
+        // Near enough for the echoes of both outer faces.
+        setup.layers.coupling.thickness = 4e-3;
+        setup.layers.marrow.thickness = 3e-3;
+        setup.probe.source.x3 = 1e-3;
+        setup.probe.receivers.x3 = 3e-3;
+        let traces = |setup: &Setup| Solver::new(setup).traces(&bone, 12e-6, 50e-9).unwrap();
+        let (there, there_traces) = (arrival(&setup, &bone), traces(&setup));
+        setup.probe.source.x3 = 3e-3;
+        setup.probe.receivers.x3 = 1e-3;
+        let (back, back_traces) = (arrival(&setup, &bone), traces(&setup));
+        // Rounding of the echoes, amplified by the picking.
+        assert!(later(&there, &back) < 1e-16, "index {index}: {there:?} {back:?}");
+        for (there, back) in there_traces.pressures.iter().zip(&back_traces.pressures) {
+            let largest = there.iter().fold(0.0, |max: f64, p| max.max(p.abs()));
+            let difference = there.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(difference < 1e-12 * largest, "index {index}: {difference} of {largest}");
+        }
+    }
 }
 
 #[test]

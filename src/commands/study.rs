@@ -3,7 +3,10 @@
 use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
-use osteon_study::{Draws, Progress, Table, accuracy, continuity, convergence, failures, methods};
+use osteon_study::{
+    Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods,
+    refinement, setups,
+};
 
 use crate::arguments::{DrawsArguments, Study};
 use crate::ending::{Ending, Failure, stdout_failure};
@@ -24,6 +27,15 @@ const ACCURACY: OverDraws =
     OverDraws { name: "accuracy", realizations: accuracy::REALIZATIONS, table: accuracy::table };
 const METHODS: OverDraws =
     OverDraws { name: "methods", realizations: methods::REALIZATIONS, table: methods::table };
+const REFINEMENT: OverDraws = OverDraws {
+    name: "refinement",
+    realizations: refinement::REALIZATIONS,
+    table: refinement::table,
+};
+const SETUPS: OverDraws =
+    OverDraws { name: "setups", realizations: setups::REALIZATIONS, table: setups::table };
+const DIGEST: OverDraws =
+    OverDraws { name: "digest", realizations: digest::REALIZATIONS, table: digest::table };
 const CONTINUITY: OverDraws = OverDraws {
     name: "continuity",
     realizations: continuity::REALIZATIONS,
@@ -36,6 +48,9 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
         Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
         Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
+        Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
+        Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
+        Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     });

@@ -5,16 +5,10 @@ use osteon_common::limits::REFINEMENT_MAX;
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 
-use crate::difference::{Difference, difference};
+use crate::difference::{Difference, difference, error_max};
 
 /// Refinement of the reference over the case's.
 const REFERENCE: f64 = 5.0;
-/// Largest relative error of the exact method's velocity.
-const ERROR_MAX: f64 = 1e-4;
-/// The same in a thin plate: its first extremum lies closer to the wave of the pulse's kink.
-const ERROR_MAX_THIN: f64 = 3e-4;
-/// Plates below this are thin, m.
-const THIN: f64 = 2e-3;
 
 /// One solution of the case.
 #[derive(Debug, Clone)]
@@ -63,7 +57,7 @@ impl Check {
 
     /// Largest accepted relative difference between exact and refined velocity.
     pub fn error_max(&self) -> f64 {
-        if self.exact.setup.layers.bone_thickness < THIN { ERROR_MAX_THIN } else { ERROR_MAX }
+        error_max(&self.exact.setup)
     }
 
     /// Whether all picked the same extremum, and the exact velocity is within its bound.

@@ -9,6 +9,7 @@ use osteon_solver::Failure;
 use crate::Progress;
 use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Draws, arrival, cells};
+use crate::generator::Generator;
 use crate::table::{Table, millimetres, two_digits};
 
 /// Thicknesses of the plates, m.
@@ -68,9 +69,9 @@ fn summary(differences: &[Difference]) -> Vec<String> {
 /// `index`.
 fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
     let mut rows = *bone.elasticity.rows();
-    let mut state = index;
+    let mut generator = Generator::new(index);
     for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
-        rows[i][j] *= 1.0 + CHANGE * symmetric(&mut state);
+        rows[i][j] *= 1.0 + CHANGE * generator.between(-1.0, 1.0);
         rows[j][i] = rows[i][j];
     }
     let elasticity = Elasticity::new(rows).map_err(|error| Failure {
@@ -78,16 +79,6 @@ fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
         detail: error.to_string(),
     })?;
     Ok(Bone { density: bone.density, elasticity })
-}
-
-/// The next number of a splitmix64 generator, from -1 to 1.
-fn symmetric(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
-    ((z >> 11) as f64 / (1_u64 << 52) as f64) - 1.0
 }
 
 #[cfg(test)]

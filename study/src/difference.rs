@@ -9,6 +9,13 @@ use osteon_solver::{Arrival, Failure};
 /// thousandth.
 const SAME_EXTREMUM: f64 = 0.1;
 
+/// Largest relative error of the exact method's velocity.
+const ERROR_MAX: f64 = 1e-4;
+/// The same in a thin plate: its first extremum lies closer to the wave of the pulse's kink.
+const ERROR_MAX_THIN: f64 = 3e-4;
+/// Plates of less than this thickness times centre frequency are thin, m Hz.
+const THIN: f64 = 2000.0;
+
 /// How a solution differs from a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Difference {
@@ -54,6 +61,12 @@ pub fn difference(
         (Err(found), Err(reference)) if found.kind == reference.kind => Difference::BothFailed,
         _ => Difference::Picks,
     }
+}
+
+/// Largest accepted relative error of a velocity at refinement 1.
+pub(crate) fn error_max(setup: &Setup) -> f64 {
+    let product = setup.layers.bone_thickness * setup.probe.center_frequency;
+    if product < THIN { ERROR_MAX_THIN } else { ERROR_MAX }
 }
 
 fn of_arrivals(setup: &Setup, found: &Arrival, reference: &Arrival) -> Difference {

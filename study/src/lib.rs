@@ -9,9 +9,13 @@ pub mod check;
 pub mod continuity;
 pub mod convergence;
 mod difference;
+pub mod digest;
 mod draws;
 pub mod failures;
+mod generator;
 pub mod methods;
+pub mod refinement;
+pub mod setups;
 mod table;
 
 pub use difference::{Difference, difference};

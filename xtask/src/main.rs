@@ -1,32 +1,57 @@
 //! Every developer command in one place: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
+mod digests;
+mod tables;
+
 use std::env;
-use std::process::{Command, ExitCode};
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 
-/// Name, what it does, and the cargo invocations behind it.
-type Task = (&'static str, &'static str, &'static [&'static [&'static str]]);
+/// A cargo invocation.
+type Cargo = &'static [&'static str];
 
-const FORMAT: &[&str] = &["fmt", "--all", "--check"];
-const LINT: &[&str] = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
-const TEST: &[&str] = &["test", "--workspace"];
+/// What a command does.
+enum Action {
+    /// Runs cargo.
+    Cargo(&'static [Cargo]),
+    /// Runs a function, which may take more words.
+    Function(fn(&[String]) -> Result<()>),
+}
 
-const TABLES: &[&[&str]] = &[
-    &["run", "--release", "--", "study", "failures"],
-    &["run", "--release", "--", "study", "accuracy"],
-    &["run", "--release", "--", "study", "methods"],
-    &["run", "--release", "--", "study", "continuity"],
-    &["run", "--release", "--", "study", "convergence"],
+const FORMAT: Cargo = &["fmt", "--all", "--check"];
+const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+const TEST: Cargo = &["test", "--workspace"];
+
+const BENCH: &[Cargo] = &[
+    &["bench", "--package", "osteon-solver", "--bench", "table"],
+    &["bench", "--package", "osteon", "--bench", "end_to_end"],
 ];
 
-const TASKS: &[Task] = &[
-    ("format", "format the code", &[&["fmt", "--all"]]),
-    ("lint", "formatting and lints, as CI wants them", &[FORMAT, LINT]),
-    ("test", "every test", &[TEST]),
-    ("ci", "what CI runs: formatting, lints, every test", &[FORMAT, LINT, TEST]),
-    ("tables", "the tables of docs/validation.md, on stdout", TABLES),
-    ("docs", "the documentation of all crates", &[&["doc", "--workspace", "--no-deps"]]),
+/// Name, what it does, and how.
+const TASKS: &[(&str, &str, Action)] = &[
+    ("format", "format the code", Action::Cargo(&[&["fmt", "--all"]])),
+    ("lint", "formatting and lints, as CI wants them", Action::Cargo(&[FORMAT, LINT])),
+    ("test", "every test", Action::Cargo(&[TEST])),
+    ("ci", "what CI runs: formatting, lints, every test", Action::Cargo(&[FORMAT, LINT, TEST])),
+    (
+        "tables",
+        "makes the tables of docs/validation.md again: all, or those of the studies named",
+        Action::Function(tables::rewrite),
+    ),
+    (
+        "digests",
+        "compares the digest of a batch over instruction sets and builds; checks AArch64",
+        Action::Function(digests::compare),
+    ),
+    ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
+    (
+        "docs",
+        "the documentation of all crates",
+        Action::Cargo(&[&["doc", "--workspace", "--no-deps"]]),
+    ),
 ];
 
 fn main() -> ExitCode {
@@ -41,26 +66,65 @@ fn main() -> ExitCode {
 
 fn run() -> Result<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let task = match arguments.as_slice() {
-        [name] => TASKS.iter().find(|task| task.0 == name),
-        _ => None,
-    };
-    let Some((_, _, commands)) = task else {
-        bail!("usage: cargo xtask COMMAND, one of:\n{}", list());
-    };
-    for arguments in *commands {
-        eprintln!("+ cargo {}", arguments.join(" "));
-        let status = Command::new(env!("CARGO"))
-            .args(*arguments)
-            .status()
-            .with_context(|| format!("cannot run cargo {}", arguments.join(" ")))?;
-        if !status.success() {
-            bail!("cargo {} failed", arguments.join(" "));
+    let named = arguments.split_first().and_then(|(name, words)| {
+        let (_, _, action) = TASKS.iter().find(|(task, _, _)| task == name)?;
+        Some((action, words))
+    });
+    match named {
+        Some((Action::Cargo(commands), [])) => {
+            commands.iter().try_for_each(|arguments| cargo(&mut cargo_command(arguments)))
         }
+        Some((Action::Function(function), words)) => function(words),
+        _ => bail!("usage: cargo xtask COMMAND, one of:\n{}", list()),
     }
-    Ok(())
 }
 
 fn list() -> String {
     TASKS.iter().map(|(name, what, _)| format!("  {name:8} {what}\n")).collect()
+}
+
+/// Cargo with these arguments, at the root of the workspace.
+fn cargo_command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO"));
+    command.args(arguments).current_dir(root());
+    command
+}
+
+/// Runs it, and fails if it does.
+fn cargo(command: &mut Command) -> Result<()> {
+    announce(command);
+    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
+    if !status.success() {
+        bail!("{command:?} failed");
+    }
+    Ok(())
+}
+
+/// What it prints.
+fn output(command: &mut Command) -> Result<String> {
+    announce(command);
+    let output = command
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| format!("cannot run {command:?}"))?;
+    if !output.status.success() {
+        bail!("{command:?} failed");
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("{command:?} prints no text"))
+}
+
+fn announce(command: &Command) {
+    let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
+    eprintln!("+ {} {}", command.get_program().to_string_lossy(), words.join(" "));
+}
+
+/// A line on stdout.
+fn say(text: &str) -> Result<()> {
+    writeln!(io::stdout(), "{text}").context("cannot write to stdout")
+}
+
+/// The root of the workspace.
+fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
 }

@@ -10,7 +10,7 @@
 use crate::sampling::Sampling;
 
 /// Frequencies, over the centre frequency, between which the step doubles.
-const DOUBLINGS: [(f64, f64); 4] = [(2.0, 2.75), (3.25, 4.0), (6.0, 7.0), (10.0, 12.0)];
+const DOUBLINGS: [(f64, f64); 4] = [(2.0, 2.75), (3.25, 4.0), (7.0, 8.5), (12.0, 14.0)];
 
 /// Frequencies of a run.
 pub const RUN: usize = 8;
@@ -32,8 +32,8 @@ impl Run {
 }
 
 impl Sampling {
-    /// The frequencies that are computed, in runs; [`Sampling::is_computed`] says which frequencies
-    /// of a run are not needed.
+    /// The frequencies of the whole band, in runs; [`Sampling::is_within`] says which frequencies of a
+    /// run are not needed.
     pub fn runs(&self) -> Vec<Run> {
         let (mut first, mut stride) = (0, 1);
         let mut doublings = DOUBLINGS.into_iter().peekable();
@@ -50,11 +50,6 @@ impl Sampling {
             first += RUN * stride;
         }
         runs
-    }
-
-    /// Whether frequency `n` counts: below the band's end, and not thinned out.
-    pub fn is_computed(&self, n: usize) -> bool {
-        n < self.frequencies() && self.share(n) > 0.0
     }
 
     /// Weight of frequency `n` in the sum: 1 where none is left out.

@@ -46,7 +46,7 @@ pub(crate) type AccuratePlate = Plate<11>;
 
 impl Default for FastPlate {
     fn default() -> Self {
-        Self::new(3.0)
+        Self::new(2.65)
     }
 }
 
@@ -155,30 +155,32 @@ fn sublayer<const TERMS: usize, V: Vector>(polynomials: &Polynomials, k: V) -> L
     let mut minus = [ComplexVector::zero(); 6];
     for i in 0..6 {
         let entry = polynomials.entry::<TERMS, V>(9 + i, k);
-        plus[i] = entry.even.add(entry.odd);
-        minus[i] = entry.even.sub(entry.odd);
+        plus[i] = entry.at(k);
+        minus[i] = entry.at_opposite(k);
     }
     let up = inverse(&plus);
     let down = inverse(&minus);
-    let mut x = [ComplexVector::zero(); 9];
-    for i in 0..9 {
-        let entry = polynomials.entry::<TERMS, V>(i, k);
-        x[i] = entry.even.add(entry.odd);
-    }
-    let (first, second, third) = ([x[0], x[3], x[6]], [x[1], x[4], x[7]], [x[2], x[5], x[8]]);
     let rows = [[up[0], up[1], up[2]], [up[1], up[3], up[4]], [up[2], up[4], up[5]]];
-    let top = [
-        dot(rows[0], first),
-        dot(rows[1], first),
-        dot(rows[2], first),
-        dot(rows[0], second),
-        dot(rows[1], second),
-        dot(rows[2], second),
-        dot(rows[0], third),
-        dot(rows[1], third),
-        dot(rows[2], third),
-    ];
+    let [a, b, c] = products::<TERMS, V>(polynomials, k, 0, &rows);
+    let [d, e, f] = products::<TERMS, V>(polynomials, k, 1, &rows);
+    let [g, h, i] = products::<TERMS, V>(polynomials, k, 2, &rows);
+    let top = [a, b, c, d, e, f, g, h, i];
     Layer { top, down, up }
+}
+
+/// Products of three rows with one column of the block (u, u) of the transfer matrix.
+#[inline(always)]
+fn products<const TERMS: usize, V: Vector>(
+    polynomials: &Polynomials,
+    k: V,
+    column: usize,
+    rows: &[[ComplexVector<V>; 3]; 3],
+) -> [ComplexVector<V>; 3] {
+    let mut x = [ComplexVector::zero(); 3];
+    for row in 0..3 {
+        x[row] = polynomials.entry::<TERMS, V>(3 * row + column, k).at(k);
+    }
+    [dot(rows[0], x), dot(rows[1], x), dot(rows[2], x)]
 }
 
 impl<V: Vector> Layer<V> {
@@ -187,8 +189,9 @@ impl<V: Vector> Layer<V> {
     fn doubled(&self) -> Self {
         let factor = Factor::new(&self.joint());
         let down = factor.forward(&self.down);
-        let up = factor.forward(&self.up);
         let scaled = factor.scaled(&down);
+        let new_down = gram(&scaled, &down);
+        let up = factor.forward(&self.up);
         let a = &self.top;
         let top = [
             dot_from(a[0], scaled[0], up[0]),
@@ -201,7 +204,7 @@ impl<V: Vector> Layer<V> {
             dot_from(a[7], scaled[2], up[1]),
             dot_from(a[8], scaled[2], up[2]),
         ];
-        Self { top, down: gram(&scaled, &down), up: gram(&factor.scaled(&up), &up) }
+        Self { top, down: new_down, up: gram(&factor.scaled(&up), &up) }
     }
 
     /// S = A + Aᵀ of the joint between two equal layers.
@@ -237,22 +240,21 @@ impl<V: Vector> Layer<V> {
     fn eliminated(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
         let lu = Lu::new(pivot);
         let last = lu.last_pivot.recip();
+        let right = lu.forward(&self.up);
         let d = &self.down;
         let first = lu.divided([d[0], d[1], d[2]], last);
+        let a = dot_from(target[0], first, right[0]);
+        let b = dot_from(target[1], first, right[1]);
+        let c = dot_from(target[2], first, right[2]);
         let second = lu.divided([d[1], d[3], d[4]], last);
+        let e = dot_from(target[3], second, right[0]);
+        let f = dot_from(target[4], second, right[1]);
+        let g = dot_from(target[5], second, right[2]);
         let third = lu.divided([d[2], d[4], d[5]], last);
-        let right = lu.forward(&self.up);
-        [
-            dot_from(target[0], first, right[0]),
-            dot_from(target[1], first, right[1]),
-            dot_from(target[2], first, right[2]),
-            dot_from(target[3], second, right[0]),
-            dot_from(target[4], second, right[1]),
-            dot_from(target[5], second, right[2]),
-            dot_from(target[6], third, right[0]),
-            dot_from(target[7], third, right[1]),
-            dot_from(target[8], third, right[2]),
-        ]
+        let h = dot_from(target[6], third, right[0]);
+        let i = dot_from(target[7], third, right[1]);
+        let j = dot_from(target[8], third, right[2]);
+        [a, b, c, e, f, g, h, i, j]
     }
 }
 

@@ -1,8 +1,10 @@
 //! The sum over wavenumbers: spectrum of the pressure at every receiver.
 
+use std::ops::Range;
+
 use crate::complex::Complex;
 use crate::exact::plate::Plate;
-use crate::exact::tables::{Block, Tables};
+use crate::exact::tables::{Block, Line, Tables};
 use crate::isa::{Isa, Kernel};
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::medium::Medium;
@@ -17,7 +19,7 @@ const GROUP: usize = 4;
 pub(crate) struct Spectra {
     rows: Vec<ComplexLanes>,
     runs: usize,
-    /// What the cosines of one frequency's wavenumbers are weighted with.
+    /// Scratch memory of [`respond`].
     responses: Vec<ComplexLanes>,
 }
 
@@ -32,7 +34,14 @@ impl Spectra {
         self.rows.iter().all(|l| l.re.0.iter().chain(&l.im.0).all(|value| value.is_finite()))
     }
 
-    /// Computes the spectra of one plate.
+    /// Makes room for the spectra of one plate, all zero.
+    pub(crate) fn clear(&mut self, tables: &Tables) {
+        self.runs = tables.runs.len();
+        self.rows.clear();
+        self.rows.resize(tables.receivers() * self.runs, ComplexLanes::ZERO);
+    }
+
+    /// Computes some lines of the spectra of one plate.
     ///
     /// The parts are kernels of their own: in one large function the compiler has too few registers
     /// for the innermost one.
@@ -42,26 +51,41 @@ impl Spectra {
         tables: &Tables,
         medium: &Medium,
         plate: &mut Plate<TERMS>,
+        lines: Range<usize>,
     ) {
-        let receivers = tables.receivers();
-        self.runs = tables.runs.len();
-        self.rows.clear();
-        self.rows.resize(receivers * self.runs, ComplexLanes::ZERO);
-        for (i, line) in tables.lines.iter().enumerate() {
-            if line.blocks > 0 {
-                let responses = &mut self.responses;
-                responses.clear();
-                let mut scratch = None;
-                for b in 0..line.blocks {
-                    let k = tables.wavenumbers(b);
-                    isa.run(Prepare { plate, medium, s: line.s, k: (k.0[0], k.0[LANES - 1]) });
-                    let (block, echo) = tables.block(line, b, &mut scratch);
-                    let inertia = line.inertia;
-                    responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
-                }
-                isa.run(SumOverWavenumbers { tables, line: i, spectra: self });
-            }
+        let mut responses = std::mem::take(&mut self.responses);
+        for i in lines {
+            respond(isa, tables, medium, plate, &tables.lines[i], &mut responses);
+            self.sum(isa, tables, i, &responses);
         }
+        self.responses = responses;
+    }
+
+    /// Sums the responses of line `i` at every receiver.
+    pub(crate) fn sum(&mut self, isa: Isa, tables: &Tables, i: usize, responses: &[ComplexLanes]) {
+        if !responses.is_empty() {
+            isa.run(SumOverWavenumbers { tables, line: i, responses, spectra: self });
+        }
+    }
+}
+
+/// Computes what the cosines of one frequency's wavenumbers are weighted with.
+pub(crate) fn respond<const TERMS: usize>(
+    isa: Isa,
+    tables: &Tables,
+    medium: &Medium,
+    plate: &mut Plate<TERMS>,
+    line: &Line,
+    responses: &mut Vec<ComplexLanes>,
+) {
+    responses.clear();
+    let mut scratch = None;
+    for b in 0..line.blocks {
+        let k = tables.wavenumbers(b);
+        isa.run(Prepare { plate, medium, s: line.s, k: (k.0[0], k.0[LANES - 1]) });
+        let (block, echo) = tables.block(line, b, &mut scratch);
+        let inertia = line.inertia;
+        responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
     }
 }
 
@@ -118,6 +142,7 @@ impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
 struct SumOverWavenumbers<'a> {
     tables: &'a Tables,
     line: usize,
+    responses: &'a [ComplexLanes],
     spectra: &'a mut Spectra,
 }
 
@@ -126,12 +151,12 @@ impl Kernel for SumOverWavenumbers<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Spectra { rows, runs, responses } = self.spectra;
+        let Spectra { rows, runs, .. } = self.spectra;
         let receivers = self.tables.receivers();
         let (run, lane) = (self.line / LANES, self.line % LANES);
         let mut r = 0;
         while r < receivers {
-            let sums = cosine_sums::<V>(self.tables, r, responses);
+            let sums = cosine_sums::<V>(self.tables, r, self.responses);
             for j in 0..GROUP.min(receivers - r) {
                 let row = &mut rows[(r + j) * *runs + run];
                 row.re.0[lane] = sums[j].re.sum();

@@ -123,31 +123,54 @@ impl<const TERMS: usize> Series<TERMS> {
     }
 }
 
-/// Even and odd part in κ of one entry: its value is their sum, and their difference at -k.
+/// One entry: `even` + κ `odd`.
 pub(crate) struct Parts<V> {
-    pub(crate) even: ComplexVector<V>,
-    pub(crate) odd: ComplexVector<V>,
+    even: ComplexVector<V>,
+    odd: ComplexVector<V>,
+}
+
+impl<V: Vector> Parts<V> {
+    /// At wavenumbers `k`: κ = -ik.
+    #[inline(always)]
+    pub(crate) fn at(&self, k: V) -> ComplexVector<V> {
+        let re = self.odd.im.mul_add(k, self.even.re);
+        ComplexVector { re, im: self.odd.re.mul_sub_from(k, self.even.im) }
+    }
+
+    /// At the opposite wavenumbers.
+    #[inline(always)]
+    pub(crate) fn at_opposite(&self, k: V) -> ComplexVector<V> {
+        let re = self.odd.im.mul_sub_from(k, self.even.re);
+        ComplexVector { re, im: self.odd.re.mul_add(k, self.even.im) }
+    }
 }
 
 impl Polynomials {
     /// Entry `entry` of the transfer matrix at wavenumbers `k` times d.
     ///
-    /// Horner's rule in κ² = -k² for the even and the odd powers; then the odd part times κ = -ik.
+    /// Horner's rule in κ² = -k² for the even and the odd powers.
     #[inline(always)]
     pub(crate) fn entry<const TERMS: usize, V: Vector>(&self, entry: usize, k: V) -> Parts<V> {
         debug_assert!(entry < ENTRIES);
         let (group, lane) = (entry / LANES, entry % LANES);
         let (re, im) = (&self.re[..2 * TERMS], &self.im[..2 * TERMS]);
         let square = k.mul(k).neg();
-        let mut even = ComplexVector::zero();
-        let mut odd = ComplexVector::zero();
-        for pair in (0..TERMS).rev() {
+        let last = 2 * TERMS - 2;
+        let mut even = ComplexVector {
+            re: V::splat(re[last][group].0[lane]),
+            im: V::splat(im[last][group].0[lane]),
+        };
+        let mut odd = ComplexVector {
+            re: V::splat(re[last + 1][group].0[lane]),
+            im: V::splat(im[last + 1][group].0[lane]),
+        };
+        for pair in (0..TERMS - 1).rev() {
             let (c, d) = (2 * pair, 2 * pair + 1);
             even.re = square.mul_add(even.re, V::splat(re[c][group].0[lane]));
             even.im = square.mul_add(even.im, V::splat(im[c][group].0[lane]));
             odd.re = square.mul_add(odd.re, V::splat(re[d][group].0[lane]));
             odd.im = square.mul_add(odd.im, V::splat(im[d][group].0[lane]));
         }
-        Parts { even, odd: ComplexVector { re: odd.im.mul(k), im: odd.re.mul(k).neg() } }
+        Parts { even, odd }
     }
 }

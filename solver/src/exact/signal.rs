@@ -96,7 +96,8 @@ impl Grid {
         slopes: &mut Slopes,
     ) {
         slopes.delayed.clear();
-        for (n, &derivative) in self.slopes.iter().enumerate() {
+        let lines = self.slopes.len().min(signal.spectrum.len() * LANES);
+        for (n, &derivative) in self.slopes[..lines].iter().enumerate() {
             let run = &signal.spectrum[n / LANES];
             let slope = derivative * Complex::new(run.re.0[n % LANES], run.im.0[n % LANES]);
             let slope = ComplexVector { re: V::splat(slope.re), im: V::splat(slope.im) };
@@ -141,7 +142,7 @@ pub(crate) struct Signal<'a> {
     pub(crate) sampling: &'a Sampling,
     /// Where the lines stand.
     pub(crate) runs: &'a [Run],
-    /// The lines, run by run, tapered; zero where a line is not computed.
+    /// The lines of the first runs, tapered; zero where a line is not computed.
     pub(crate) spectrum: &'a [ComplexLanes],
 }
 
@@ -287,26 +288,31 @@ impl Signal<'_> {
             let mut phase = ComplexVector { re: V::splat(1.0), im: V::splat(0.0) };
             let mut stride = 1;
             // Σ Re, Σ n Im, Σ n² Re of c e^{iωt}.
-            let (mut a, mut b, mut c) = (V::splat(0.0), V::splat(0.0), V::splat(0.0));
+            let (mut a, mut b, mut second) = (V::splat(0.0), V::splat(0.0), V::splat(0.0));
             for (i, (run, spectrum)) in self.runs.iter().zip(self.spectrum).enumerate() {
                 while stride < run.stride {
                     turn = turn.mul(turn);
                     stride *= 2;
                 }
+                // Two chains of phases, for even and odd lines: half the latency.
+                let mut phases = [phase, phase.mul(turn)];
+                let double = turn.mul(turn);
                 for lane in 0..LANES {
                     let n = (run.first + lane * run.stride) as f64;
-                    let (re, im) = (spectrum.re.0[lane], spectrum.im.0[lane]);
-                    let (re, im) = weights.apply::<V>(i, lane, part, (re, im));
+                    let c = (spectrum.re.0[lane], spectrum.im.0[lane]);
+                    let (re, im) = weights.apply::<V>(i, lane, part, c);
+                    let phase = &mut phases[lane % 2];
                     let value = phase.im.mul_sub_from(im, phase.re.mul(re));
                     let other = phase.im.mul_add(re, phase.re.mul(im));
                     a = a.add(value);
                     b = other.mul_add(V::splat(n), b);
-                    c = value.mul_add(V::splat(n * n), c);
-                    phase = phase.mul(turn);
+                    second = value.mul_add(V::splat(n * n), second);
+                    *phase = phase.mul(double);
                 }
+                phase = phases[0];
             }
             let turned = b.mul(V::splat(-omega));
-            let bent = c.mul(V::splat(-(omega * omega)));
+            let bent = second.mul(V::splat(-(omega * omega)));
             let (alpha, twice) = (V::splat(alpha), V::splat(2.0 * alpha));
             a.store(&mut derivatives.value, part);
             alpha.mul_add(a, turned).store(&mut derivatives.slope, part);

@@ -10,11 +10,6 @@ use crate::complex::Complex;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 
-/// Pairs beyond which blocks are computed when they are needed and not kept: 20 MB of tables.
-const KEPT_PAIRS_MAX: f64 = 3e5;
-/// Frequencies whose taper is below this are left out.
-const TAPER_MIN: f64 = 1e-9;
-
 /// Tables of one sampling.
 #[derive(Debug)]
 pub(crate) struct Tables {
@@ -64,7 +59,16 @@ pub(crate) struct Block {
 
 impl Tables {
     /// Tables for a pulse of the given amplitude.
-    pub(crate) fn new(setup: &Setup, sampling: Sampling, amplitude: f64) -> Self {
+    ///
+    /// `taper` cuts the whole band; `keep`: whether blocks are kept, rather than be computed whenever
+    /// they are needed.
+    pub(crate) fn new(
+        setup: &Setup,
+        sampling: Sampling,
+        amplitude: f64,
+        taper: (f64, f64),
+        keep: bool,
+    ) -> Self {
         let probe = &setup.probe;
         let runs = sampling.runs();
         let numbers: Vec<usize> = runs.iter().flat_map(|run| run.frequencies()).collect();
@@ -73,12 +77,11 @@ impl Tables {
             sampling.period,
             &numbers,
         );
-        let keep = sampling.pairs() <= KEPT_PAIRS_MAX;
         let lines: Vec<_> = numbers
             .iter()
             .zip(spectrum)
             .map(|(&n, pulse)| {
-                let mut line = Line::new(setup, &sampling, n, pulse);
+                let mut line = Line::new(setup, &sampling, n, pulse, taper);
                 if keep {
                     line.keep(setup, &sampling);
                 }
@@ -140,12 +143,18 @@ impl Tables {
         self.receivers
     }
 
-    /// Weights of the lines, eight at a time, that cut the band smoothly from `start` to `end` Hz.
-    pub(crate) fn taper(&self, start: f64, end: f64) -> Vec<Lanes> {
+    /// How many lines, from the first on, take part in a signal that is cut by a taper.
+    pub(crate) fn lines_within(&self, taper: (f64, f64)) -> usize {
+        let within = |line: &Line| self.sampling.is_within(line.n, taper);
+        self.lines.iter().rposition(within).map_or(0, |last| last + 1)
+    }
+
+    /// Weights of the lines, eight at a time, of a taper that starts and ends at two frequencies, Hz.
+    pub(crate) fn taper(&self, taper: (f64, f64)) -> Vec<Lanes> {
         let weights = |run: &Run| {
             let mut lanes = Lanes::ZERO;
             for (lane, n) in lanes.0.iter_mut().zip(run.frequencies()) {
-                *lane = self.sampling.taper(n, start, end);
+                *lane = self.sampling.taper(n, taper);
             }
             lanes
         };
@@ -154,12 +163,17 @@ impl Tables {
 }
 
 impl Line {
-    fn new(setup: &Setup, sampling: &Sampling, n: usize, pulse: Complex) -> Self {
+    fn new(
+        setup: &Setup,
+        sampling: &Sampling,
+        n: usize,
+        pulse: Complex,
+        taper: (f64, f64),
+    ) -> Self {
         let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
         let inertia = (s * s).scale(setup.layers.coupling.density);
-        let computed = sampling.is_computed(n)
-            && sampling.taper(n, sampling.taper_start, sampling.band) > TAPER_MIN;
-        let blocks = if computed { sampling.wavenumbers(n) / LANES } else { 0 };
+        let within = sampling.is_within(n, taper);
+        let blocks = if within { sampling.wavenumbers(n) / LANES } else { 0 };
         // Of the two signs of every frequency but zero, one is summed: the factor 2 is the sum's.
         let share = if n == 0 { 0.5 } else { sampling.share(n) };
         Self {

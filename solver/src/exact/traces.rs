@@ -2,7 +2,7 @@
 
 use osteon_common::case::Bone;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::Sampling;
+use osteon_common::sampling::{Sampling, trace_taper};
 use thiserror::Error;
 
 use crate::exact::plate::AccuratePlate;
@@ -98,13 +98,16 @@ impl Solver {
         let fluids =
             self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
         let sampling = Sampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
-        let pairs = sampling.pairs();
+        let pairs = sampling.pairs(sampling.band);
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Err(TraceError::TooLong { duration, pairs });
         }
-        let tables = Tables::new(self.setup(), sampling, self.setup().probe.amplitude);
-        let taper = tables.taper(sampling.taper_start, sampling.band);
-        spectra.fill(self.isa(), &tables, &medium, &mut plate);
+        let amplitude = self.setup().probe.amplitude;
+        let cut = trace_taper(sampling.band);
+        let tables = Tables::new(self.setup(), sampling, amplitude, cut, false);
+        let taper = tables.taper(cut);
+        spectra.clear(&tables);
+        spectra.fill(self.isa(), &tables, &medium, &mut plate, 0..tables.lines.len());
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
         let pressures: Vec<Vec<f64>> = (0..tables.receivers())

@@ -1,0 +1,226 @@
+//! One look at the first arrival: extrema of the signals in one band, the pick, and the estimate of
+//! its error.
+
+use osteon_common::case::Setup;
+use osteon_common::sampling::{self, Sampling, velocity_taper};
+
+use crate::Failure;
+use crate::exact::plate::{AccuratePlate, FastPlate};
+use crate::exact::response::Spectra;
+use crate::exact::signal::{Grid, Signal, Slopes};
+use crate::exact::tables::Tables;
+use crate::isa::{Isa, Kernel};
+use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::picking::{self, Pick, Window, pick};
+use crate::solver::not_finite;
+use crate::vector::Vector;
+
+/// The tapers that the estimate of the error compares with: start and end over the band. Sharper and
+/// otherser ones, since the error is what the smooth taper takes off the pulse's kink.
+const OTHER_TAPERS: [(f64, f64); LANES] = [
+    (0.2, 1.0),
+    (0.3, 0.7),
+    (0.5, 0.6),
+    (0.7, 0.8),
+    (0.85, 0.9),
+    (0.8, 1.0),
+    (0.9, 1.0),
+    (0.95, 1.0),
+];
+/// Estimated error over the root mean square change of the velocity by the other tapers.
+const ESTIMATE_FACTOR: f64 = 1.3;
+
+/// Tables of one rung of the speed ladder, shared by all bones.
+#[derive(Debug)]
+pub(crate) struct Rung {
+    pub(crate) tables: Tables,
+    grid: Grid,
+    /// Up to the band of a first look.
+    pub(crate) first: Look,
+    /// Up to the whole band.
+    pub(crate) whole: Look,
+}
+
+/// A band.
+#[derive(Debug)]
+pub(crate) struct Look {
+    /// How many lines it needs, from the first on.
+    pub(crate) lines: usize,
+    /// One weight per line, of the runs that hold the lines.
+    taper: Vec<Lanes>,
+    /// The tapers of the error estimate, side by side, per run and line.
+    others: Vec<[Lanes; LANES]>,
+}
+
+/// Scratch memory of one thread; its contents never reach a result.
+#[derive(Debug, Default)]
+pub(crate) struct ExactWorkspace {
+    pub(crate) fast: FastPlate,
+    /// The plate of thorough looks.
+    pub(crate) accurate: AccuratePlate,
+    pub(crate) spectra: Spectra,
+    windows: Vec<Window>,
+    slopes: Slopes,
+    tapered: Vec<ComplexLanes>,
+}
+
+/// A pick with the estimate of its velocity's relative error.
+#[derive(Debug)]
+pub(crate) struct Estimated {
+    pub(crate) pick: Pick,
+    pub(crate) error: f64,
+}
+
+impl Rung {
+    /// `keep`: whether tables are kept, rather than be computed whenever they are needed.
+    pub(crate) fn new(setup: &Setup, sampling: Sampling, keep: bool) -> Self {
+        let whole = velocity_taper(sampling.band);
+        // A velocity does not depend on the pulse's amplitude, not even in its last bit.
+        let tables = Tables::new(setup, sampling, 1.0, whole, keep);
+        let grid = Grid::new(setup, &tables);
+        let first = Look::new(&tables, sampling.first_band);
+        let whole = Look::new(&tables, sampling.band);
+        Self { tables, grid, first, whole }
+    }
+}
+
+impl Look {
+    fn new(tables: &Tables, band: f64) -> Self {
+        let cut = velocity_taper(band);
+        let lines = tables.lines_within(cut);
+        let mut taper = tables.taper(cut);
+        taper.truncate(lines.div_ceil(LANES));
+        let mut others = vec![[Lanes::ZERO; LANES]; taper.len()];
+        for (lane, (start, end)) in OTHER_TAPERS.into_iter().enumerate() {
+            for (taper, weights) in others.iter_mut().zip(tables.taper((start * band, end * band)))
+            {
+                for (line, weight) in taper.iter_mut().zip(weights.0) {
+                    line.0[lane] = weight;
+                }
+            }
+        }
+        Self { lines, taper, others }
+    }
+}
+
+/// Picks the first arrival from the spectra in the workspace.
+///
+/// # Errors
+/// When a number is not finite, or there is no acceptable pick.
+pub(crate) fn look(
+    setup: &Setup,
+    distances: &[f64],
+    isa: Isa,
+    speed: f64,
+    rung: &Rung,
+    look: &Look,
+    workspace: &mut ExactWorkspace,
+) -> Result<Estimated, Failure> {
+    observe(setup, distances, isa, speed, rung, look, workspace)?;
+    picked(setup, distances, isa, rung, look, workspace)
+}
+
+/// Lists, in the workspace, the extrema of the signals of its spectra.
+///
+/// # Errors
+/// When a number is not finite.
+pub(crate) fn observe(
+    setup: &Setup,
+    distances: &[f64],
+    isa: Isa,
+    speed: f64,
+    rung: &Rung,
+    look: &Look,
+    workspace: &mut ExactWorkspace,
+) -> Result<(), Failure> {
+    if !workspace.spectra.is_finite() {
+        return Err(not_finite("the pressure"));
+    }
+    isa.run(Observe { setup, distances, rung, look, speed, workspace });
+    Ok(())
+}
+
+/// Picks one of the extrema in the workspace, and estimates its error.
+///
+/// # Errors
+/// When there is no acceptable pick.
+pub(crate) fn picked(
+    setup: &Setup,
+    distances: &[f64],
+    isa: Isa,
+    rung: &Rung,
+    look: &Look,
+    workspace: &ExactWorkspace,
+) -> Result<Estimated, Failure> {
+    let fc = setup.probe.center_frequency;
+    let pick = pick(&setup.picking, fc, distances, &workspace.windows)?;
+    let moved = isa.run(Repick { rung, look, times: &pick.times, workspace });
+    let mut square = 0.0;
+    for taper in 0..LANES {
+        let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
+        let change = picking::slope(distances, &times) / pick.velocity - 1.0;
+        square = change.mul_add(change, square);
+    }
+    let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
+    // A signal that changes past recognition makes the largest error, not a failure.
+    let error = if error <= 1.0 { error } else { 1.0 };
+    Ok(Estimated { pick, error })
+}
+
+/// Lists the extrema of the pressure at every receiver.
+struct Observe<'a> {
+    setup: &'a Setup,
+    distances: &'a [f64],
+    rung: &'a Rung,
+    look: &'a Look,
+    /// Bound of every wave's speed, m/s.
+    speed: f64,
+    workspace: &'a mut ExactWorkspace,
+}
+
+impl Kernel for Observe<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let ExactWorkspace { spectra, windows, slopes, tapered, .. } = self.workspace;
+        let Tables { sampling, runs, .. } = &self.rung.tables;
+        windows.resize_with(self.distances.len(), Window::default);
+        for (r, (window, &x)) in windows.iter_mut().zip(self.distances).enumerate() {
+            tapered.clear();
+            for (run, &weights) in spectra.receiver(r).iter().zip(&self.look.taper) {
+                tapered.push(ComplexLanes { re: run.re * weights, im: run.im * weights });
+            }
+            let signal = Signal { sampling, runs, spectrum: tapered };
+            let from = sampling::earliest_arrival(self.setup, x, self.speed);
+            let to = sampling::direct_arrival(self.setup, x);
+            let last = signal.extrema::<V>(&self.rung.grid, from, to, slopes, &mut window.extrema);
+            window.last = last.abs();
+            window.drop_noise();
+        }
+    }
+}
+
+/// The same extrema, s, of the spectra in the workspace cut by each of the other tapers.
+struct Repick<'a> {
+    rung: &'a Rung,
+    look: &'a Look,
+    times: &'a [f64],
+    workspace: &'a ExactWorkspace,
+}
+
+impl Kernel for Repick<'_> {
+    type Output = Vec<Lanes>;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Vec<Lanes> {
+        let Tables { sampling, runs, .. } = &self.rung.tables;
+        let mut moved = Vec::with_capacity(self.times.len());
+        for (r, &time) in self.times.iter().enumerate() {
+            let spectrum = &self.workspace.spectra.receiver(r)[..self.look.others.len()];
+            let signal = Signal { sampling, runs, spectrum };
+            moved.push(signal.moved_extrema::<V>(time, &self.look.others));
+        }
+        moved
+    }
+}

@@ -1,0 +1,176 @@
+//! The stages of one realization one by one, for benchmarks.
+//!
+//! They are the very code that [`Solver::arrival`](crate::Solver::arrival) runs, cut where a clock can
+//! be read in between: the first look at a bone, which most bones need nothing after. Admittances
+//! and sums take turns there, frequency by frequency; here all admittances come first. Each stage
+//! may be repeated.
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::sampling::{self, Grade};
+
+use crate::exact::Exact;
+use crate::exact::look::{self, ExactWorkspace, Look, Rung};
+use crate::exact::response::respond;
+use crate::isa::Isa;
+use crate::lanes::{ComplexLanes, LANES};
+use crate::medium::Medium;
+use crate::solver::{Arrival, Failure};
+
+/// The exact method for one setup.
+#[derive(Debug)]
+pub struct Stages {
+    exact: Exact,
+}
+
+/// Scratch memory of one thread.
+#[derive(Debug, Default)]
+pub struct Memory {
+    exact: ExactWorkspace,
+    /// Per line.
+    responses: Vec<Vec<ComplexLanes>>,
+}
+
+/// A bone whose tensor has been turned into what its plate's admittances have in common.
+#[derive(Debug)]
+pub struct Filled<'a> {
+    exact: &'a Exact,
+    rung: &'a Rung,
+    look: &'a Look,
+    accurate: bool,
+    medium: Medium,
+    speed: f64,
+    memory: &'a mut Memory,
+}
+
+/// A plate whose responses at every frequency and wavenumber are known.
+#[derive(Debug)]
+pub struct Responded<'a, 'b>(&'a mut Filled<'b>);
+
+/// A plate whose spectra at every receiver are known.
+#[derive(Debug)]
+pub struct Summed<'a, 'b>(&'a mut Filled<'b>);
+
+/// A plate whose extrema at every receiver are known.
+#[derive(Debug)]
+pub struct Observed<'a, 'b>(&'a mut Filled<'b>);
+
+impl Stages {
+    /// The stages at cases of `setup`, which has passed validation, on one instruction set.
+    pub fn new(setup: &Setup, isa: Isa) -> Self {
+        Self { exact: Exact::new(setup, isa) }
+    }
+
+    /// Tensor: what the admittances of one bone have in common.
+    ///
+    /// # Errors
+    /// When nothing that arrives through the bone can come first, or it is out of scale.
+    pub fn tensor<'a>(
+        &'a self,
+        bone: &Bone,
+        memory: &'a mut Memory,
+    ) -> Result<Filled<'a>, Failure> {
+        let exact = &self.exact;
+        let grade = sampling::first_grade(&exact.setup);
+        let accurate = grade == Grade::Thorough;
+        let (medium, speed) = exact.filled(bone, accurate, &mut memory.exact)?;
+        let rung = exact.rung(speed, grade)?;
+        let look = if accurate { &rung.whole } else { &rung.first };
+        Ok(Filled { exact, rung, look, accurate, medium, speed, memory })
+    }
+}
+
+impl<'b> Filled<'b> {
+    /// Number of (frequency, wavenumber) pairs.
+    pub fn pairs(&self) -> usize {
+        let lines = &self.rung.tables.lines[..self.look.lines];
+        lines.iter().map(|line| line.blocks * LANES).sum()
+    }
+
+    /// Admittance: the plate's response in every pair.
+    pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
+        let (isa, tables, medium) = (self.exact.isa, &self.rung.tables, &self.medium);
+        let lines = &tables.lines[..self.look.lines];
+        let Memory { exact: ExactWorkspace { fast, accurate, .. }, responses } = &mut *self.memory;
+        responses.resize_with(lines.len(), Vec::new);
+        for (line, responses) in lines.iter().zip(responses) {
+            if self.accurate {
+                respond(isa, tables, medium, accurate, line, responses);
+            } else {
+                respond(isa, tables, medium, fast, line, responses);
+            }
+        }
+        Responded(self)
+    }
+}
+
+impl<'b> Responded<'_, 'b> {
+    /// Wavenumber sum: spectra at every receiver.
+    pub fn sum(&mut self) -> Summed<'_, 'b> {
+        let Filled { exact, rung, memory, .. } = &mut *self.0;
+        memory.exact.spectra.clear(&rung.tables);
+        for (i, responses) in memory.responses.iter().enumerate() {
+            memory.exact.spectra.sum(exact.isa, &rung.tables, i, responses);
+        }
+        Summed(self.0)
+    }
+}
+
+impl<'b> Summed<'_, 'b> {
+    /// Time synthesis: extrema of the pressure at every receiver.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
+        let Filled { exact, rung, look, speed, memory, .. } = &mut *self.0;
+        let Exact { setup, distances, isa, .. } = exact;
+        look::observe(setup, distances, *isa, *speed, rung, look, &mut memory.exact)?;
+        Ok(Observed(self.0))
+    }
+}
+
+impl Observed<'_, '_> {
+    /// Picking: the first arrival and the estimate of its error.
+    ///
+    /// # Errors
+    /// When there is no acceptable pick.
+    pub fn picking(&self) -> Result<Arrival, Failure> {
+        let Filled { exact, rung, look, memory, .. } = &*self.0;
+        let Exact { setup, distances, isa, .. } = exact;
+        look::picked(setup, distances, *isa, rung, look, &memory.exact).map(Arrival::from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::parameters::Point;
+    use osteon_common::realization::Ensemble;
+
+    use super::*;
+    use crate::{Solver, Workspace};
+
+    #[test]
+    fn the_stages_together_are_the_solver() {
+        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+        let ensemble = Ensemble::new(&point, 1).unwrap();
+        for refinement in [1.0, 2.0] {
+            let mut setup = Setup::default();
+            setup.solver.refinement = refinement;
+            let solver = Solver::new(&setup);
+            let stages = Stages::new(&setup, Isa::fastest());
+            let (mut workspace, mut memory) = (Workspace::default(), Memory::default());
+            let mut same = 0;
+            for i in 0..20 {
+                let bone = ensemble.bone(i).unwrap();
+                let expected = solver.arrival(&bone, &mut workspace).unwrap();
+                let mut filled = stages.tensor(&bone, &mut memory).unwrap();
+                let mut responded = filled.admittance();
+                let mut summed = responded.sum();
+                let arrival = summed.synthesis().unwrap().picking().unwrap();
+                same += usize::from(arrival == expected);
+                // Where the solver looks again, it finds nearly the same.
+                assert!((arrival.velocity / expected.velocity - 1.0).abs() < 3e-4, "index {i}");
+            }
+            assert!(same >= 15, "only {same} of 20 arrivals are those of a first look");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Reproducible random numbers for what a study varies beside the germs of its bones.
+
+/// A splitmix64 generator.
+#[derive(Debug, Clone)]
+pub(crate) struct Generator {
+    state: u64,
+}
+
+impl Generator {
+    /// The generator of one index.
+    pub(crate) fn new(seed: u64) -> Self {
+        Self { state: seed }
+    }
+
+    /// The next number, from 0 to 1.
+    pub(crate) fn uniform(&mut self) -> f64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// The next number between two.
+    pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.uniform()
+    }
+
+    /// The next number between two positive ones, its logarithm uniform.
+    pub(crate) fn decades(&mut self, from: f64, to: f64) -> f64 {
+        from * libm::pow(to / from, self.uniform())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_fill_their_ranges() {
+        let mut generator = Generator::new(1);
+        let numbers: Vec<f64> = (0..1000).map(|_| generator.decades(1e-3, 10.0)).collect();
+        assert!(numbers.iter().all(|number| (1e-3..=10.0).contains(number)));
+        // The median of a logarithmic law is the geometric mean of its ends.
+        let below = numbers.iter().filter(|&&number| number < 0.1).count();
+        assert!((440..560).contains(&below), "{below}");
+        let mean: f64 = (0..1000).map(|_| generator.between(-1.0, 1.0)).sum::<f64>() / 1000.0;
+        assert!(mean.abs() < 0.06, "{mean}");
+        assert_ne!(Generator::new(1).uniform(), Generator::new(2).uniform());
+    }
+}

@@ -1,0 +1,100 @@
+//! Makes the tables of docs/validation.md again.
+//!
+//! A table stands between two comments, of which the first says what makes it:
+//!
+//! ```text
+//! <!-- table: study failures --realizations 100000 -->
+//! …
+//! <!-- end -->
+//! ```
+
+use std::fs;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{cargo_command, output, root};
+
+const PAGE: &str = "docs/validation.md";
+const START: &str = "<!-- table: ";
+const START_END: &str = " -->\n";
+const END: &str = "<!-- end -->";
+
+/// Replaces the tables made by the studies `named`; without names, all. The page is written after
+/// each, so that nothing is lost when a long one is interrupted.
+pub(crate) fn rewrite(named: &[String]) -> Result<()> {
+    let path = root().join(PAGE);
+    let read = || fs::read_to_string(&path).with_context(|| format!("cannot read {PAGE}"));
+    let commands = commands(&read()?)?;
+    let is_named = |command: &str| named.iter().any(|name| command.split(' ').any(|w| w == name));
+    if let Some(name) =
+        named.iter().find(|name| !commands.iter().any(|c| c.split(' ').any(|w| w == *name)))
+    {
+        bail!("{PAGE} has no table of {name:?}; it has:\n  {}", commands.join("\n  "));
+    }
+    for command in commands.iter().filter(|command| named.is_empty() || is_named(command)) {
+        let mut run = cargo_command(&["run", "--quiet", "--release", "--"]);
+        run.args(command.split(' '));
+        let table = output(&mut run)?;
+        fs::write(&path, replaced(&read()?, command, &table)?)
+            .with_context(|| format!("cannot write {PAGE}"))?;
+    }
+    Ok(())
+}
+
+/// The commands of all tables of a page.
+fn commands(page: &str) -> Result<Vec<String>> {
+    let blocks = page.split(START).skip(1);
+    blocks
+        .map(|block| match (block.split_once(START_END), block.contains(END)) {
+            (Some((command, _)), true) => Ok(command.to_owned()),
+            _ => bail!("{PAGE}: a table has no {END:?}: {}", block.lines().next().unwrap_or("")),
+        })
+        .collect()
+}
+
+/// The page with another table by `command`.
+fn replaced(page: &str, command: &str, table: &str) -> Result<String> {
+    let start = format!("{START}{command}{START_END}");
+    let split = page.split_once(&start).and_then(|(before, rest)| {
+        let (_, after) = rest.split_once(END)?;
+        Some((before, after))
+    });
+    let Some((before, after)) = split else {
+        bail!("{PAGE} lost its table of {command:?} while it was made");
+    };
+    Ok(format!("{before}{start}\n{}\n\n{END}{after}", table.trim_end()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: &str = "a\n<!-- table: study x -->\nold\n<!-- end -->\nb\n\
+                        <!-- table: study y --seed 2 -->\n<!-- end -->\n";
+
+    #[test]
+    fn one_table_is_replaced_and_all_else_is_kept() {
+        assert_eq!(commands(PAGE).unwrap(), ["study x", "study y --seed 2"]);
+        let page = replaced(PAGE, "study x", "| new |\n").unwrap();
+        let expected = "a\n<!-- table: study x -->\n\n| new |\n\n<!-- end -->\nb\n\
+                        <!-- table: study y --seed 2 -->\n<!-- end -->\n";
+        assert_eq!(page, expected);
+        assert_eq!(replaced(&page, "study x", "| new |").unwrap(), expected);
+        let page = replaced(&page, "study y --seed 2", "| y |").unwrap();
+        assert!(page.contains("| new |") && page.ends_with("\n| y |\n\n<!-- end -->\n"));
+        assert!(replaced(PAGE, "study z", "").is_err());
+    }
+
+    #[test]
+    fn a_table_without_an_end_is_refused() {
+        assert!(commands("<!-- table: study x -->\n| a |\n").is_err());
+    }
+
+    #[test]
+    fn the_pages_own_tables_can_be_made() {
+        let page = fs::read_to_string(root().join(super::PAGE)).unwrap();
+        let commands = commands(&page).unwrap();
+        assert!(commands.len() > 5, "{commands:?}");
+        assert!(commands.iter().all(|command| command.starts_with("study ")), "{commands:?}");
+    }
+}
