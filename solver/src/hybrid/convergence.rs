@@ -11,6 +11,7 @@ use super::march::{Limit, Memory, Response};
 use super::mesh::Mesh;
 use super::operator::Operator;
 use super::plan::Times;
+use super::scope::Scope;
 use crate::Failure;
 use crate::isa::Isa;
 use crate::lanes::{LANES, Lanes};
@@ -92,7 +93,7 @@ pub fn time_step_convergence(
     halvings: u32,
 ) -> Result<Vec<ConvergenceRow>, Failure> {
     let mut study = Study::new(setup, bone);
-    let mesh = Mesh::new(setup, bone, study.speed);
+    let mesh = Mesh::new(setup, bone, &study.scope, setup.solver.refinement.sqrt());
     let limit = study.limit(&mesh);
     let first = study.ratio(limit);
     let finest = first << halvings;
@@ -115,7 +116,7 @@ pub fn time_step_convergence(
 struct Study<'a> {
     setup: &'a Setup,
     bone: &'a Bone,
-    speed: f64,
+    scope: Scope,
     wavenumbers: Lanes,
     memory: Memory,
 }
@@ -129,12 +130,18 @@ impl<'a> Study<'a> {
             wavenumbers.0[lane] = WAVENUMBER * fluid * lane as f64 / (LANES - 1) as f64;
         }
         let speed = Medium::new(bone).fastest.max(setup.layers.marrow.sound_speed);
-        Self { setup, bone, speed, wavenumbers, memory: Memory::default() }
+        Self {
+            setup,
+            bone,
+            scope: Scope::whole(setup, speed),
+            wavenumbers,
+            memory: Memory::default(),
+        }
     }
 
     /// The same elements everywhere.
     fn mesh(&self, order: usize, size: f64) -> Mesh {
-        Mesh::with_sizes(self.setup, self.speed, order, [size; 3])
+        Mesh::with_sizes(self.setup, &self.scope, order, [size; 3])
     }
 
     /// The largest stable time step, s.
@@ -159,7 +166,7 @@ impl<'a> Study<'a> {
     /// Pressures at the receivers' height with `ratio` time steps per sample.
     fn pressures(&mut self, mesh: &Mesh, ratio: usize) -> Result<Vec<Lanes>, Failure> {
         let step = self.spacing() / ratio as f64;
-        let times = Times { step, ratio, samples: SAMPLES, half_period: 1 };
+        let times = Times { step, ratio, samples: SAMPLES };
         let width = LOAD_WIDTH / self.setup.probe.center_frequency;
         self.memory.rest(times);
         for (n, load) in self.memory.load.iter_mut().enumerate() {

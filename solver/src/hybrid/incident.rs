@@ -17,6 +17,7 @@ use std::f64::consts::PI;
 use osteon_common::case::Setup;
 
 use super::mesh::path_heard;
+use super::scope::Scope;
 use crate::lanes::{LANES, Lanes};
 use crate::pulse::Pulse;
 
@@ -34,11 +35,10 @@ pub(super) struct Image {
     pub(super) sign: f64,
 }
 
-/// The source, and its images in fluid 1's outer face whose waves can be heard before the direct
-/// wave in a bone of waves up to `speed` (m/s).
-pub(super) fn images(setup: &Setup, speed: f64) -> Vec<Image> {
+/// The source, and its images in fluid 1's outer face whose waves can be heard.
+pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
     let (source, depth) = (setup.probe.source.x3, setup.layers.coupling.thickness);
-    let heard = path_heard(setup, speed) - setup.probe.receivers.x3;
+    let heard = path_heard(setup, scope) - setup.probe.receivers.x3;
     let mut images = vec![Image { height: source, sign: 1.0 }];
     let mut sign = -1.0;
     for n in 1..=IMAGES_MAX / 2 {
@@ -72,14 +72,14 @@ pub(super) struct Incident {
 
 impl Incident {
     /// For samples `step` (s) apart.
-    pub(super) fn new(setup: &Setup, speed: f64, step: f64) -> Self {
+    pub(super) fn new(setup: &Setup, scope: &Scope, step: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let samples = (PULSE_PERIODS / fc / step) as usize + 1;
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let pulse = Pulse::new(1.0, fc);
         let at = |i: usize| i as f64 * step;
         Self {
-            images: images(setup, speed),
+            images: images(setup, scope),
             sound_speed: setup.layers.coupling.sound_speed,
             density: setup.layers.coupling.density,
             step,

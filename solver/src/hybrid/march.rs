@@ -24,7 +24,7 @@ impl Kernel for Limit<'_> {
     }
 }
 
-/// Pressures at the receivers, with two tapers of wavenumbers.
+/// Pressures at the receivers.
 pub(super) struct March<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) plan: &'a Plan,
@@ -33,8 +33,6 @@ pub(super) struct March<'a> {
     pub(super) receivers: &'a [Receiver],
     /// Height of the receivers, m.
     pub(super) height: f64,
-    /// Share of the wavenumber limit at which the second taper ends.
-    pub(super) narrow: f64,
     pub(super) memory: &'a mut Memory,
 }
 
@@ -57,9 +55,10 @@ pub(super) struct Memory {
     pub(super) load: Vec<Lanes>,
     /// Samples of the pressure at the receivers' height.
     pub(super) record: Vec<Lanes>,
-    /// Pressure samples: receiver after receiver, with the full and with the narrow taper.
-    pub(super) full: Vec<f64>,
-    pub(super) narrow: Vec<f64>,
+    /// Pressure samples, receiver after receiver.
+    pub(super) pressures: Vec<f64>,
+    /// One receiver's row of them.
+    pub(super) row: Vec<f64>,
 }
 
 impl Memory {
@@ -100,10 +99,8 @@ impl Kernel for March<'_> {
     fn run<V: Vector>(self) -> bool {
         let samples = self.times.samples;
         let memory = self.memory;
-        for sums in [&mut memory.full, &mut memory.narrow] {
-            sums.clear();
-            sums.resize(samples * self.receivers.len(), 0.0);
-        }
+        memory.pressures.clear();
+        memory.pressures.resize(samples * self.receivers.len(), 0.0);
         memory.rest(self.times);
         let (node, weights) = self.plan.mesh.receiver(self.height);
         let mut finite = true;
@@ -115,11 +112,9 @@ impl Kernel for March<'_> {
             self.incident.fill(k, self.times.ratio, &mut memory.load);
             run_block(self.operator, k, self.times, (node, &weights), memory);
             for (r, receiver) in self.receivers.iter().enumerate() {
-                let range = r * samples..(r + 1) * samples;
-                let full = transform(self.plan, k, receiver.distance, 1.0);
-                add(full, &memory.record, receiver, &mut memory.full[range.clone()]);
-                let narrow = transform(self.plan, k, receiver.distance, self.narrow);
-                add(narrow, &memory.record, receiver, &mut memory.narrow[range]);
+                let sums = &mut memory.pressures[r * samples..(r + 1) * samples];
+                let factors = transform(self.plan, k, receiver.distance);
+                add(factors, &memory.record, receiver, sums);
             }
             finite &= memory.record.iter().all(|p| p.sum().is_finite());
         }
@@ -152,8 +147,8 @@ fn run_block(
 }
 
 /// Factors of the cosine transform at `distance` (m).
-fn transform(plan: &Plan, k: Lanes, distance: f64, share: f64) -> Lanes {
-    Lanes(k.0.map(|k| plan.weight(k, share) * libm::cos(k * distance)))
+fn transform(plan: &Plan, k: Lanes, distance: f64) -> Lanes {
+    Lanes(k.0.map(|k| plan.weight(k) * libm::cos(k * distance)))
 }
 
 /// Adds one block's share of a receiver's pressure.
@@ -173,6 +168,7 @@ mod tests {
 
     use super::*;
     use crate::hybrid::mesh::Mesh;
+    use crate::hybrid::scope::Scope;
     use crate::isa::Isa;
     use crate::{Complex, admittance};
 
@@ -185,12 +181,12 @@ mod tests {
         setup.layers.marrow.thickness = 4e-3;
         let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
         let bone = Ensemble::new(&point, 3).unwrap().bone(1).unwrap();
-        let mesh = Mesh::with_sizes(&setup, 5000.0, 8, [0.4e-3; 3]);
+        let mesh = Mesh::with_sizes(&setup, &Scope::whole(&setup, 5000.0), 8, [0.4e-3; 3]);
         let operator = Operator::<1>::new(&setup, &bone, &mesh);
         let step = 5e-9;
         // What returns from the coupling's outer face after 13 µs is weaker by e^-25.
         let (damping, samples) = (1.9e6, 2600);
-        let times = Times { step, ratio: 1, samples, half_period: 1 };
+        let times = Times { step, ratio: 1, samples };
         let k = Lanes(std::array::from_fn(|lane| 600.0 * lane as f64));
         let mut memory = Memory::default();
         memory.rest(times);

@@ -5,19 +5,13 @@
 //! wave: what is looked at is as if the fluid were whole.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::layers::Fluid;
-use osteon_common::sampling::{direct_arrival, distances};
 
 use super::element::Element;
+use super::scope::Scope;
 use crate::medium::Medium;
 
 /// The slowest wavelength at the centre frequency, m, for which `element_size` is meant.
 const WAVELENGTH: f64 = 1.5e-3;
-/// In a plate thinner than this many metres at 1 Hz (m·Hz) the first extremum lies close to the
-/// wave of the pulse's kink at t = 0, which takes more of everything to follow.
-const THIN_PLATE: f64 = 3000.0;
-/// Most refinement for a thin plate.
-const THIN_PLATE_MAX: f64 = 2.0;
 /// Depths are made larger by this share, so that an echo comes clearly late.
 const DEPTH_MARGIN: f64 = 1.02;
 /// Most elements of a layer that are counted; beyond, the work is over its bound anyway.
@@ -50,31 +44,30 @@ impl LayerMesh {
 }
 
 impl Mesh {
-    /// The mesh that the setup asks for, for a bone of waves up to `speed` (m/s) along x1.
-    pub(super) fn new(setup: &Setup, bone: &Bone, speed: f64) -> Self {
+    /// The mesh for `scope`, of elements `finer` times smaller than the setup says.
+    pub(super) fn new(setup: &Setup, bone: &Bone, scope: &Scope, finer: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let size = |slowest: f64| {
             let share = (slowest / fc / WAVELENGTH).min(1.0);
-            setup.solver.element_size * share / setup.solver.refinement.sqrt()
+            setup.solver.element_size * share / finer
         };
-        let fluid = |fluid: &Fluid| size(fluid.sound_speed) / thin_plate(setup);
         let sizes = [
-            fluid(&setup.layers.coupling),
+            size(setup.layers.coupling.sound_speed),
             size(slowest_across(bone)),
-            fluid(&setup.layers.marrow),
+            size(setup.layers.marrow.sound_speed),
         ];
-        Self::with_sizes(setup, speed, setup.solver.element_order as usize, sizes)
+        Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
     }
 
     /// A mesh of elements of degree `order`, none larger than `sizes` (m) in fluid 1, bone and
     /// fluid 2.
-    pub(super) fn with_sizes(setup: &Setup, speed: f64, order: usize, sizes: [f64; 3]) -> Self {
+    pub(super) fn with_sizes(setup: &Setup, scope: &Scope, order: usize, sizes: [f64; 3]) -> Self {
         let [coupling, bone, marrow] = sizes;
         Self {
             element: Element::new(order),
-            coupling: LayerMesh::new(coupling_depth(setup, speed), coupling),
+            coupling: LayerMesh::new(coupling_depth(setup, scope), coupling),
             bone: LayerMesh::new(setup.layers.bone_thickness, bone),
-            marrow: LayerMesh::new(marrow_depth(setup, speed, marrow), marrow),
+            marrow: LayerMesh::new(marrow_depth(setup, scope, marrow), marrow),
         }
     }
 
@@ -98,41 +91,28 @@ pub(super) fn slowest_across(bone: &Bone) -> f64 {
     (medium.stiffness / (medium.dynamic_growth * medium.density)).sqrt()
 }
 
-/// How much finer than usual a thin plate is computed, ≥ 1.
-pub(super) fn thin_plate(setup: &Setup) -> f64 {
-    let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
-    (THIN_PLATE / thickness).clamp(1.0, THIN_PLATE_MAX)
-}
-
 /// √(1/c² - 1/v²), s/m, of waves that travel along the layer at `speed` at most.
 pub(super) fn slowness_across(sound_speed: f64, speed: f64) -> f64 {
     (1.0 / (sound_speed * sound_speed) - 1.0 / (speed * speed)).max(0.0).sqrt()
 }
 
-/// Longest path, m, across the coupling fluid in which a wave can arrive before the direct wave.
-pub(super) fn path_heard(setup: &Setup, speed: f64) -> f64 {
-    let across = slowness_across(setup.layers.coupling.sound_speed, speed);
-    distances(setup)
-        .fold(0.0, |path: f64, x| path.max((direct_arrival(setup, x) - x / speed) / across))
+/// Longest path, m, across the coupling fluid in which a wave can arrive within its window.
+pub(super) fn path_heard(setup: &Setup, scope: &Scope) -> f64 {
+    scope.across() / slowness_across(setup.layers.coupling.sound_speed, scope.speed)
 }
 
 /// Depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then up to the
 /// cut and down to the receiver.
-fn coupling_depth(setup: &Setup, speed: f64) -> f64 {
+fn coupling_depth(setup: &Setup, scope: &Scope) -> f64 {
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
-    let heard = 0.5 * (path_heard(setup, speed) + receivers - source);
+    let heard = 0.5 * (path_heard(setup, scope) + receivers - source);
     (DEPTH_MARGIN * heard.max(receivers)).min(setup.layers.coupling.thickness)
 }
 
 /// Depth of fluid 2 that is meshed, m; at least one element of `size`.
-fn marrow_depth(setup: &Setup, speed: f64, size: f64) -> f64 {
-    let (coupling, marrow) = (&setup.layers.coupling, &setup.layers.marrow);
-    let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
-    let above = heights * slowness_across(coupling.sound_speed, speed);
-    let across = slowness_across(marrow.sound_speed, speed);
-    let heard = distances(setup).fold(0.0, |depth: f64, x| {
-        depth.max(0.5 * (direct_arrival(setup, x) - x / speed - above) / across)
-    });
+fn marrow_depth(setup: &Setup, scope: &Scope, size: f64) -> f64 {
+    let marrow = &setup.layers.marrow;
+    let heard = 0.5 * scope.longest() / slowness_across(marrow.sound_speed, scope.speed);
     (DEPTH_MARGIN * heard).max(size).min(marrow.thickness)
 }
 
@@ -172,7 +152,8 @@ mod tests {
     #[test]
     fn fluids_end_where_no_echo_is_heard() {
         let setup = Setup::default();
-        let mesh = Mesh::new(&setup, &bone(), 3960.1);
+        let scope = Scope::whole(&setup, 3960.1);
+        let mesh = Mesh::new(&setup, &bone(), &scope, 1.0);
         // By hand, at the farthest receiver: (14.267 - 5.404) µs / 616.99 µs/m is a path of
         // 14.36 mm, half of it 7.18 mm; below, (14.267 - 5.404 - 2.468) µs leaves 5.18 mm.
         let depth = |mesh: &LayerMesh| mesh.elements as f64 * mesh.size;
@@ -182,7 +163,7 @@ mod tests {
         let mut thin = setup;
         thin.layers.coupling.thickness = 4e-3;
         thin.layers.marrow.thickness = 2e-3;
-        let mesh = Mesh::new(&thin, &bone(), 3960.1);
+        let mesh = Mesh::new(&thin, &bone(), &Scope::whole(&thin, 3960.1), 1.0);
         assert!((depth(&mesh.coupling) - 4e-3).abs() < 1e-12);
         assert!((depth(&mesh.marrow) - 2e-3).abs() < 1e-12);
     }

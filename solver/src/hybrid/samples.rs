@@ -1,5 +1,7 @@
 //! Extrema of an equally sampled signal.
 
+use std::f64::consts::PI;
+
 use crate::picking::Extremum;
 
 /// Samples of one interpolating polynomial.
@@ -7,34 +9,58 @@ const POINTS: usize = 8;
 /// Bisections of an interval; then Newton's method could not tell more.
 const BISECTIONS: usize = 44;
 
-/// Half periods on either side that [`low_pass`] looks at.
-pub(super) const REACH: usize = 4;
-/// The eighth difference, over 2⁸.
-const EIGHTH_DIFFERENCE: [f64; 2 * REACH + 1] = [
-    1.0 / 256.0,
-    -8.0 / 256.0,
-    28.0 / 256.0,
-    -56.0 / 256.0,
-    70.0 / 256.0,
-    -56.0 / 256.0,
-    28.0 / 256.0,
-    -8.0 / 256.0,
-    1.0 / 256.0,
-];
+/// Middle of the low-pass filter's fall over the band, and its width.
+const FALL: (f64, f64) = (0.84, 0.28);
+/// The filter ends where its Gaussian factor is exp(-this²).
+const FILTER_END: f64 = 3.2;
 
-/// `values` without what swings with the period of two `half_period`s (in samples), into `out`:
-/// frequencies ω pass by 1 - sin⁸(ω half_period / 2), without delay. The last [`REACH`] half periods
-/// are left as they are; before the first sample there is nothing.
-pub(super) fn low_pass(values: &[f64], half_period: usize, out: &mut [f64]) {
-    out.copy_from_slice(values);
-    for i in 0..values.len().saturating_sub(REACH * half_period) {
-        let mut sum = 0.0;
-        for (j, &factor) in EIGHTH_DIFFERENCE.iter().enumerate() {
-            if let Some(place) = (i + j * half_period).checked_sub(REACH * half_period) {
-                sum = f64::mul_add(factor, values[place], sum);
-            }
+/// A low-pass filter without delay, ½ erfc((f - f0)/w), f0 and w being shares of a band. What the
+/// mesh does not resolve reaches the receivers at wrong times; the filter takes it out.
+#[derive(Debug, Clone)]
+pub(super) struct LowPass {
+    /// Half of the symmetric impulse response; the whole sums up to one.
+    response: Vec<f64>,
+}
+
+impl LowPass {
+    /// For `band` in cycles per sample.
+    pub(super) fn new(band: f64) -> Self {
+        let (middle, width) = (FALL.0 * band, FALL.1 * band);
+        let count = (FILTER_END / (PI * width)) as usize + 1;
+        let mut response: Vec<f64> = (0..count)
+            .map(|i| {
+                let t = i as f64;
+                let decay = PI * width * t;
+                let sinc =
+                    if i == 0 { 2.0 * middle } else { libm::sin(2.0 * PI * middle * t) / (PI * t) };
+                sinc * libm::exp(-decay * decay)
+            })
+            .collect();
+        let sum =
+            response.iter().skip(1).fold(response[0], |sum, value| 2.0_f64.mul_add(*value, sum));
+        for value in &mut response {
+            *value /= sum;
         }
-        out[i] -= sum;
+        Self { response }
+    }
+
+    /// Samples that it looks at on either side.
+    pub(super) fn reach(&self) -> usize {
+        self.response.len() - 1
+    }
+
+    /// `values` filtered, into `out`. Before the first there is nothing; the last, whose
+    /// surroundings are not known, are as they are.
+    pub(super) fn apply(&self, values: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(values);
+        for i in 0..values.len().saturating_sub(self.reach()) {
+            let mut sum = self.response[0] * values[i];
+            for (j, &factor) in self.response.iter().enumerate().skip(1) {
+                let before = if j <= i { values[i - j] } else { 0.0 };
+                sum = factor.mul_add(before + values[i + j], sum);
+            }
+            out[i] = sum;
+        }
     }
 }
 
@@ -154,14 +180,26 @@ mod tests {
     }
 
     #[test]
-    fn the_low_pass_takes_one_frequency_and_leaves_the_low_ones() {
-        for (samples_per_period, gain) in [(10.0, 0.0), (20.0, 0.9375), (100.0, 1.0)] {
-            let wave = |i: usize| libm::cos(2.0 * PI * i as f64 / samples_per_period);
-            let values: Vec<f64> = (0..100).map(wave).collect();
-            let mut out = vec![0.0; 100];
-            low_pass(&values, 5, &mut out);
-            for i in 20..80 {
-                assert!((out[i] - gain * values[i]).abs() < 1e-6, "{samples_per_period}, {i}");
+    fn the_low_pass_takes_high_frequencies_and_leaves_the_low_ones() {
+        let filter = LowPass::new(0.1);
+        let count = 3 * filter.reach();
+        for (frequency, gain, tolerance) in [
+            (0.0, 1.0, 1e-12),
+            (0.01, 1.0, 2e-4),
+            (0.084, 0.5, 1e-3),
+            (0.15, 0.0, 1e-3),
+            (0.3, 0.0, 2e-4),
+        ] {
+            let wave = |i: usize| libm::cos(2.0 * PI * frequency * i as f64);
+            let values: Vec<f64> = (0..count).map(wave).collect();
+            let mut out = vec![0.0; count];
+            filter.apply(&values, &mut out);
+            for i in filter.reach()..count - filter.reach() {
+                assert!(
+                    (out[i] - gain * values[i]).abs() < tolerance,
+                    "{frequency}, {i}: {}",
+                    out[i]
+                );
             }
         }
     }

@@ -2,6 +2,7 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
 use super::*;
+use crate::hybrid::scope::Scope;
 use crate::hybrid::stepping::{State, stability_limit};
 use crate::lanes::LANES;
 
@@ -20,7 +21,7 @@ fn setup() -> Setup {
 }
 
 fn mesh() -> Mesh {
-    Mesh::with_sizes(&setup(), 4500.0, 6, [0.7e-3, 0.9e-3, 0.8e-3])
+    Mesh::with_sizes(&setup(), &Scope::whole(&setup(), 4500.0), 6, [0.7e-3, 0.9e-3, 0.8e-3])
 }
 
 fn wavenumbers() -> Lanes {

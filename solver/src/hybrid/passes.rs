@@ -1,0 +1,301 @@
+//! One bone in passes, each finer than the one before, until the picked times stand still.
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::outcome::FailureKind;
+
+use super::incident::Incident;
+use super::march::{Limit, March, Memory, Receiver};
+use super::operator::Operator;
+use super::plan::{Plan, SAMPLES_BEYOND, Times};
+use super::samples::{LowPass, Samples};
+use super::scope::{Scope, Span};
+use crate::isa::Isa;
+use crate::picking::{FLOOR, Pick, Window, pick};
+use crate::solver::not_finite;
+use crate::{Arrival, Failure};
+
+/// How fine the first pass is, over what the setup says.
+const FIRST: f64 = 0.65;
+/// A plate thinner than this many metres at 1 Hz (m·Hz) starts finer, by the root of how much
+/// thinner it is: its first extremum lies closer to the wave of the kink.
+const THIN_PLATE: f64 = 2000.0;
+/// Most that a thin plate starts finer.
+const THIN_PLATE_MAX: f64 = 1.5;
+/// How much finer every pass is than the one before.
+const FINER: f64 = 1.55;
+/// Most passes.
+const PASSES_MAX: usize = 4;
+/// Passes without a velocity after which there is none: coarse ones can miss a weak arrival.
+const FAILURES_MAX: usize = 3;
+/// After the first, passes look this many periods of the centre frequency beyond the picked
+/// extremum: what the picking rule compares it with, and a little more.
+const PACKET_PERIODS: f64 = 1.25;
+/// Estimated relative error of the velocity at which passes end, at refinement 1.
+const SMALL_ERROR: f64 = 4e-5;
+/// Change of the mean of all times, in periods of the centre frequency, at which passes end. That
+/// all times shift alike is the error of the elements, which falls fast; that they scatter is the
+/// kink's, and part of the estimated error.
+const SMALL_SHIFT: f64 = 2.5e-3;
+
+/// A bone on its way through the passes.
+pub(super) struct Passes<'a> {
+    pub(super) setup: &'a Setup,
+    /// Of the receivers from the source, m.
+    pub(super) distances: &'a [f64],
+    pub(super) isa: Isa,
+    pub(super) bone: &'a Bone,
+    /// All that comes before the direct wave.
+    pub(super) whole: Scope,
+    pub(super) memory: &'a mut Memory,
+    pub(super) windows: &'a mut Vec<Window>,
+    /// Time step over the stability limit, once it is known.
+    pub(super) share: Option<f64>,
+}
+
+/// What a pass found.
+struct Found {
+    pick: Pick,
+    /// Extrema below these are noise, Pa per Pa of the pulse's amplitude; one per receiver.
+    floors: Vec<f64>,
+}
+
+impl Passes<'_> {
+    /// The first arrival.
+    ///
+    /// # Errors
+    /// A typed failure when the case has no velocity in three passes, or what has to be computed is
+    /// above its bounds.
+    pub(super) fn arrival(&mut self) -> Result<Arrival, Failure> {
+        let mut finer = self.first();
+        let mut last = self.pass(finer, None);
+        let mut estimate = 1.0;
+        for passes in 1..PASSES_MAX {
+            if last.as_ref().is_err_and(is_final) {
+                break;
+            }
+            finer *= FINER;
+            let mut next = self.pass(finer, last.as_ref().ok());
+            if last.is_ok() && next.as_ref().is_err_and(|failure| !is_final(failure)) {
+                // What is picked now may lie behind the packet that was looked at.
+                next = self.pass(finer, None);
+            }
+            match (&last, &next) {
+                // Finer than the bounds of the computation allow.
+                (Ok(_), Err(failure)) if is_final(failure) => break,
+                (Ok(before), Ok(after)) => {
+                    let change = Change::new(&before.pick, &after.pick);
+                    estimate = self.estimate(&change, &after.pick);
+                    last = next;
+                    let refinement = self.setup.solver.refinement;
+                    let periods = self.setup.probe.center_frequency * change.shift;
+                    if refinement * estimate <= SMALL_ERROR && refinement * periods <= SMALL_SHIFT {
+                        break;
+                    }
+                }
+                (Err(_), Err(_)) if passes + 1 == FAILURES_MAX => {
+                    last = next;
+                    break;
+                }
+                _ => last = next,
+            }
+        }
+        last.map(|Found { pick, .. }| Arrival {
+            velocity: pick.velocity,
+            times: pick.times,
+            estimated_error: estimate,
+        })
+    }
+
+    /// How fine the first pass is.
+    fn first(&self) -> f64 {
+        let setup = self.setup;
+        let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
+        let thin = (THIN_PLATE / thickness).sqrt().clamp(1.0, THIN_PLATE_MAX);
+        FIRST * thin * setup.solver.refinement.sqrt()
+    }
+
+    /// The relative error of the velocity: its change, and what the scatter of the times would make
+    /// of it at the end of the array.
+    fn estimate(&self, change: &Change, pick: &Pick) -> f64 {
+        let count = self.distances.len() as f64;
+        let mean = self.distances.iter().fold(0.0, |sum, x| sum + x) / count;
+        let (mut square, mut largest) = (0.0_f64, 0.0_f64);
+        for x in self.distances {
+            square = (x - mean).mul_add(x - mean, square);
+            largest = largest.max((x - mean).abs());
+        }
+        change.velocity + pick.velocity * change.scatter * largest / square
+    }
+
+    /// Computes the bone `finer` times as fine as the setup says: the packet that was found
+    /// `before`, or everything.
+    fn pass(&mut self, finer: f64, before: Option<&Found>) -> Result<Found, Failure> {
+        let after = PACKET_PERIODS / self.setup.probe.center_frequency;
+        let scope = match before {
+            Some(found) => self.whole.until(&found.pick.times, after),
+            None => self.whole.clone(),
+        };
+        let times = self.march(finer, &scope)?;
+        self.pick(&scope, times, before)
+    }
+
+    /// Computes the pressures at the receivers.
+    fn march(&mut self, finer: f64, scope: &Scope) -> Result<Times, Failure> {
+        let setup = self.setup;
+        let plan = Plan::new(setup, self.bone, scope, finer)?;
+        let operator = Operator::new(setup, self.bone, &plan.mesh);
+        let limit = self.isa.run(Limit {
+            operator: &operator,
+            wavenumber: plan.wavenumber_limit,
+            state: &mut self.memory.state,
+        });
+        let times = plan.times(setup, self.onset(), limit, self.share(limit)?)?;
+        let filter = LowPass::new(plan.band * times.sample());
+        let receivers: Vec<Receiver> =
+            scope.windows.iter().map(|span| self.receiver(span, times, filter.reach())).collect();
+        let mut incident = Incident::new(setup, scope, times.sample());
+        let finite = self.isa.run(March {
+            operator: &operator,
+            plan: &plan,
+            times,
+            incident: &mut incident,
+            receivers: &receivers,
+            height: setup.probe.receivers.x3,
+            memory: self.memory,
+        });
+        if !finite {
+            return Err(not_finite("the pressure"));
+        }
+        let Memory { pressures, row, .. } = &mut *self.memory;
+        for values in pressures.chunks_exact_mut(times.samples) {
+            row.clear();
+            row.extend_from_slice(values);
+            filter.apply(row, values);
+        }
+        Ok(times)
+    }
+
+    /// The time step over the stability limit: of the first pass, `limit` (s), what the setup asks
+    /// for; of all others the same.
+    ///
+    /// # Errors
+    /// `NoConvergence` when the setup's step is above the limit.
+    fn share(&mut self, limit: f64) -> Result<f64, Failure> {
+        if let Some(share) = self.share {
+            return Ok(share);
+        }
+        let share = match self.setup.solver.time_step {
+            None => 1.0,
+            Some(step) => {
+                let allowed = limit * self.first();
+                if step > allowed {
+                    return Err(Failure {
+                        kind: FailureKind::NoConvergence,
+                        detail: format!(
+                            "the time step of {step:e} s is above this bone's stability limit of \
+                             {allowed:e} s; give a smaller solver.time_step, or none"
+                        ),
+                    });
+                }
+                step / allowed
+            }
+        };
+        self.share = Some(share);
+        Ok(share)
+    }
+
+    /// When the source's wave reaches the bone, s: the computation begins.
+    fn onset(&self) -> f64 {
+        self.setup.probe.source.x3 / self.setup.layers.coupling.sound_speed
+    }
+
+    /// The samples that a window needs under a filter of some `reach`.
+    fn receiver(&self, span: &Span, times: Times, reach: usize) -> Receiver {
+        let margin = SAMPLES_BEYOND + reach;
+        let sample = |t: f64| ((t - self.onset()) / times.sample()).max(0.0) as usize;
+        Receiver {
+            distance: span.distance,
+            first: sample(span.from).saturating_sub(margin),
+            last: (sample(span.to) + margin).min(times.samples - 1),
+        }
+    }
+
+    /// Picks the first arrival in what was computed.
+    fn pick(
+        &mut self,
+        scope: &Scope,
+        times: Times,
+        before: Option<&Found>,
+    ) -> Result<Found, Failure> {
+        let onset = self.onset();
+        self.windows.resize_with(scope.windows.len(), Window::default);
+        let rows = self.memory.pressures.chunks_exact(times.samples);
+        let mut floors = Vec::with_capacity(scope.windows.len());
+        let spans = scope.windows.iter().enumerate();
+        for ((window, values), (r, span)) in self.windows.iter_mut().zip(rows).zip(spans) {
+            let samples = Samples { start: onset, step: times.sample(), values };
+            samples.extrema(span.from, span.to, &mut window.extrema);
+            if let Some(found) = before {
+                window.extrema.retain(|e| e.pressure.abs() >= found.floors[r]);
+                floors.push(found.floors[r]);
+            } else {
+                window.last = samples.at(span.to).abs();
+                window.drop_noise();
+                let largest =
+                    window.extrema.iter().fold(0.0, |max: f64, e| max.max(e.pressure.abs()));
+                floors.push(FLOOR * largest);
+            }
+        }
+        let fc = self.setup.probe.center_frequency;
+        let pick = pick(&self.setup.picking, fc, self.distances, self.windows)?;
+        Ok(Found { pick, floors })
+    }
+}
+
+/// Whether a finer pass could do nothing about the failure.
+fn is_final(failure: &Failure) -> bool {
+    matches!(failure.kind, FailureKind::NoConvergence | FailureKind::NotFinite)
+}
+
+/// What one more pass changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Change {
+    /// Of the velocity, relative.
+    velocity: f64,
+    /// Of the mean of the times, s.
+    shift: f64,
+    /// The largest of a time against the mean, s.
+    scatter: f64,
+}
+
+impl Change {
+    fn new(before: &Pick, after: &Pick) -> Self {
+        let changes = || before.times.iter().zip(&after.times).map(|(a, b)| b - a);
+        let shift = changes().fold(0.0, |sum, change| sum + change) / after.times.len() as f64;
+        Self {
+            velocity: (before.velocity / after.velocity - 1.0).abs(),
+            shift: shift.abs(),
+            scatter: changes().fold(0.0, |max: f64, change| max.max((change - shift).abs())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shift_of_all_times_is_told_from_their_scatter() {
+        let pick = |velocity, times: [f64; 3]| Pick {
+            velocity,
+            times: times.to_vec(),
+            ratio: 1.0,
+            residual: 0.0,
+        };
+        let change = Change::new(&pick(4004.0, [1.0, 2.0, 3.0]), &pick(4000.0, [1.5, 2.5, 3.5]));
+        assert!((change.velocity - 1e-3).abs() < 1e-12);
+        assert_eq!((change.shift, change.scatter), (0.5, 0.0));
+        let change = Change::new(&pick(4000.0, [1.0, 2.0, 3.0]), &pick(4000.0, [1.0, 2.0, 3.75]));
+        assert_eq!((change.velocity, change.shift, change.scatter), (0.0, 0.25, 0.5));
+    }
+}

@@ -1,0 +1,60 @@
+//! What is looked at: a window of time at every receiver.
+
+use osteon_common::case::Setup;
+use osteon_common::sampling::{self, direct_arrival, earliest_arrival};
+
+/// The windows of all receivers, for a bone of waves up to a speed along x1.
+#[derive(Debug, Clone)]
+pub(super) struct Scope {
+    /// No wave along the bone is faster, m/s.
+    pub(super) speed: f64,
+    /// One per receiver.
+    pub(super) windows: Vec<Span>,
+}
+
+/// The window of one receiver.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Span {
+    /// Distance from the source along x1, m.
+    pub(super) distance: f64,
+    /// No wave through the bone is earlier, s.
+    pub(super) from: f64,
+    /// Nothing is looked at from this time on, s; not after the direct wave.
+    pub(super) to: f64,
+}
+
+impl Scope {
+    /// All before the direct wave.
+    pub(super) fn whole(setup: &Setup, speed: f64) -> Self {
+        let span = |x| Span {
+            distance: x,
+            from: earliest_arrival(setup, x, speed),
+            to: direct_arrival(setup, x),
+        };
+        Self { speed, windows: sampling::distances(setup).map(span).collect() }
+    }
+
+    /// Nothing later than `after` (s) from each of `times` (s), one per receiver.
+    pub(super) fn until(&self, times: &[f64], after: f64) -> Self {
+        let windows = self.windows.iter().zip(times);
+        let windows =
+            windows.map(|(span, time)| Span { to: span.to.min(time + after), ..*span }).collect();
+        Self { windows, ..*self }
+    }
+
+    /// End of the last window, s.
+    pub(super) fn end(&self) -> f64 {
+        self.windows.iter().fold(0.0, |end: f64, span| end.max(span.to))
+    }
+
+    /// Longest time, s, for which a window stays open after a wave without detours.
+    pub(super) fn longest(&self) -> f64 {
+        self.windows.iter().fold(0.0, |time: f64, span| time.max(span.to - span.from))
+    }
+
+    /// Longest time, s, that a wave can spend on its way across layers and still be heard.
+    pub(super) fn across(&self) -> f64 {
+        let spent = |span: &Span| span.to - span.distance / self.speed;
+        self.windows.iter().map(spent).fold(0.0, f64::max)
+    }
+}
