@@ -76,7 +76,8 @@ pub struct SolverSettings {
     /// Polynomial degree of the hybrid method's elements, 2 to 12. The default under any other
     /// method.
     pub element_order: u32,
-    /// The hybrid method's time step at refinement 1, s, above 0; `None`: chosen from the stability limit. `None`
+    /// Time step of the hybrid method's first pass at refinement 1, s, above 0; `None`: chosen from the
+    /// stability limit. `None`
     /// under any other method.
     pub time_step: Option<f64>,
 }
