@@ -25,12 +25,11 @@ use std::f64::consts::PI;
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 
-use thinning::smooth_step;
-pub use thinning::{RUN, Run};
+pub use thinning::{RUN, Run, smooth_step};
 
 /// Ratio of neighbouring speeds on the ladder.
 const RUNG_RATIO: f64 = 1.05;
-/// Rungs of the ladder: its last speed is 280 times the first.
+/// Rungs of the ladder: its last speed is 270 times the first.
 pub const RUNGS: usize = 116;
 /// Speed, m/s, at which a setup's sampling is sized before any bone is known: the usual bound of
 /// speeds in cortical bone.
@@ -358,7 +357,7 @@ fn first_rung(setup: &Setup) -> f64 {
 }
 
 /// √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at `v`.
-fn slowness(c: f64, v: f64) -> f64 {
+pub fn slowness(c: f64, v: f64) -> f64 {
     (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
 }
 

@@ -77,8 +77,7 @@ pub struct SolverSettings {
     /// method.
     pub element_order: u32,
     /// Time step of the hybrid method's first pass at refinement 1, s, above 0; `None`: chosen from the
-    /// stability limit. `None`
-    /// under any other method.
+    /// stability limit. `None` under any other method.
     pub time_step: Option<f64>,
 }
 

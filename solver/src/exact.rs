@@ -85,8 +85,8 @@ impl Exact {
         bone: &Bone,
         workspace: &mut ExactWorkspace,
     ) -> Result<Arrival, Failure> {
-        let (medium, speed) = self.filled(bone, false, workspace)?;
-        let mut sight = Sight { exact: self, bone, medium: &medium, speed, workspace };
+        let (medium, speed) = self.solid(bone)?;
+        let mut sight = Sight { exact: self, medium: &medium, speed, workspace };
         let estimated = match sampling::first_grade(&self.setup) {
             Grade::Quick => sight.quick()?,
             Grade::Thorough => sight.thorough()?,
@@ -94,25 +94,21 @@ impl Exact {
         Ok(estimated.into())
     }
 
-    /// Fills the plate that is asked for; returns its solid and the bound of every wave's speed, m/s.
-    fn filled(
-        &self,
-        bone: &Bone,
-        accurate: bool,
-        workspace: &mut ExactWorkspace,
-    ) -> Result<(Medium, f64), Failure> {
-        let thickness = self.setup.layers.bone_thickness;
-        let medium = if accurate {
-            self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.accurate })
-        } else {
-            self.isa.run(FillPlate { bone, thickness, plate: &mut workspace.fast })
-        };
+    /// The solid of a bone, and the bound of every wave's speed, m/s.
+    fn solid(&self, bone: &Bone) -> Result<(Medium, f64), Failure> {
+        let medium = self.isa.run(Solid(bone));
         let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
             return Err(not_finite("the bone's wave speeds"));
         }
         check_direct_wave(&self.setup, speed)?;
         Ok((medium, speed))
+    }
+
+    /// Makes `plate` the one of `medium`.
+    fn fill_plate<const TERMS: usize>(&self, medium: &Medium, plate: &mut Plate<TERMS>) {
+        let thickness = self.setup.layers.bone_thickness;
+        self.isa.run(FillPlate { medium, thickness, plate });
     }
 
     fn rung(&self, speed: f64, grade: Grade) -> Result<&Rung, Failure> {
@@ -209,10 +205,9 @@ fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// One bone, its fast plate filled, about to be looked at.
+/// One bone, about to be looked at.
 struct Sight<'a> {
     exact: &'a Exact,
-    bone: &'a Bone,
     medium: &'a Medium,
     /// Bound of every wave's speed, m/s.
     speed: f64,
@@ -224,6 +219,7 @@ impl Sight<'_> {
     fn quick(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         let rung = exact.rung(self.speed, Grade::Quick)?;
+        exact.fill_plate(self.medium, &mut self.workspace.fast);
         self.workspace.spectra.clear(&rung.tables);
         self.fill(rung, 0, rung.first.lines);
         let mut found = self.look(rung, &rung.first);
@@ -244,12 +240,10 @@ impl Sight<'_> {
     /// One look, and a good one.
     fn thorough(&mut self) -> Result<Estimated, Failure> {
         let rung = self.exact.rung(self.speed, Grade::Thorough)?;
-        let isa = self.exact.isa;
-        let thickness = self.exact.setup.layers.bone_thickness;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
-        isa.run(FillPlate { bone: self.bone, thickness, plate: accurate });
+        self.exact.fill_plate(self.medium, accurate);
         spectra.clear(&rung.tables);
-        spectra.fill(isa, &rung.tables, self.medium, accurate, 0..rung.whole.lines);
+        spectra.fill(self.exact.isa, &rung.tables, self.medium, accurate, 0..rung.whole.lines);
         self.look(rung, &rung.whole)
     }
 
@@ -260,26 +254,36 @@ impl Sight<'_> {
     }
 
     fn look(&mut self, rung: &Rung, look: &Look) -> Result<Estimated, Failure> {
-        let Exact { setup, distances, isa, .. } = self.exact;
-        look::look(setup, distances, *isa, self.speed, rung, look, self.workspace)
+        self.exact.observe(self.speed, rung, look, self.workspace)?;
+        self.exact.picked(rung, look, self.workspace)
+    }
+}
+
+/// Turns a tensor into the system's coefficients.
+pub(crate) struct Solid<'a>(pub(crate) &'a Bone);
+
+impl Kernel for Solid<'_> {
+    type Output = Medium;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Medium {
+        Medium::new(self.0)
     }
 }
 
 /// Computes what a plate's admittances have in common.
 pub(crate) struct FillPlate<'a, const TERMS: usize> {
-    pub(crate) bone: &'a Bone,
+    pub(crate) medium: &'a Medium,
     pub(crate) thickness: f64,
     pub(crate) plate: &'a mut Plate<TERMS>,
 }
 
 impl<const TERMS: usize> Kernel for FillPlate<'_, TERMS> {
-    type Output = Medium;
+    type Output = ();
 
     #[inline(always)]
-    fn run<V: Vector>(self) -> Medium {
-        let medium = Medium::new(self.bone);
-        self.plate.fill::<V>(&medium, self.thickness);
-        medium
+    fn run<V: Vector>(self) {
+        self.plate.fill::<V>(self.medium, self.thickness);
     }
 }
 

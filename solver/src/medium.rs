@@ -32,8 +32,6 @@ pub(crate) struct Medium {
     pub(crate) membrane: Matrix3,
     /// Bound of every wave's speed along x1 in the solid, m/s: √(λmax(A11)/ρ).
     pub(crate) fastest: f64,
-    /// Bound of |λ|² · stiffness / |σ| at k = 0.
-    pub(crate) dynamic_growth: f64,
 }
 
 impl Medium {
@@ -59,16 +57,12 @@ impl Medium {
         }
         symmetrize(&mut membrane);
         let fastest = (largest_eigenvalue(&a11) * stiffness / bone.density).sqrt();
-        let dynamic_growth = largest_eigenvalue(&compliance);
-        Self {
-            density: bone.density,
-            stiffness,
-            compliance,
-            coupling,
-            membrane,
-            fastest,
-            dynamic_growth,
-        }
+        Self { density: bone.density, stiffness, compliance, coupling, membrane, fastest }
+    }
+
+    /// Speed of the slowest wave straight across, m/s.
+    pub(crate) fn slowest_across(&self) -> f64 {
+        (self.stiffness / (largest_eigenvalue(&self.compliance) * self.density)).sqrt()
     }
 }
 

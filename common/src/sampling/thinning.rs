@@ -74,7 +74,7 @@ impl Sampling {
 }
 
 /// 0 up to x = 0, 1 from x = 1 on, infinitely smooth.
-pub(super) fn smooth_step(x: f64) -> f64 {
+pub fn smooth_step(x: f64) -> f64 {
     if x <= 0.0 {
         0.0
     } else if x >= 1.0 {

@@ -5,18 +5,19 @@ use osteon_common::case::Setup;
 use osteon_common::sampling::{self, Sampling, velocity_taper};
 
 use crate::Failure;
+use crate::exact::Exact;
 use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::response::Spectra;
 use crate::exact::signal::{Grid, Signal, Slopes};
 use crate::exact::tables::Tables;
-use crate::isa::{Isa, Kernel};
+use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
 use crate::solver::not_finite;
 use crate::vector::Vector;
 
 /// The tapers that the estimate of the error compares with: start and end over the band. Sharper and
-/// otherser ones, since the error is what the smooth taper takes off the pulse's kink.
+/// narrower ones, since the error is what the smooth taper takes off the pulse's kink.
 const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.2, 1.0),
     (0.3, 0.7),
@@ -103,68 +104,50 @@ impl Look {
     }
 }
 
-/// Picks the first arrival from the spectra in the workspace.
-///
-/// # Errors
-/// When a number is not finite, or there is no acceptable pick.
-pub(crate) fn look(
-    setup: &Setup,
-    distances: &[f64],
-    isa: Isa,
-    speed: f64,
-    rung: &Rung,
-    look: &Look,
-    workspace: &mut ExactWorkspace,
-) -> Result<Estimated, Failure> {
-    observe(setup, distances, isa, speed, rung, look, workspace)?;
-    picked(setup, distances, isa, rung, look, workspace)
-}
-
-/// Lists, in the workspace, the extrema of the signals of its spectra.
-///
-/// # Errors
-/// When a number is not finite.
-pub(crate) fn observe(
-    setup: &Setup,
-    distances: &[f64],
-    isa: Isa,
-    speed: f64,
-    rung: &Rung,
-    look: &Look,
-    workspace: &mut ExactWorkspace,
-) -> Result<(), Failure> {
-    if !workspace.spectra.is_finite() {
-        return Err(not_finite("the pressure"));
+impl Exact {
+    /// Lists, in the workspace, the extrema of the signals of its spectra.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub(super) fn observe(
+        &self,
+        speed: f64,
+        rung: &Rung,
+        look: &Look,
+        workspace: &mut ExactWorkspace,
+    ) -> Result<(), Failure> {
+        if !workspace.spectra.is_finite() {
+            return Err(not_finite("the pressure"));
+        }
+        let Self { setup, distances, isa, .. } = self;
+        isa.run(Observe { setup, distances, rung, look, speed, workspace });
+        Ok(())
     }
-    isa.run(Observe { setup, distances, rung, look, speed, workspace });
-    Ok(())
-}
 
-/// Picks one of the extrema in the workspace, and estimates its error.
-///
-/// # Errors
-/// When there is no acceptable pick.
-pub(crate) fn picked(
-    setup: &Setup,
-    distances: &[f64],
-    isa: Isa,
-    rung: &Rung,
-    look: &Look,
-    workspace: &ExactWorkspace,
-) -> Result<Estimated, Failure> {
-    let fc = setup.probe.center_frequency;
-    let pick = pick(&setup.picking, fc, distances, &workspace.windows)?;
-    let moved = isa.run(Repick { rung, look, times: &pick.times, workspace });
-    let mut square = 0.0;
-    for taper in 0..LANES {
-        let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
-        let change = picking::slope(distances, &times) / pick.velocity - 1.0;
-        square = change.mul_add(change, square);
+    /// Picks one of the extrema in the workspace, and estimates its error.
+    ///
+    /// # Errors
+    /// When there is no acceptable pick.
+    pub(super) fn picked(
+        &self,
+        rung: &Rung,
+        look: &Look,
+        workspace: &ExactWorkspace,
+    ) -> Result<Estimated, Failure> {
+        let fc = self.setup.probe.center_frequency;
+        let pick = pick(&self.setup.picking, fc, &self.distances, &workspace.windows)?;
+        let moved = self.isa.run(Repick { rung, look, times: &pick.times, workspace });
+        let mut square = 0.0;
+        for taper in 0..LANES {
+            let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
+            let change = picking::slope(&self.distances, &times) / pick.velocity - 1.0;
+            square = change.mul_add(change, square);
+        }
+        let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
+        // A signal that changes past recognition makes the largest error, not a failure.
+        let error = if error <= 1.0 { error } else { 1.0 };
+        Ok(Estimated { pick, error })
     }
-    let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
-    // A signal that changes past recognition makes the largest error, not a failure.
-    let error = if error <= 1.0 { error } else { 1.0 };
-    Ok(Estimated { pick, error })
 }
 
 /// Lists the extrema of the pressure at every receiver.

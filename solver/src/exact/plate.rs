@@ -37,11 +37,11 @@ pub(crate) struct Plate<const TERMS: usize> {
     prepared: Option<Prepared>,
 }
 
-/// The plate that velocities are computed with: 1/Y is right to 2e-7, in the mean, with an error as
+/// The plate of quick looks: the remainder of its series is 3e-7 of the leading terms, an error as
 /// smooth as a slightly different solid's, which a velocity does not notice.
 pub(crate) type FastPlate = Plate<8>;
 
-/// The plate of single admittances, right to 1e-13.
+/// The plate of thorough looks, traces and single admittances: right to 1e-13.
 pub(crate) type AccuratePlate = Plate<11>;
 
 impl Default for FastPlate {
@@ -188,10 +188,10 @@ impl<V: Vector> Layer<V> {
     #[inline(always)]
     fn doubled(&self) -> Self {
         let factor = Factor::new(&self.joint());
-        let down = factor.forward(&self.down);
+        let down = factor.lower.forward(&self.down);
         let scaled = factor.scaled(&down);
         let new_down = gram(&scaled, &down);
-        let up = factor.forward(&self.up);
+        let up = factor.lower.forward(&self.up);
         let a = &self.top;
         let top = [
             dot_from(a[0], scaled[0], up[0]),
@@ -240,7 +240,7 @@ impl<V: Vector> Layer<V> {
     fn eliminated(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
         let lu = Lu::new(pivot);
         let last = lu.last_pivot.recip();
-        let right = lu.forward(&self.up);
+        let right = lu.lower.forward(&self.up);
         let d = &self.down;
         let first = lu.divided([d[0], d[1], d[2]], last);
         let a = dot_from(target[0], first, right[0]);
@@ -287,28 +287,14 @@ fn gram<V: Vector>(a: &[[ComplexVector<V>; 3]; 3], b: &[[ComplexVector<V>; 3]; 3
     ]
 }
 
-/// L D Lᵀ of a complex symmetric 3×3 matrix.
-struct Factor<V> {
+/// L: ones on the diagonal, these below it.
+struct Lower<V> {
     l10: ComplexVector<V>,
     l20: ComplexVector<V>,
     l21: ComplexVector<V>,
-    /// Inverses of the pivots.
-    inverse: [ComplexVector<V>; 3],
 }
 
-impl<V: Vector> Factor<V> {
-    #[inline(always)]
-    fn new(s: &Symmetric<V>) -> Self {
-        let first = s[0].recip();
-        let l10 = s[1].mul(first);
-        let l20 = s[2].mul(first);
-        let second = l10.mul_sub_from(s[1], s[3]).recip();
-        let below = l20.mul_sub_from(s[1], s[4]);
-        let l21 = below.mul(second);
-        let third = l21.mul_sub_from(below, l20.mul_sub_from(s[2], s[5])).recip();
-        Self { l10, l20, l21, inverse: [first, second, third] }
-    }
-
+impl<V: Vector> Lower<V> {
     /// The columns of L⁻¹ b.
     #[inline(always)]
     fn forward(&self, b: &Symmetric<V>) -> [[ComplexVector<V>; 3]; 3] {
@@ -328,6 +314,27 @@ impl<V: Vector> Factor<V> {
     ) -> [ComplexVector<V>; 3] {
         let second = self.l10.mul_sub_from(x, y);
         [x, second, self.l21.mul_sub_from(second, self.l20.mul_sub_from(x, z))]
+    }
+}
+
+/// L D Lᵀ of a complex symmetric 3×3 matrix.
+struct Factor<V> {
+    lower: Lower<V>,
+    /// Inverses of the pivots.
+    inverse: [ComplexVector<V>; 3],
+}
+
+impl<V: Vector> Factor<V> {
+    #[inline(always)]
+    fn new(s: &Symmetric<V>) -> Self {
+        let first = s[0].recip();
+        let l10 = s[1].mul(first);
+        let l20 = s[2].mul(first);
+        let second = l10.mul_sub_from(s[1], s[3]).recip();
+        let below = l20.mul_sub_from(s[1], s[4]);
+        let l21 = below.mul(second);
+        let third = l21.mul_sub_from(below, l20.mul_sub_from(s[2], s[5])).recip();
+        Self { lower: Lower { l10, l20, l21 }, inverse: [first, second, third] }
     }
 
     /// The columns of D⁻¹ b.
@@ -345,18 +352,17 @@ impl<V: Vector> Factor<V> {
 /// Inverse of a complex symmetric 3×3 matrix: L⁻ᵀ D⁻¹ L⁻¹.
 #[inline(always)]
 fn inverse<V: Vector>(s: &Symmetric<V>) -> Symmetric<V> {
-    let f = Factor::new(s);
+    let Factor { lower: Lower { l10, l20, l21 }, inverse: [d0, d1, d2] } = Factor::new(s);
     // L⁻¹ = [1; -l10 1; m20 -l21 1]
-    let m20 = f.l10.mul_add(f.l21, f.l20.neg());
-    let [d0, d1, d2] = f.inverse;
+    let m20 = l10.mul_add(l21, l20.neg());
     let m20_d2 = m20.mul(d2);
-    let l21_d2 = f.l21.mul(d2);
-    let l10_d1 = f.l10.mul(d1);
+    let l21_d2 = l21.mul(d2);
+    let l10_d1 = l10.mul(d1);
     [
-        m20_d2.mul_add(m20, l10_d1.mul_add(f.l10, d0)),
-        m20_d2.mul_add(f.l21, l10_d1).neg(),
+        m20_d2.mul_add(m20, l10_d1.mul_add(l10, d0)),
+        m20_d2.mul_add(l21, l10_d1).neg(),
         m20_d2,
-        l21_d2.mul_add(f.l21, d1),
+        l21_d2.mul_add(l21, d1),
         l21_d2.neg(),
         d2,
     ]
@@ -364,9 +370,7 @@ fn inverse<V: Vector>(s: &Symmetric<V>) -> Symmetric<V> {
 
 /// LU of a general complex 3×3 matrix without pivoting.
 struct Lu<V> {
-    l10: ComplexVector<V>,
-    l20: ComplexVector<V>,
-    l21: ComplexVector<V>,
+    lower: Lower<V>,
     u01: ComplexVector<V>,
     u02: ComplexVector<V>,
     u12: ComplexVector<V>,
@@ -384,28 +388,8 @@ impl<V: Vector> Lu<V> {
         let u12 = l10.mul_sub_from(a[2], a[5]);
         let l21 = l20.mul_sub_from(a[1], a[7]).mul(second);
         let last_pivot = l21.mul_sub_from(u12, l20.mul_sub_from(a[2], a[8]));
-        Self { l10, l20, l21, u01: a[1], u02: a[2], u12, inverse: [first, second], last_pivot }
-    }
-
-    /// The columns of L⁻¹ b.
-    #[inline(always)]
-    fn forward(&self, b: &Symmetric<V>) -> [[ComplexVector<V>; 3]; 3] {
-        [
-            self.forward_column(b[0], b[1], b[2]),
-            self.forward_column(b[1], b[3], b[4]),
-            self.forward_column(b[2], b[4], b[5]),
-        ]
-    }
-
-    #[inline(always)]
-    fn forward_column(
-        &self,
-        x: ComplexVector<V>,
-        y: ComplexVector<V>,
-        z: ComplexVector<V>,
-    ) -> [ComplexVector<V>; 3] {
-        let second = self.l10.mul_sub_from(x, y);
-        [x, second, self.l21.mul_sub_from(second, self.l20.mul_sub_from(x, z))]
+        let lower = Lower { l10, l20, l21 };
+        Self { lower, u01: a[1], u02: a[2], u12, inverse: [first, second], last_pivot }
     }
 
     /// The row b U⁻¹; `last`: the inverse of the last pivot.

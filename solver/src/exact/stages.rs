@@ -9,7 +9,7 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::{self, Grade};
 
 use crate::exact::Exact;
-use crate::exact::look::{self, ExactWorkspace, Look, Rung};
+use crate::exact::look::{ExactWorkspace, Look, Rung};
 use crate::exact::response::respond;
 use crate::isa::Isa;
 use crate::lanes::{ComplexLanes, LANES};
@@ -72,7 +72,12 @@ impl Stages {
         let exact = &self.exact;
         let grade = sampling::first_grade(&exact.setup);
         let accurate = grade == Grade::Thorough;
-        let (medium, speed) = exact.filled(bone, accurate, &mut memory.exact)?;
+        let (medium, speed) = exact.solid(bone)?;
+        if accurate {
+            exact.fill_plate(&medium, &mut memory.exact.accurate);
+        } else {
+            exact.fill_plate(&medium, &mut memory.exact.fast);
+        }
         let rung = exact.rung(speed, grade)?;
         let look = if accurate { &rung.whole } else { &rung.first };
         Ok(Filled { exact, rung, look, accurate, medium, speed, memory })
@@ -122,8 +127,7 @@ impl<'b> Summed<'_, 'b> {
     /// When a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
         let Filled { exact, rung, look, speed, memory, .. } = &mut *self.0;
-        let Exact { setup, distances, isa, .. } = exact;
-        look::observe(setup, distances, *isa, *speed, rung, look, &mut memory.exact)?;
+        exact.observe(*speed, rung, look, &mut memory.exact)?;
         Ok(Observed(self.0))
     }
 }
@@ -135,8 +139,7 @@ impl Observed<'_, '_> {
     /// When there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
         let Filled { exact, rung, look, memory, .. } = &*self.0;
-        let Exact { setup, distances, isa, .. } = exact;
-        look::picked(setup, distances, *isa, rung, look, &memory.exact).map(Arrival::from)
+        exact.picked(rung, look, &memory.exact).map(Arrival::from)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::exact::plate::AccuratePlate;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
 use crate::exact::tables::Tables;
-use crate::exact::{FillPlate, direct};
+use crate::exact::{FillPlate, Solid, direct};
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::solver::Solver;
@@ -94,7 +94,8 @@ impl Solver {
         }
         let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
         let thickness = self.setup().layers.bone_thickness;
-        let medium = self.isa().run(FillPlate { bone, thickness, plate: &mut plate });
+        let medium = self.isa().run(Solid(bone));
+        self.isa().run(FillPlate { medium: &medium, thickness, plate: &mut plate });
         let fluids =
             self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
         let sampling = Sampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);

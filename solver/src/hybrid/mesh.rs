@@ -5,6 +5,7 @@
 //! wave: what is looked at is as if the fluid were whole.
 
 use osteon_common::case::{Bone, Setup};
+use osteon_common::sampling::slowness;
 
 use super::element::Element;
 use super::scope::Scope;
@@ -53,7 +54,7 @@ impl Mesh {
         };
         let sizes = [
             size(setup.layers.coupling.sound_speed),
-            size(slowest_across(bone)),
+            size(Medium::new(bone).slowest_across()),
             size(setup.layers.marrow.sound_speed),
         ];
         Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
@@ -85,20 +86,9 @@ impl Mesh {
     }
 }
 
-/// Speed, m/s, of the slowest wave across the layer: √(λmin(A33)/ρ).
-pub(super) fn slowest_across(bone: &Bone) -> f64 {
-    let medium = Medium::new(bone);
-    (medium.stiffness / (medium.dynamic_growth * medium.density)).sqrt()
-}
-
-/// √(1/c² - 1/v²), s/m, of waves that travel along the layer at `speed` at most.
-pub(super) fn slowness_across(sound_speed: f64, speed: f64) -> f64 {
-    (1.0 / (sound_speed * sound_speed) - 1.0 / (speed * speed)).max(0.0).sqrt()
-}
-
 /// Longest path, m, across the coupling fluid in which a wave can arrive within its window.
 pub(super) fn path_heard(setup: &Setup, scope: &Scope) -> f64 {
-    scope.across() / slowness_across(setup.layers.coupling.sound_speed, scope.speed)
+    scope.across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
 }
 
 /// Depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then up to the
@@ -112,7 +102,7 @@ fn coupling_depth(setup: &Setup, scope: &Scope) -> f64 {
 /// Depth of fluid 2 that is meshed, m; at least one element of `size`.
 fn marrow_depth(setup: &Setup, scope: &Scope, size: f64) -> f64 {
     let marrow = &setup.layers.marrow;
-    let heard = 0.5 * scope.longest() / slowness_across(marrow.sound_speed, scope.speed);
+    let heard = 0.5 * scope.longest() / slowness(marrow.sound_speed, scope.speed);
     (DEPTH_MARGIN * heard).max(size).min(marrow.thickness)
 }
 
@@ -135,7 +125,9 @@ mod tests {
 
     #[test]
     fn the_slowest_wave_across_is_the_transverse_shear_wave() {
-        assert!((slowest_across(&bone()) - (3.389e9_f64 / 1598.8).sqrt()).abs() < 0.1);
+        assert!(
+            (Medium::new(&bone()).slowest_across() - (3.389e9_f64 / 1598.8).sqrt()).abs() < 0.1
+        );
     }
 
     #[test]

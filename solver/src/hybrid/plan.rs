@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
-use osteon_common::sampling::{distances, earliest_arrival};
+use osteon_common::sampling::{distances, earliest_arrival, smooth_step};
 
 use super::mesh::Mesh;
 use super::scope::Scope;
@@ -110,15 +110,7 @@ impl Plan {
 
     /// Weight of wavenumber `k` (rad/m) in the cosine transform.
     pub(super) fn weight(&self, k: f64) -> f64 {
-        let x = (k / self.wavenumber_limit - TAPER_START) / (1.0 - TAPER_START);
-        let taper = if x <= 0.0 {
-            1.0
-        } else if x >= 1.0 {
-            0.0
-        } else {
-            let (rising, falling) = (libm::exp(-1.0 / x), libm::exp(-1.0 / (1.0 - x)));
-            falling / (rising + falling)
-        };
+        let taper = smooth_step((1.0 - k / self.wavenumber_limit) / (1.0 - TAPER_START));
         let half = if k == 0.0 { 0.5 } else { 1.0 };
         half * taper * self.wavenumber_step / PI
     }
