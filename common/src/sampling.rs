@@ -73,6 +73,10 @@ const SLOW_WAVES_END: (f64, f64) = (3.5, 4.0);
 const SLOWNESS_START: f64 = 0.8;
 /// Range of slowness over which they fade, over that of the coupling fluid.
 const SLOWNESS_FADE: f64 = 0.5;
+/// Periods of the centre frequency by which the waves at the two ends of the fading have to be apart at
+/// the nearest receiver, for frequencies to be thinned and slow waves to be left out from where they
+/// usually are; where they are less far apart, this happens higher in the band.
+const APART: f64 = 2.2;
 
 /// How much a sampling has to allow for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -229,6 +233,7 @@ impl Sampling {
             // Finer sampling is also less truncated, slowly.
             Grade::Thorough => (1.5, EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))),
         };
+        let unit = unit * crowding(setup, speed);
         let through_fluid = earliest_arrival(setup, 0.0, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
@@ -343,6 +348,25 @@ pub fn velocity_taper(band: f64) -> (f64, f64) {
 /// The taper that cuts a trace's band, given where it ends: start and end, Hz.
 pub fn trace_taper(band: f64) -> (f64, f64) {
     (TRACE_TAPER_START * band, band)
+}
+
+/// How much higher in the band than usual the first packet comes apart from slower waves, at the
+/// nearest receiver: there the signals of both, cut off sharply in one of time and slowness, would
+/// overlap.
+fn crowding(setup: &Setup, speed: f64) -> f64 {
+    let c1 = setup.layers.coupling.sound_speed;
+    let start = SLOWNESS_START * c1 / speed;
+    let end = start + SLOWNESS_FADE;
+    if end >= 1.0 {
+        return 1.0;
+    }
+    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    let nearest = distances(setup).fold(f64::INFINITY, f64::min);
+    // Slowness over that of the fluid, along and across.
+    let across = |along: f64| (1.0 - along * along).sqrt();
+    let apart = nearest * (end - start) - heights * (across(start) - across(end));
+    let periods = apart / c1 * setup.probe.center_frequency;
+    if periods > 0.0 { (APART / periods).max(1.0) } else { f64::INFINITY }
 }
 
 /// How much wider the band has to be than that of a thick plate.

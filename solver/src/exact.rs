@@ -1,10 +1,11 @@
 //! Exact layers in (frequency, wavenumber).
 //!
-//! A bone is looked at up to three times. The first look is quick and enough for most. Where its
+//! A bone is looked at up to four times. The first look is quick and enough for most. Where its
 //! estimated error is large, the band is widened. Where a doubt remains (a late or weak pick, picks
-//! off their line, no pick at all) the bone is computed again with a thorough sampling, which
-//! decides. Between doubt and none two looks are blended, so that the velocity stays a continuous
-//! function of the bone. All of this depends on the bone alone.
+//! off their line, no pick at all) the bone is computed again with a thorough sampling, and where
+//! even that one's estimated error is large, with a refined one. Between doubt and none two looks are
+//! blended, so that the velocity stays a continuous function of the bone. All of this depends on the
+//! bone alone.
 
 pub(crate) mod direct;
 pub(crate) mod growth;
@@ -39,10 +40,13 @@ use crate::vector::{ComplexVector, Scalar, Vector};
 const PAIRS_MARGIN: f64 = 8.0;
 /// Pairs whose tables one solver keeps, 30 MB; those of further rungs are made when needed.
 const KEPT_PAIRS_MAX: u64 = 600_000;
-/// Estimated errors between which the doubt whether the band is wide enough grows from none to full.
+/// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough grows
+/// from none to full.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
-/// Estimated errors between which a doubt grows.
+/// The same of any other doubt.
 const LARGE_ERROR: (f64, f64) = (1e-4, 2e-4);
+/// Refinement of the last look.
+const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency, between
 /// which a doubt grows: a quick period has little room for a late packet.
 const LATE: (f64, f64) = (0.62, 0.72);
@@ -61,21 +65,39 @@ pub(crate) struct Exact {
     setup: Setup,
     distances: Vec<f64>,
     isa: Isa,
-    /// One entry per rung of the speed ladder, made when a bone first needs it.
-    quick: [OnceLock<Option<Box<Rung>>>; RUNGS],
-    thorough: [OnceLock<Option<Box<Rung>>>; RUNGS],
+    quick: Ladder,
+    thorough: Ladder,
+    refined: Ladder,
     /// Pairs whose tables are kept.
     kept: AtomicU64,
 }
 
+/// Samplings of one kind, by speed.
+#[derive(Debug)]
+struct Ladder {
+    setup: Setup,
+    grade: Grade,
+    /// Each is made when a bone first needs it; `None` if it would be too large.
+    rungs: [OnceLock<Option<Box<Rung>>>; RUNGS],
+}
+
+impl Ladder {
+    fn new(setup: &Setup, grade: Grade) -> Self {
+        Self { setup: *setup, grade, rungs: [const { OnceLock::new() }; RUNGS] }
+    }
+}
+
 impl Exact {
     pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
+        let mut refined = *setup;
+        refined.solver.refinement *= LAST_REFINEMENT;
         Self {
             setup: *setup,
             distances: sampling::distances(setup).collect(),
             isa,
-            quick: [const { OnceLock::new() }; RUNGS],
-            thorough: [const { OnceLock::new() }; RUNGS],
+            quick: Ladder::new(setup, Grade::Quick),
+            thorough: Ladder::new(setup, Grade::Thorough),
+            refined: Ladder::new(&refined, Grade::Thorough),
             kept: AtomicU64::new(0),
         }
     }
@@ -89,7 +111,7 @@ impl Exact {
         let mut sight = Sight { exact: self, medium: &medium, speed, workspace };
         let estimated = match sampling::first_grade(&self.setup) {
             Grade::Quick => sight.quick()?,
-            Grade::Thorough => sight.thorough()?,
+            Grade::Thorough => sight.thorough(&self.thorough)?,
         };
         Ok(estimated.into())
     }
@@ -111,7 +133,8 @@ impl Exact {
         self.isa.run(FillPlate { medium, thickness, plate });
     }
 
-    fn rung(&self, speed: f64, grade: Grade) -> Result<&Rung, Failure> {
+    /// The lowest rung that is fast enough for `speed` (m/s).
+    fn rung<'a>(&self, ladder: &'a Ladder, speed: f64) -> Result<&'a Rung, Failure> {
         let too_large = || Failure {
             kind: FailureKind::NoConvergence,
             detail: format!(
@@ -120,12 +143,8 @@ impl Exact {
             ),
         };
         let index = sampling::rung(&self.setup, speed).ok_or_else(too_large)?;
-        let rungs = match grade {
-            Grade::Quick => &self.quick,
-            Grade::Thorough => &self.thorough,
-        };
-        let rung = rungs[index].get_or_init(|| {
-            let sampling = Sampling::at_rung(&self.setup, index, grade);
+        let rung = ladder.rungs[index].get_or_init(|| {
+            let sampling = Sampling::at_rung(&ladder.setup, index, ladder.grade);
             let pairs = sampling.pairs(sampling.band);
             if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
                 return None;
@@ -135,9 +154,16 @@ impl Exact {
             if !keep {
                 self.kept.fetch_sub(pairs as u64, Ordering::Relaxed);
             }
-            Some(Box::new(Rung::new(&self.setup, sampling, keep)))
+            Some(Box::new(Rung::new(&ladder.setup, sampling, keep)))
         });
         rung.as_deref().ok_or_else(too_large)
+    }
+
+    /// An estimated error as it counts against bounds that are meant for refinement 1: who asks for
+    /// less accepts more.
+    fn counted(&self, error: f64) -> f64 {
+        let refinement = self.setup.solver.refinement.min(1.0);
+        error * refinement * refinement * refinement
     }
 
     /// How much a pick is doubted, 0 to 1, continuously.
@@ -149,7 +175,7 @@ impl Exact {
             margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
         }
         let ratio = found.pick.ratio / self.setup.picking.threshold;
-        rise(found.error, LARGE_ERROR)
+        rise(self.counted(found.error), LARGE_ERROR)
             .max(rise(delay * fc, LATE))
             .max(rise(found.pick.residual * fc, OFF_LINE))
             .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))
@@ -218,12 +244,13 @@ impl Sight<'_> {
     /// As many looks as the bone needs.
     fn quick(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
-        let rung = exact.rung(self.speed, Grade::Quick)?;
+        let rung = exact.rung(&exact.quick, self.speed)?;
         exact.fill_plate(self.medium, &mut self.workspace.fast);
         self.workspace.spectra.clear(&rung.tables);
         self.fill(rung, 0, rung.first.lines);
         let mut found = self.look(rung, &rung.first);
-        let doubt = found.as_ref().map_or(1.0, |found| rise(found.error, NARROW_BAND));
+        let doubt =
+            found.as_ref().map_or(1.0, |found| rise(exact.counted(found.error), NARROW_BAND));
         if doubt > 0.0 {
             self.fill(rung, rung.first.lines, rung.whole.lines);
             let wider = self.look(rung, &rung.whole);
@@ -231,15 +258,31 @@ impl Sight<'_> {
         }
         let doubt = found.as_ref().map_or(1.0, |found| exact.doubt(found, self.speed));
         if doubt > 0.0 {
-            let thorough = self.thorough();
-            found = exact.merged(found, thorough, doubt);
+            let last = self.careful();
+            found = exact.merged(found, last, doubt);
         }
         found
     }
 
+    /// A thorough look, and a refined one if that is needed.
+    fn careful(&mut self) -> Result<Estimated, Failure> {
+        let exact = self.exact;
+        let thorough = self.thorough(&exact.thorough);
+        let doubt =
+            thorough.as_ref().map_or(0.0, |found| rise(exact.counted(found.error), LARGE_ERROR));
+        if doubt == 0.0 {
+            return thorough;
+        }
+        match self.thorough(&exact.refined) {
+            // More than may be computed: what was found stands, with its error.
+            Err(Failure { kind: FailureKind::NoConvergence, .. }) => thorough,
+            refined => exact.merged(thorough, refined, doubt),
+        }
+    }
+
     /// One look, and a good one.
-    fn thorough(&mut self) -> Result<Estimated, Failure> {
-        let rung = self.exact.rung(self.speed, Grade::Thorough)?;
+    fn thorough(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
+        let rung = self.exact.rung(ladder, self.speed)?;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
         self.exact.fill_plate(self.medium, accurate);
         spectra.clear(&rung.tables);

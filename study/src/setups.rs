@@ -311,6 +311,18 @@ mod tests {
         );
     }
 
+    /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin plate
+    /// needs the refined look: each was off by 3e-4 to 2e-3 without.
+    #[test]
+    fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
+        for index in [53, 101, 111, 149, 173, 177, 381] {
+            let drawn = drawn(1, index).unwrap().unwrap();
+            let one = Measured::of(index, drawn, Isa::fastest(), &mut Workspace::default());
+            let error = one.difference.velocity();
+            assert!(error.is_some_and(|error| error < 2e-4), "{error:?}: {}", one.described());
+        }
+    }
+
     #[test]
     fn every_case_is_in_one_class() {
         let draws = Draws { realizations: 12, seed: 1, isa: Isa::fastest() };

@@ -70,15 +70,14 @@ impl Stages {
         memory: &'a mut Memory,
     ) -> Result<Filled<'a>, Failure> {
         let exact = &self.exact;
-        let grade = sampling::first_grade(&exact.setup);
-        let accurate = grade == Grade::Thorough;
+        let accurate = sampling::first_grade(&exact.setup) == Grade::Thorough;
         let (medium, speed) = exact.solid(bone)?;
         if accurate {
             exact.fill_plate(&medium, &mut memory.exact.accurate);
         } else {
             exact.fill_plate(&medium, &mut memory.exact.fast);
         }
-        let rung = exact.rung(speed, grade)?;
+        let rung = exact.rung(if accurate { &exact.thorough } else { &exact.quick }, speed)?;
         let look = if accurate { &rung.whole } else { &rung.first };
         Ok(Filled { exact, rung, look, accurate, medium, speed, memory })
     }
