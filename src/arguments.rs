@@ -75,7 +75,7 @@ pub(crate) struct RunArguments {
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
     pub(crate) case: PathBuf,
-    /// Write the pressure traces here, as traces.csv
+    /// Write the pressure traces here, as traces.csv (by the exact method, whatever the case asks for)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON

@@ -38,8 +38,8 @@ use crate::vector::{ComplexVector, Scalar, Vector};
 
 /// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
 const PAIRS_MARGIN: f64 = 8.0;
-/// Pairs whose tables one solver keeps, 30 MB; those of further rungs are made when needed.
-const KEPT_PAIRS_MAX: u64 = 600_000;
+/// Pairs whose tables one solver keeps, 20 MB; those of further rungs are made when needed.
+const KEPT_PAIRS_MAX: u64 = 400_000;
 /// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough grows
 /// from none to full.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);

@@ -13,7 +13,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use osteon_common::case::Setup;
-use osteon_common::limits::ACTIVE_JOBS_MAX;
 use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::realization::Ensemble;
 use osteon_proto::batch::Work;
@@ -23,9 +22,9 @@ use rayon::prelude::*;
 use crate::error::{PanickedCase, WorkerError};
 use crate::state::Computed;
 
-/// Most solvers, each with its tables, that a worker keeps: batches of all active jobs come in
-/// turn, and each may have a setup of its own.
-const SOLVERS_MAX: usize = ACTIVE_JOBS_MAX;
+/// Most solvers, each with up to 20 MB of tables, that a worker keeps. Where the jobs that take turns
+/// have more setups than that, tables are made again, which is a small part of a batch's time.
+const SOLVERS_MAX: usize = 2;
 
 thread_local! {
     /// Scratch memory of one thread of the pool.
