@@ -7,10 +7,11 @@ use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
 use osteon_common::results::Status;
+use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
 
-use crate::client::{Client, Fetched};
+use crate::client::{Client, Fetched, Remote};
 use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownResult};
@@ -56,7 +57,7 @@ impl<'a> Computers<'a> {
     async fn find(place: &'a Place) -> Result<Self, Failure> {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
-            Place::There(endpoint) => Self::There(Client::connect(endpoint).await?, endpoint),
+            Place::There(remote) => Self::There(Client::connect(remote).await?, &remote.endpoint),
         })
     }
 }
@@ -109,8 +110,9 @@ async fn here(
     let progress = Arc::new(AtomicU64::new(0));
     let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
     let endpoint = embedded.endpoint().clone();
+    let remote = Remote { endpoint, files: CredentialFiles::default() };
     let driven = async {
-        let client = Client::connect(&endpoint).await?;
+        let client = Client::connect(&remote).await?;
         let note = |snapshot: &JobSnapshot| {
             let done = snapshot.evaluations.wrapping_mul(snapshot.realizations);
             progress.store(done.wrapping_add(snapshot.realizations_done), Ordering::Relaxed);
