@@ -291,7 +291,7 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
     if let Some(failure) = TlsFailure::of(status) {
         return ConnectError::Tls { endpoint: endpoint.clone(), failure }.into();
     }
-    let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
+    let (endpoint, reason) = (endpoint.clone(), endpoint.explained(status.message()));
     // What the coordinator itself answers has no source: that is an error of the transport.
     let answered = std::error::Error::source(status).is_none();
     match status.code() {

@@ -60,7 +60,8 @@ pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
 /// When it cannot be written.
 pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
-        let mut file = OpenOptions::new().read(true).append(true).create(true).mode(0o600).open(path)?;
+        let mut file =
+            OpenOptions::new().read(true).append(true).create(true).mode(0o600).open(path)?;
         let whole = ends_with_newline(&file)?;
         // In one piece: others may add lines at the same time.
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;

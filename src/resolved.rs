@@ -193,14 +193,12 @@ impl Resolved {
                 coordinator: remote(arguments.client)?,
                 format: format(arguments.json),
             },
-            Command::Watch(arguments) => Self::Watch {
-                job: arguments.job,
-                coordinator: remote(arguments.client)?,
-            },
-            Command::Cancel(arguments) => Self::Cancel {
-                job: arguments.job,
-                coordinator: remote(arguments.client)?,
-            },
+            Command::Watch(arguments) => {
+                Self::Watch { job: arguments.job, coordinator: remote(arguments.client)? }
+            }
+            Command::Cancel(arguments) => {
+                Self::Cancel { job: arguments.job, coordinator: remote(arguments.client)? }
+            }
             Command::Fetch(arguments) => Self::Fetch {
                 job: arguments.job,
                 coordinator: remote(arguments.client)?,

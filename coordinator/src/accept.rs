@@ -16,8 +16,8 @@ use tokio::time::{Sleep, sleep, timeout};
 use tokio_rustls::server::TlsStream;
 use tonic::transport::server::Connected;
 
-use crate::access::Purpose;
-use crate::tls::{Tls, purpose};
+use crate::access::Certificate;
+use crate::tls::Tls;
 
 /// A peer must complete its handshake, and then send its first bytes, within this time each.
 pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
@@ -35,8 +35,7 @@ pub(crate) enum Bound {
 #[derive(Debug)]
 pub(crate) struct Connection {
     io: Io,
-    /// What the peer's certificate is for, if it showed one.
-    certificate: Option<Purpose>,
+    certificate: Certificate,
     /// Until the first byte has come: when to give up.
     patience: Option<Pin<Box<Sleep>>>,
     /// One of [`CONNECTIONS_MAX`].
@@ -46,8 +45,8 @@ pub(crate) struct Connection {
 /// What is known of the peer of a call.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
-    /// What its certificate is for, if it showed one.
-    pub(crate) certificate: Option<Purpose>,
+    /// What its certificate says.
+    pub(crate) certificate: Certificate,
 }
 
 #[derive(Debug)]
@@ -106,7 +105,7 @@ impl Acceptor {
                         (Some(tls), Io::Tcp(stream)) => {
                             self.handshakes.spawn(handshake(tls.clone(), stream, place));
                         }
-                        (_, io) => return Connection::new(io, None, place),
+                        (_, io) => return Connection::new(io, Certificate::Absent, place),
                     }
                 }
             }
@@ -114,10 +113,7 @@ impl Acceptor {
     }
 }
 
-async fn accept(
-    bound: &Bound,
-    places: &Arc<Semaphore>,
-) -> io::Result<(Io, OwnedSemaphorePermit)> {
+async fn accept(bound: &Bound, places: &Arc<Semaphore>) -> io::Result<(Io, OwnedSemaphorePermit)> {
     let place = Arc::clone(places).acquire_owned().await.map_err(io::Error::other)?;
     let io = match bound {
         Bound::Tcp(listener) => {
@@ -131,15 +127,11 @@ async fn accept(
     Ok((io, place))
 }
 
-async fn handshake(
-    tls: Tls,
-    stream: TcpStream,
-    place: OwnedSemaphorePermit,
-) -> Option<Connection> {
+async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> Option<Connection> {
     let peer = stream.peer_addr().ok();
     match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
         Ok(Ok(stream)) => {
-            let certificate = stream.get_ref().1.peer_certificates().and_then(purpose);
+            let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
             Some(Connection::new(Io::Tls(Box::new(stream)), certificate, place))
         }
         Ok(Err(error)) => {
@@ -154,7 +146,7 @@ async fn handshake(
 }
 
 impl Connection {
-    fn new(io: Io, certificate: Option<Purpose>, place: OwnedSemaphorePermit) -> Self {
+    fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
         let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
         Self { io, certificate, patience, _place: place }
     }

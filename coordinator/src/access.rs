@@ -23,13 +23,37 @@ pub enum Policy {
     Tls(Tokens),
 }
 
-/// What a certificate, which an authority that we believe has signed, was made for.
+/// What a peer's certificate says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
-    /// For a worker.
+pub enum Certificate {
+    /// There is none.
+    Absent,
+    /// It is in order, and a worker's.
     Worker,
-    /// For anything else.
+    /// It is in order, and for anything else.
     Other,
+    /// It is not in order, and says nothing.
+    Faulty(Fault),
+}
+
+/// Why a certificate is not in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Fault {
+    /// Somebody else signed it.
+    #[error("the coordinator's authority (its --tls-ca) has not signed it; make one with that")]
+    UnknownAuthority,
+    /// It is too old.
+    #[error("it has expired; make a new one")]
+    Expired,
+    /// It is too young.
+    #[error("it is not valid yet; are the clocks right?")]
+    NotYetValid,
+    /// It is for coordinators, say.
+    #[error("it is not for clients or workers; make one with `osteon certs`")]
+    OtherUsage,
+    /// It cannot be understood.
+    #[error("it cannot be used; make one with `osteon certs`")]
+    Unusable,
 }
 
 /// What a call says of its token.
@@ -81,10 +105,17 @@ pub enum Denied {
         needs: Role,
     },
     /// A worker without a certificate.
-    #[error("this coordinator takes workers with a certificate only; give --tls-cert and --tls-key")]
+    #[error(
+        "this coordinator takes workers with a certificate only; give --tls-cert and --tls-key"
+    )]
     NoCertificate,
+    /// A certificate that is not in order.
+    #[error("the certificate in --tls-cert is refused: {0}")]
+    Faulty(Fault),
     /// A certificate that is for something else.
-    #[error("the certificate is not a worker's: it lacks the name `{WORKER_NAME}`; make one with `osteon certs`")]
+    #[error(
+        "the certificate is not a worker's: it lacks the name `{WORKER_NAME}`; make one with `osteon certs`"
+    )]
     NotAWorker,
 }
 
@@ -111,7 +142,7 @@ pub fn need(path: &str) -> Need {
 /// When it may not, with the reason for the caller.
 pub fn decide<'a>(
     policy: &'a Policy,
-    certificate: Option<Purpose>,
+    certificate: Certificate,
     presented: Presented<'_>,
     need: Need,
 ) -> Result<Option<&'a str>, Denied> {
@@ -119,20 +150,25 @@ pub fn decide<'a>(
         Policy::Everybody => return Ok(None),
         Policy::Tokens(tokens) | Policy::Tls(tokens) => tokens,
     };
+    let in_order = matches!(certificate, Certificate::Worker | Certificate::Other);
     let needs = match need {
         Need::Nothing => return Ok(None),
-        Need::Known if certificate.is_some() => return Ok(None),
+        Need::Known if in_order => return Ok(None),
         Need::Known => Role::Read,
         Need::Role(role) => role,
-        // A certificate is the one proof of a worker; without TLS there is none, and only who
-        // may do everything may answer for results.
         Need::Worker => match (policy, certificate) {
-            (Policy::Tls(_), Some(Purpose::Worker)) => return Ok(None),
-            (Policy::Tls(_), Some(Purpose::Other)) => return Err(Denied::NotAWorker),
-            (Policy::Tls(_), None) => return Err(Denied::NoCertificate),
+            (Policy::Tls(_), Certificate::Worker) => return Ok(None),
+            (Policy::Tls(_), Certificate::Other) => return Err(Denied::NotAWorker),
+            (Policy::Tls(_), Certificate::Absent) => return Err(Denied::NoCertificate),
+            (_, Certificate::Faulty(fault)) => return Err(Denied::Faulty(fault)),
+            // A certificate is the one proof of a worker; without TLS there is none, and only
+            // who may do everything may answer for results.
             _ => Role::Admin,
         },
     };
+    if let Certificate::Faulty(fault) = certificate {
+        return Err(Denied::Faulty(fault));
+    }
     let holder = match presented {
         Presented::Nothing => return Err(Denied::NoToken),
         Presented::Unreadable => return Err(Denied::Unreadable),
@@ -150,7 +186,11 @@ pub fn presented(header: Option<&[u8]>) -> Presented<'_> {
     let Ok(text) = std::str::from_utf8(header) else { return Presented::Unreadable };
     match text.split_once(' ') {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => {
-            if Token::parse(token).is_ok() { Presented::Token(token) } else { Presented::Unreadable }
+            if Token::parse(token).is_ok() {
+                Presented::Token(token)
+            } else {
+                Presented::Unreadable
+            }
         }
         _ => Presented::Unreadable,
     }
@@ -163,6 +203,7 @@ impl From<Denied> for Status {
             Denied::NoToken
             | Denied::Unreadable
             | Denied::UnknownToken
+            | Denied::Faulty(_)
             | Denied::NoCertificate => Code::Unauthenticated,
         };
         Self::new(code, denied.to_string())

@@ -12,7 +12,7 @@ use tonic::codegen::{Service, http};
 use tower::Layer;
 
 use crate::accept::Peer;
-use crate::access::{self, Need, Policy};
+use crate::access::{self, Certificate, Need, Policy};
 use crate::tokens::Role;
 
 /// The one method whose message may be large.
@@ -40,7 +40,8 @@ impl AccessLayer {
 
     fn decide<B>(&self, request: &http::Request<B>) -> Result<(), Status> {
         let path = request.uri().path();
-        let certificate = request.extensions().get::<Peer>().and_then(|peer| peer.certificate);
+        let peer = request.extensions().get::<Peer>();
+        let certificate = peer.map_or(Certificate::Absent, |peer| peer.certificate);
         let header = request.headers().get(http::header::AUTHORIZATION);
         let presented = access::presented(header.map(http::HeaderValue::as_bytes));
         let need = access::need(path);

@@ -1,6 +1,7 @@
 //! The tokens that a coordinator takes: names, roles, hashes. Read from a text, compared without
 //! telling by time how much of a hash was right.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use osteon_common::limits::{NAME_BYTES_MAX, TOKENS_MAX};
@@ -149,7 +150,8 @@ impl Tokens {
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, TokensError> {
-        let mut entries: Vec<(usize, Entry)> = Vec::new();
+        let mut entries = Vec::new();
+        let mut lines: BTreeMap<String, usize> = BTreeMap::new();
         for (line, words) in text.lines().enumerate() {
             let line = line + 1;
             let words = words.split('#').next().unwrap_or_default();
@@ -158,19 +160,18 @@ impl Tokens {
             }
             let wrong = |fault| TokensError::Line { path: path.to_owned(), line, fault };
             let entry = entry(words).map_err(wrong)?;
-            if let Some((first, _)) = entries.iter().find(|(_, other)| other.hash == entry.hash) {
-                let (name, first) = (entry.holder.name, *first);
-                return Err(wrong(LineFault::Twice { name, first }));
+            if let Some(first) = lines.insert(entry.hash.to_string(), line) {
+                return Err(wrong(LineFault::Twice { name: entry.holder.name, first }));
             }
             if entries.len() == TOKENS_MAX {
                 return Err(TokensError::TooMany { path: path.to_owned(), max: TOKENS_MAX });
             }
-            entries.push((line, entry));
+            entries.push(entry);
         }
         if entries.is_empty() {
             return Err(TokensError::Empty { path: path.to_owned() });
         }
-        Ok(Self(entries.into_iter().map(|(_, entry)| entry).collect()))
+        Ok(Self(entries))
     }
 }
 
@@ -265,7 +266,10 @@ mod tests {
             (format!("ann {secret} {hash}"), "gives `ann` an unknown role"),
             (format!("ann read {secret}"), "holds the token of `ann` itself"),
             ("ann read blake3:12".to_owned(), "what is no hash"),
-            (format!("ann read {hash}\n\nbob read {hash}"), "line 3 gives `bob` a token that line 1"),
+            (
+                format!("ann read {hash}\n\nbob read {hash}"),
+                "line 3 gives `bob` a token that line 1",
+            ),
         ] {
             let error = parse(&text).unwrap_err();
             assert!(error.contains(expected), "{text}: {error}");

@@ -169,6 +169,7 @@ pub struct Identity {
 /// When a file cannot be used.
 pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialError> {
     let chain = certificates(certificate)?;
+    in_its_time(certificate, &chain)?;
     let private = private_key(key)?;
     let cannot = |source| CredentialError::Key { path: key.to_owned(), source };
     let provider = ring::default_provider();
@@ -180,7 +181,6 @@ pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialEr
         }
         Err(source) => return Err(cannot(source)),
     }
-    in_its_time(certificate, &chain)?;
     Ok(Identity { chain, key: private })
 }
 
@@ -258,8 +258,15 @@ fn in_its_time(path: &Path, chain: &[CertificateDer<'static>]) -> Result<(), Cre
     let certificate = EndEntityCert::try_from(first).map_err(unusable)?;
     let usage = KeyUsage::server_auth();
     let now = UnixTime::now();
-    match certificate.verify_for_usage(webpki::ALL_VERIFICATION_ALGS, &[], &[], now, usage, None, None)
-    {
+    match certificate.verify_for_usage(
+        webpki::ALL_VERIFICATION_ALGS,
+        &[],
+        &[],
+        now,
+        usage,
+        None,
+        None,
+    ) {
         Err(webpki::Error::CertExpired { .. }) => Err(CredentialError::Expired { path: path() }),
         Err(webpki::Error::CertNotValidYet { .. }) => {
             Err(CredentialError::NotYetValid { path: path() })

@@ -162,10 +162,9 @@ impl std::fmt::Debug for Connector {
 pub fn roots(path: &std::path::Path) -> Result<RootCertStore, CredentialError> {
     let mut roots = RootCertStore::empty();
     for certificate in credential_file::certificates(path)? {
-        roots.add(certificate).map_err(|source| CredentialError::Root {
-            path: path.to_owned(),
-            source,
-        })?;
+        roots
+            .add(certificate)
+            .map_err(|source| CredentialError::Root { path: path.to_owned(), source })?;
     }
     Ok(roots)
 }

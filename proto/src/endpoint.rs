@@ -56,7 +56,9 @@ pub enum EndpointError {
         text: String,
     },
     /// The host or port cannot be read.
-    #[error("`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing behind it")]
+    #[error(
+        "`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing behind it"
+    )]
     Authority {
         /// `http` or `https`.
         scheme: &'static str,
@@ -140,6 +142,17 @@ fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, En
 }
 
 impl Endpoint {
+    /// What broke a connection, with a word about TLS where that may be the cause.
+    pub fn explained(&self, reason: &str) -> String {
+        match self {
+            // The answer to plain HTTP/2 was no HTTP/2.
+            Self::Http(authority) if reason.contains("protocol error") => {
+                format!("{reason}; if it speaks TLS, write https://{authority}")
+            }
+            _ => reason.to_owned(),
+        }
+    }
+
     /// Whether what is sent there stays on this machine: a Unix socket or a loopback address.
     pub fn is_local(&self) -> bool {
         let authority = match self {
@@ -205,8 +218,7 @@ async fn channel(
         match endpoint {
             Endpoint::Https(authority) => {
                 let dialed = authority.clone();
-                let connector =
-                    service_fn(move |_: Uri| dial_tls(dialed.clone(), tls.clone()));
+                let connector = service_fn(move |_: Uri| dial_tls(dialed.clone(), tls.clone()));
                 let origin = Uri::try_from(format!("https://{authority}"));
                 let mut transport = transport(format!("http://{authority}"), timeout)?;
                 if let Ok(origin) = origin {
@@ -249,9 +261,8 @@ async fn dial_tls(
 ) -> io::Result<TokioIo<TlsStream<TcpStream>>> {
     let unnamed = |_| io::Error::new(io::ErrorKind::InvalidInput, "the host name is not valid");
     let name = ServerName::try_from(host(&authority).to_owned()).map_err(unnamed)?;
-    let Connector(connector) = tls.ok_or_else(|| {
-        io::Error::new(io::ErrorKind::InvalidInput, "TLS needs --tls-ca FILE")
-    })?;
+    let Connector(connector) =
+        tls.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "TLS needs --tls-ca FILE"))?;
     let stream = TcpStream::connect(authority).await?;
     stream.set_nodelay(true)?;
     Ok(TokioIo::new(connector.connect(name, stream).await?))

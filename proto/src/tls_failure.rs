@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io;
 
 use thiserror::Error;
-use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tokio_rustls::rustls::{self, CertificateError};
 
 /// Why there is no trust between two peers.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -30,14 +30,6 @@ pub enum TlsFailure {
     /// The peer speaks no TLS.
     #[error("it does not speak TLS; write http://HOST:PORT if that is meant")]
     NoTls,
-    /// The peer does not take the certificate that it was shown.
-    #[error(
-        "it does not take the certificate in --tls-cert ({}); make one with its authority", alert_text(*alert)
-    )]
-    Refused {
-        /// What the peer says.
-        alert: AlertDescription,
-    },
     /// Something else.
     #[error("TLS failed: {0}")]
     Other(rustls::Error),
@@ -66,9 +58,6 @@ impl TlsFailure {
         match error {
             Tls::InvalidCertificate(certificate) => Self::from_certificate(certificate, error),
             Tls::InvalidMessage(_) => Self::NoTls,
-            Tls::AlertReceived(alert) if is_of_certificates(*alert) => {
-                Self::Refused { alert: *alert }
-            }
             other => Self::Other(other.clone()),
         }
     }
@@ -94,33 +83,6 @@ impl TlsFailure {
     }
 }
 
-/// Whether a peer says by `alert` that it does not take a certificate.
-fn is_of_certificates(alert: AlertDescription) -> bool {
-    matches!(
-        alert,
-        AlertDescription::BadCertificate
-            | AlertDescription::UnsupportedCertificate
-            | AlertDescription::CertificateRevoked
-            | AlertDescription::CertificateExpired
-            | AlertDescription::CertificateUnknown
-            | AlertDescription::UnknownCA
-            | AlertDescription::CertificateRequired
-            | AlertDescription::DecryptError
-    )
-}
-
-fn alert_text(alert: AlertDescription) -> &'static str {
-    match alert {
-        AlertDescription::UnknownCA | AlertDescription::DecryptError => {
-            "another authority signed it"
-        }
-        AlertDescription::CertificateExpired => "it has expired",
-        AlertDescription::UnsupportedCertificate => "it is for another purpose",
-        AlertDescription::CertificateRequired => "there is none",
-        _ => "it cannot be used",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,9 +101,8 @@ mod tests {
         check(certificate(CertificateError::NotValidYet), "clocks");
         check(certificate(CertificateError::NotValidForName), "host name");
         check(certificate(CertificateError::InvalidPurpose), "not one for coordinators");
-        check(rustls::Error::AlertReceived(AlertDescription::UnknownCA), "another authority");
-        check(rustls::Error::AlertReceived(AlertDescription::CertificateExpired), "has expired");
-        check(rustls::Error::AlertReceived(AlertDescription::InternalError), "TLS failed");
+        let alert = rustls::AlertDescription::InternalError;
+        check(rustls::Error::AlertReceived(alert), "TLS failed");
         let no_tls = rustls::InvalidMessage::InvalidContentType;
         check(rustls::Error::InvalidMessage(no_tls), "http://");
         assert_eq!(TlsFailure::of(&io::Error::other("reset")), None);

@@ -34,8 +34,11 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
             (authority, pair(directory, AUTHORITY, made))
         }
     };
-    let bearers =
-        [("server", Bearer::Coordinator(host)), ("worker", Bearer::Worker), ("client", Bearer::Client)];
+    let bearers = [
+        ("server", Bearer::Coordinator(host)),
+        ("worker", Bearer::Worker),
+        ("client", Bearer::Client),
+    ];
     for (name, bearer) in bearers {
         let made = authority.sign(bearer, now, *days).map_err(unmade)?;
         files.extend(pair(directory, name, made));
@@ -63,8 +66,10 @@ fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Fa
 }
 
 fn pair(directory: &Path, name: &str, made: Made) -> Vec<NewFile> {
-    let file = |suffix: &str, text, secret| {
-        NewFile { path: directory.join(format!("{name}{suffix}")), text, secret }
+    let file = |suffix: &str, text, secret| NewFile {
+        path: directory.join(format!("{name}{suffix}")),
+        text,
+        secret,
     };
     vec![file(".pem", made.certificate, false), file("-key.pem", made.key, true)]
 }

@@ -68,11 +68,7 @@ pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<Ending, Fa
 }
 
 /// `fetch`: writes what an ended job left. Nothing is written while it has not ended.
-pub(super) async fn fetch(
-    job: &str,
-    coordinator: &Remote,
-    out: &Path,
-) -> Result<Ending, Failure> {
+pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<Ending, Failure> {
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {

@@ -33,9 +33,9 @@ pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
                 return Err(failure);
             }
         }
-        None => output::stdout(Format::Text)
-            .verbatim(&format!("{line}\n"))
-            .map_err(stdout_failure)?,
+        None => {
+            output::stdout(Format::Text).verbatim(&format!("{line}\n")).map_err(stdout_failure)?
+        }
     }
     Ok(Ending::Done)
 }

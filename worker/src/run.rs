@@ -255,7 +255,7 @@ impl Worker {
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
         }
-        let reason = status.message().to_owned();
+        let reason = self.endpoint.explained(status.message());
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument
