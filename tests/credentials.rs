@@ -177,7 +177,9 @@ fn a_coordinators_files_are_checked_before_anything_is_bound() {
     };
     let open = |name: &'static str| move |scratch: &Scratch| mode(&scratch.path(name), 0o644);
     let copy = |from: &'static str, to: &'static str| {
-        move |scratch: &Scratch| drop(fs::copy(scratch.path(from), scratch.path(to)).unwrap())
+        move |scratch: &Scratch| {
+            fs::copy(scratch.path(from), scratch.path(to)).unwrap();
+        }
     };
     let remove =
         |name: &'static str| move |scratch: &Scratch| fs::remove_file(scratch.path(name)).unwrap();
