@@ -3,7 +3,6 @@
 
 use osteon_proto::token::Token;
 use thiserror::Error;
-use tonic::{Code, Status};
 
 use crate::tokens::{Role, Tokens};
 
@@ -193,20 +192,6 @@ pub fn presented(header: Option<&[u8]>) -> Presented<'_> {
             }
         }
         _ => Presented::Unreadable,
-    }
-}
-
-impl From<Denied> for Status {
-    fn from(denied: Denied) -> Self {
-        let code = match denied {
-            Denied::WeakRole { .. } | Denied::NotAWorker => Code::PermissionDenied,
-            Denied::NoToken
-            | Denied::Unreadable
-            | Denied::UnknownToken
-            | Denied::Faulty(_)
-            | Denied::NoCertificate => Code::Unauthenticated,
-        };
-        Self::new(code, denied.to_string())
     }
 }
 

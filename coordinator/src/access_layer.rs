@@ -6,13 +6,13 @@ use std::task::{Context, Poll};
 
 use osteon_common::limits::SUBMISSIONS_AT_ONCE_MAX;
 use tokio::sync::Semaphore;
-use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::{Service, http};
+use tonic::{Code, Status};
 use tower::Layer;
 
 use crate::accept::Peer;
-use crate::access::{self, Certificate, Need, Policy};
+use crate::access::{self, Certificate, Denied, Need, Policy};
 use crate::tokens::Role;
 
 /// The one method whose message may be large.
@@ -101,5 +101,19 @@ where
             let _turn = submissions.acquire_owned().await;
             inner.call(request).await
         })
+    }
+}
+
+impl From<Denied> for Status {
+    fn from(denied: Denied) -> Self {
+        let code = match denied {
+            Denied::WeakRole { .. } | Denied::NotAWorker => Code::PermissionDenied,
+            Denied::NoToken
+            | Denied::Unreadable
+            | Denied::UnknownToken
+            | Denied::Faulty(_)
+            | Denied::NoCertificate => Code::Unauthenticated,
+        };
+        Self::new(code, denied.to_string())
     }
 }

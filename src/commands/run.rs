@@ -40,7 +40,7 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
             here(workers, threads, &specification, directory.as_ref(), interruption).await?
         }
         Computers::There(client, endpoint) => {
-            there(client, endpoint, &specification, directory.as_ref(), interruption).await?
+            there(*client, endpoint, &specification, directory.as_ref(), interruption).await?
         }
     };
     let json = keep(run.kind, &fetched, directory.as_ref())?;
@@ -50,14 +50,17 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
 /// Who computes, and is there.
 enum Computers<'a> {
     Here { workers: u32, threads: u32 },
-    There(Client, &'a Endpoint),
+    There(Box<Client>, &'a Endpoint),
 }
 
 impl<'a> Computers<'a> {
     async fn find(place: &'a Place) -> Result<Self, Failure> {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
-            Place::There(remote) => Self::There(Client::connect(remote).await?, &remote.endpoint),
+            Place::There(remote) => {
+                let client = Client::connect(remote).await?;
+                Self::There(Box::new(client), &remote.endpoint)
+            }
         })
     }
 }

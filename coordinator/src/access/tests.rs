@@ -3,6 +3,7 @@ use std::collections::BTreeSet;
 use osteon_proto::v1;
 use prost::Message as _;
 use prost_types::FileDescriptorSet;
+use tonic::{Code, Status};
 
 use super::*;
 
