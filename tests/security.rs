@@ -45,7 +45,8 @@ fn a_job_over_tls_ends_with_the_bits_of_an_embedded_run_and_tells_no_secret() {
 
     // The coordinator noted who submitted.
     let log = secure.read("coordinator.log");
-    assert!(log.contains("a-submiter"), "nobody is noted");
+    assert!(log.contains("submit-holder"), "nobody is noted");
+    assert!(log.contains("TRACE"), "the log is not at its finest level");
     // Everything that was logged, at the finest level, and what other users see of processes.
     let mut told = vec![log, secure.read("worker-1.log"), secure.read("worker-2.log"), stdout];
     told.push(String::from_utf8_lossy(&output.stderr).into_owned());
@@ -157,9 +158,10 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
                 _ if worker => (Code::Unauthenticated, "give --tls-cert and --tls-key"),
                 "none" => (Code::Unauthenticated, "give --token-file"),
                 "stranger" => (Code::Unauthenticated, "does not know the token"),
-                _ => {
-                    (Code::PermissionDenied, "`a-reader` has role read, and this needs role submit")
-                }
+                _ => (
+                    Code::PermissionDenied,
+                    "`read-holder` has role read, and this needs role submit",
+                ),
             };
             assert_eq!(status.code(), code, "{context}");
             assert!(status.message().contains(message), "{context}");

@@ -58,3 +58,7 @@ pub const SUBMISSIONS_AT_ONCE_MAX: usize = 16;
 pub const CALL_S_MAX: u64 = 60;
 /// Longest list of headers of a call, bytes.
 pub const HEADER_BYTES_MAX: u32 = 16 << 10;
+/// Most fetches that a coordinator holds results for at a time; others wait.
+pub const FETCHES_AT_ONCE_MAX: usize = 8;
+/// A fetch ends when its reader takes nothing for this long, s.
+pub const READER_PATIENCE_S: u64 = 30;

@@ -16,6 +16,7 @@ pub mod evaluation;
 pub mod event;
 mod failing;
 pub mod failure;
+mod fetching;
 pub mod ids;
 pub mod leftover;
 pub mod listen;

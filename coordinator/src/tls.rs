@@ -60,7 +60,7 @@ pub struct Tls {
     pub(crate) acceptor: TlsAcceptor,
     /// Decides of clients' certificates.
     verifier: Arc<dyn ClientCertVerifier>,
-    /// A host name of the certificate that other machines can use.
+    /// A host name that the certificate is for, if possible one for other machines.
     host: Option<String>,
 }
 
@@ -103,7 +103,7 @@ impl Tls {
         }
     }
 
-    /// A host name that the certificate is for, other than `localhost`.
+    /// A host name that the certificate is for.
     pub(crate) fn host(&self) -> Option<&str> {
         self.host.as_deref()
     }
@@ -177,8 +177,9 @@ fn fault(error: &rustls::Error) -> Fault {
     }
 }
 
+/// The first of the certificate's names, `localhost` only if there is no other.
 fn host_name(certificate: &CertificateDer<'_>) -> Option<String> {
     let certificate = EndEntityCert::try_from(certificate).ok()?;
-    let mut names = certificate.valid_dns_names();
-    names.find(|name| *name != "localhost" && !name.contains('*')).map(str::to_owned)
+    let names = || certificate.valid_dns_names().filter(|name| !name.contains('*'));
+    names().find(|name| *name != "localhost").or_else(|| names().next()).map(str::to_owned)
 }

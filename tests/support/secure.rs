@@ -71,7 +71,7 @@ pub(crate) fn set_up(scratch: &Scratch) {
     for role in ROLES {
         let out = scratch.path(&format!("{role}.token"));
         let list = scratch.path("tokens");
-        let name = format!("a-{role}er");
+        let name = format!("{role}-holder");
         run(&["token", &name, "--role", role, "--out", text(&out), "--tokens", text(&list)])
             .succeeded();
     }

@@ -8,14 +8,16 @@ use tonic::{Code, Status};
 use super::*;
 
 /// Every method, and what it asks for.
-const NEEDS: [(&str, Need); 9] = [
+const NEEDS: [(&str, Need); 11] = [
     ("/grpc.health.v1.Health/Check", Need::Nothing),
     ("/osteon.v1.Jobs/Get", Need::Role(Role::Read)),
     ("/osteon.v1.Jobs/List", Need::Role(Role::Read)),
+    ("/osteon.v1.Jobs/ListExpelled", Need::Role(Role::Read)),
     ("/osteon.v1.Jobs/Watch", Need::Role(Role::Read)),
     ("/osteon.v1.Jobs/Fetch", Need::Role(Role::Read)),
     ("/osteon.v1.Jobs/Submit", Need::Role(Role::Submit)),
     ("/osteon.v1.Jobs/Cancel", Need::Role(Role::Submit)),
+    ("/osteon.v1.Jobs/Prune", Need::Role(Role::Admin)),
     ("/osteon.v1.Workers/Attach", Need::Worker),
     ("/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Need::Known),
 ];
