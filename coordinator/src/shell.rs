@@ -5,9 +5,7 @@
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use osteon_common::limits::{
-    CALL_S_MAX, HEADER_BYTES_MAX, MESSAGE_BYTES_MAX, WORKER_MESSAGE_BYTES_MAX,
-};
+use osteon_common::limits::{HEADER_BYTES_MAX, MESSAGE_BYTES_MAX, WORKER_MESSAGE_BYTES_MAX};
 use osteon_proto::v1;
 use osteon_proto::v1::jobs_server::JobsServer;
 use osteon_proto::v1::workers_server::WorkersServer;
@@ -100,7 +98,7 @@ pub async fn start(
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
     let (commands, store) = store_thread::start(store, events, failing.guard(Failed::Store))
         .map_err(|source| StartError::Thread { source })?;
-    let router = services(&messages, &commands, listener.policy.clone()).await?;
+    let router = services(&messages, &commands, listener.policy.clone(), config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
     let server = serve(router, listener, stopped);
@@ -168,6 +166,7 @@ async fn services(
     messages: &mpsc::Sender<Message>,
     commands: &mpsc::Sender<Command>,
     policy: Policy,
+    config: Config,
 ) -> Result<GuardedRouter, StartError> {
     let jobs = JobsService::new(messages.clone(), commands.clone());
     let workers = WorkersService::new(messages.clone());
@@ -184,7 +183,7 @@ async fn services(
         .http2_keepalive_timeout(Some(KEEPALIVE))
         .max_concurrent_streams(Some(STREAMS_PER_CONNECTION_MAX))
         .http2_max_header_list_size(HEADER_BYTES_MAX)
-        .timeout(Duration::from_secs(CALL_S_MAX))
+        .timeout(config.call_timeout)
         .layer(AccessLayer::new(policy))
         .add_service(health_service)
         .add_service(reflection)

@@ -14,17 +14,24 @@ use osteon_coordinator::{Config, Coordinator, Listener, start};
 use osteon_proto::endpoint::{connect, jobs_client, workers_client};
 use osteon_proto::specification;
 use osteon_proto::v1::attach_request::Message;
-use osteon_proto::v1::{AttachRequest, ListRequest, SubmitRequest, WorkerHello};
+use osteon_proto::v1::{AttachRequest, ListRequest, SubmitRequest, SubmitResponse, WorkerHello};
 use prost::Message as _;
+use tonic::client::Grpc;
+use tonic::codegen::http::uri::PathAndQuery;
 use tonic::transport::Channel;
 use tonic::{Code, Request};
+use tonic_prost::ProstCodec;
 
 const TIMEOUT: Duration = Duration::from_secs(30);
 
 async fn coordinator() -> (Coordinator, Channel) {
+    coordinator_with(Config::default()).await
+}
+
+async fn coordinator_with(config: Config) -> (Coordinator, Channel) {
     let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
     let store = Box::new(MemoryStore::new());
-    let coordinator = start(listener, store, Config::default()).await.unwrap();
+    let coordinator = start(listener, store, config).await.unwrap();
     let channel = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
     (coordinator, channel)
 }
@@ -98,5 +105,32 @@ async fn more_submissions_than_are_read_at_a_time_wait_their_turn() {
     while let Some(call) = calls.join_next().await {
         call.unwrap().unwrap();
     }
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_call_whose_message_never_ends_is_given_up() {
+    let call_timeout = Duration::from_millis(200);
+    let (coordinator, channel) =
+        coordinator_with(Config { call_timeout, ..Config::default() }).await;
+    // More of them than submissions are read at a time: they must not block the others for ever.
+    let mut calls = tokio::task::JoinSet::new();
+    for _ in 0..2 * SUBMISSIONS_AT_ONCE_MAX {
+        let mut grpc = Grpc::new(channel.clone());
+        calls.spawn(async move {
+            grpc.ready().await.unwrap();
+            let path = PathAndQuery::from_static("/osteon.v1.Jobs/Submit");
+            let endless = Request::new(tokio_stream::pending::<SubmitRequest>());
+            let codec = ProstCodec::<SubmitRequest, SubmitResponse>::default();
+            grpc.client_streaming(endless, path, codec).await.map(drop)
+        });
+    }
+    while let Some(call) = tokio::time::timeout(TIMEOUT, calls.join_next()).await.unwrap() {
+        let status = call.unwrap().unwrap_err();
+        assert!(matches!(status.code(), Code::DeadlineExceeded | Code::Cancelled), "{status}");
+    }
+    let specification = Some(specification::to_message(&fake::identification(100, 10, 7)));
+    let request = SubmitRequest { specification, request_id: String::new() };
+    jobs_client(channel).submit(request).await.unwrap();
     coordinator.shutdown().await;
 }
