@@ -41,6 +41,10 @@ pub(crate) enum Command {
     Fetch(FetchArguments),
     /// Measure the solvers against each other; prints a table in Markdown
     Study(StudyArguments),
+    /// Make a certificate authority and certificates for coordinator, workers and clients
+    Certs(CertsArguments),
+    /// Make a token for a client and the line that admits it
+    Token(TokenArguments),
 }
 
 /// Of `identify` and `propagate`.
@@ -56,12 +60,15 @@ pub(crate) struct RunArguments {
     #[arg(long, value_name = "T", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
-    /// Run on this coordinator instead: http://HOST:PORT or unix:PATH
+    /// Run on this coordinator instead: https://HOST:PORT, http://HOST:PORT or unix:PATH
     ///
     /// Without it the environment's OSTEON_COORDINATOR counts, unless --workers or --threads ask
     /// for a run on this machine.
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
+    /// What is shown to the coordinator.
+    #[command(flatten)]
+    pub(crate) credentials: CredentialArguments,
     /// Keep the results here; the same command continues or shows what is there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -115,16 +122,34 @@ pub(crate) struct CoordinatorArguments {
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
     /// Serve addresses other than loopback without TLS: whoever reaches them can use them
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["tls_ca", "tls_cert", "tls_key", "tokens", "token_file"])]
     pub(crate) insecure: bool,
+    /// Serve with TLS: certificates of the authorities that sign workers' certificates (PEM)
+    #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"])]
+    pub(crate) tls_ca: Option<PathBuf>,
+    /// The coordinator's certificate (PEM)
+    #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_key"])]
+    pub(crate) tls_cert: Option<PathBuf>,
+    /// The key of the certificate (PEM)
+    #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
+    pub(crate) tls_key: Option<PathBuf>,
+    /// Clients need a token from this list: lines of NAME ROLE HASH, made by `osteon token`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tokens: Option<PathBuf>,
+    /// A client's token that is taken, too, with role admin
+    #[arg(long, value_name = "FILE")]
+    pub(crate) token_file: Option<PathBuf>,
 }
 
 /// Of `worker`.
 #[derive(Debug, Args)]
 pub(crate) struct WorkerArguments {
-    /// The coordinator: http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
+    /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
+    /// What is shown to the coordinator.
+    #[command(flatten)]
+    pub(crate) credentials: CredentialArguments,
     /// Threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
@@ -136,12 +161,32 @@ pub(crate) struct WorkerArguments {
     pub(crate) time_limit: Option<f64>,
 }
 
+/// What is shown to a coordinator, and how it is known.
+#[derive(Debug, Args)]
+pub(crate) struct CredentialArguments {
+    /// Certificates of the authorities that may have signed the coordinator's (PEM); for https
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tls_ca: Option<PathBuf>,
+    /// An own certificate to show to the coordinator (PEM)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tls_cert: Option<PathBuf>,
+    /// The key of the own certificate (PEM)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tls_key: Option<PathBuf>,
+    /// A file with a token to show to the coordinator
+    #[arg(long, value_name = "FILE")]
+    pub(crate) token_file: Option<PathBuf>,
+}
+
 /// Of every command that speaks to a coordinator.
 #[derive(Debug, Args)]
 pub(crate) struct ClientArguments {
-    /// The coordinator: http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
+    /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
+    /// What is shown to the coordinator.
+    #[command(flatten)]
+    pub(crate) credentials: CredentialArguments,
 }
 
 /// Of `submit`.
@@ -197,6 +242,42 @@ pub(crate) struct FetchArguments {
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+}
+
+/// Of `certs`.
+#[derive(Debug, Args)]
+pub(crate) struct CertsArguments {
+    /// Directory for the files; none of them may be there already
+    #[arg(value_name = "DIR")]
+    pub(crate) directory: PathBuf,
+    /// Host name or IP address of the coordinator, besides localhost, 127.0.0.1 and ::1; may be
+    /// repeated
+    #[arg(long, value_name = "HOST")]
+    pub(crate) host: Vec<String>,
+    /// Days that the certificates of coordinator, workers and clients are valid
+    #[arg(long, value_name = "N", default_value_t = 365,
+          value_parser = clap::value_parser!(u16).range(1..=3650))]
+    pub(crate) days: u16,
+    /// Sign with the authority in this directory instead of making a new one
+    #[arg(long, value_name = "DIR")]
+    pub(crate) ca: Option<PathBuf>,
+}
+
+/// Of `token`.
+#[derive(Debug, Args)]
+pub(crate) struct TokenArguments {
+    /// Whom it is for (letters, digits and . _ - @), for logs
+    #[arg(value_name = "NAME")]
+    pub(crate) name: String,
+    /// What it allows: read (see jobs, fetch results), submit (also submit, cancel), admin (all)
+    #[arg(long, value_name = "ROLE", value_parser = ["read", "submit", "admin"])]
+    pub(crate) role: String,
+    /// Write the token to this new file, which only you can read
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Add the line to this file for the coordinator's --tokens instead of printing it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tokens: Option<PathBuf>,
 }
 
 /// Of `study`.

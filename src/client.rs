@@ -6,15 +6,16 @@ use osteon_common::job::JobSpecification;
 use osteon_common::limits::REALIZATIONS_MAX;
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
 use osteon_common::violations::Violations;
-use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
+use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
+use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
 use osteon_proto::{realizations, results, specification, status};
 use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
-use tonic::transport::Channel;
 use tonic::{Code, Response, Status};
 
 /// Longest wait for a coordinator, s.
@@ -27,6 +28,9 @@ const PAGES_MAX: usize = 10_000;
 /// Why a coordinator did not do what was asked.
 #[derive(Debug, Error)]
 pub(crate) enum ClientError {
+    /// A file of certificates or a token cannot be used.
+    #[error(transparent)]
+    Credentials(#[from] CredentialsError),
     /// There is no coordinator.
     #[error(transparent)]
     Connect(#[from] ConnectError),
@@ -79,7 +83,7 @@ impl ClientError {
     /// Whether the user must give something else.
     pub(crate) fn is_bad_input(&self) -> bool {
         match self {
-            Self::Violations(_) => true,
+            Self::Violations(_) | Self::Credentials(_) => true,
             Self::Refused { code, .. } => {
                 matches!(code, Code::NotFound | Code::InvalidArgument | Code::AlreadyExists)
             }
@@ -103,18 +107,29 @@ pub(crate) struct Fetched {
     pub(crate) history: Vec<Evaluation>,
 }
 
+/// Where a coordinator is, and what is shown to it; the files are not read yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Remote {
+    /// Its address.
+    pub(crate) endpoint: Endpoint,
+    /// Files of certificates and a token.
+    pub(crate) files: CredentialFiles,
+}
+
 /// A connection to a coordinator.
 #[derive(Debug, Clone)]
 pub(crate) struct Client {
     endpoint: Endpoint,
-    jobs: JobsClient<Channel>,
+    jobs: JobsClient<Connection>,
 }
 
 impl Client {
-    /// Connects to the coordinator at `endpoint`.
-    pub(crate) async fn connect(endpoint: &Endpoint) -> Result<Self, ClientError> {
-        let channel = endpoint::connect(endpoint, answer_limit()).await?;
-        Ok(Self { endpoint: endpoint.clone(), jobs: endpoint::jobs_client(channel) })
+    /// Reads the credentials and connects to the coordinator.
+    pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
+        let Remote { endpoint, files } = remote;
+        let credentials = Credentials::load(files, endpoint)?;
+        let connection = endpoint::connect_with(endpoint, &credentials, answer_limit()).await?;
+        Ok(Self { endpoint: endpoint.clone(), jobs: endpoint::jobs_client(connection) })
     }
 
     /// Submits a job; its id.
@@ -171,7 +186,9 @@ impl Client {
                 error,
                 ClientError::Lost { .. }
                     | ClientError::Unavailable { .. }
-                    | ClientError::Connect(_)
+                    | ClientError::Connect(
+                        ConnectError::Unreachable { .. } | ConnectError::Timeout { .. }
+                    )
                     | ClientError::Unanswered { .. }
             );
             let since = *lost_since.get_or_insert_with(Instant::now);
@@ -271,7 +288,10 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
     if let Some(violations) = status::violations(status) {
         return ClientError::Violations(violations);
     }
-    let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
+    if let Some(failure) = TlsFailure::of(status) {
+        return ConnectError::Tls { endpoint: endpoint.clone(), failure }.into();
+    }
+    let (endpoint, reason) = (endpoint.clone(), endpoint.explained(status.message()));
     // What the coordinator itself answers has no source: that is an error of the transport.
     let answered = std::error::Error::source(status).is_none();
     match status.code() {

@@ -1,11 +1,13 @@
 //! One file per subcommand, or per family of them.
 
+mod certs;
 mod coordinator;
 mod draw;
 mod jobs;
 mod run;
 mod simulate;
 mod study;
+mod token;
 mod worker;
 
 use crate::ending::{Ending, Failure};
@@ -22,7 +24,9 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Study { study, isa } => study::run(study, isa).await,
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
-        Resolved::Worker(config) => worker::serve(config).await,
+        Resolved::Worker { config, files } => worker::serve(config, &files).await,
+        Resolved::Certs(arguments) => certs::make(&arguments),
+        Resolved::Token(arguments) => token::make(&arguments),
         Resolved::Submit { job, kind, request_id, coordinator, format } => {
             jobs::submit(&job, kind, &request_id, &coordinator, format).await
         }

@@ -4,11 +4,14 @@
 //! run failed or was cancelled, 2 bad usage or bad input.
 
 mod arguments;
+mod certificates;
 mod client;
 mod commands;
+mod door;
 mod embedded;
 mod ending;
 mod instruction_set;
+mod new_files;
 mod output;
 mod progress;
 mod resolved;

@@ -6,14 +6,17 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
+use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, Command, CoordinatorArguments, DrawArguments, RunArguments, SimulateArguments,
-    Study, SubmitArguments, WorkerArguments,
+    Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
+    DrawArguments, RunArguments, SimulateArguments, Study, SubmitArguments, TokenArguments,
+    WorkerArguments,
 };
+use crate::client::Remote;
 use crate::ending::Failure;
 use crate::instruction_set;
 
@@ -56,7 +59,16 @@ pub(crate) enum Resolved {
     /// `coordinator`.
     Coordinator(CoordinatorArguments),
     /// `worker`.
-    Worker(WorkerConfig),
+    Worker {
+        /// How it works; without credentials yet.
+        config: WorkerConfig,
+        /// Files of certificates and a token.
+        files: CredentialFiles,
+    },
+    /// `certs`.
+    Certs(CertsArguments),
+    /// `token`.
+    Token(TokenArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -66,14 +78,14 @@ pub(crate) enum Resolved {
         /// Empty: a new job.
         request_id: String,
         /// Where to.
-        coordinator: Endpoint,
+        coordinator: Remote,
         /// How to print.
         format: Format,
     },
     /// `jobs`.
     Jobs {
         /// Of whom.
-        coordinator: Endpoint,
+        coordinator: Remote,
         /// How to print.
         format: Format,
     },
@@ -82,21 +94,21 @@ pub(crate) enum Resolved {
         /// Id of the job.
         job: String,
         /// Of whom.
-        coordinator: Endpoint,
+        coordinator: Remote,
     },
     /// `cancel`.
     Cancel {
         /// Id of the job.
         job: String,
         /// Of whom.
-        coordinator: Endpoint,
+        coordinator: Remote,
     },
     /// `fetch`.
     Fetch {
         /// Id of the job.
         job: String,
         /// Of whom.
-        coordinator: Endpoint,
+        coordinator: Remote,
         /// Where to.
         out: PathBuf,
     },
@@ -128,7 +140,7 @@ pub(crate) enum Place {
         threads: u32,
     },
     /// A running coordinator.
-    There(Endpoint),
+    There(Remote),
 }
 
 impl Resolved {
@@ -141,6 +153,10 @@ impl Resolved {
         let cores = u32::try_from(cores).unwrap_or(1);
         let environment = environment(std::env::var_os(VARIABLE))?;
         let coordinator = |flag| resolve_coordinator(flag, environment.as_deref());
+        let remote = |client: ClientArguments| {
+            let endpoint = coordinator(client.coordinator)?;
+            Ok::<_, Failure>(Remote { endpoint, files: client.credentials.into() })
+        };
         let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
         let run = |kind, run| {
             let run = resolve_run(kind, run, cores, environment.as_deref())?;
@@ -159,27 +175,33 @@ impl Resolved {
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {
                 let endpoint = coordinator(arguments.coordinator.clone())?;
-                Self::Worker(resolve_worker(&arguments, endpoint, cores, isa()?))
+                let config = resolve_worker(&arguments, endpoint, cores, isa()?);
+                Self::Worker { config, files: arguments.credentials.into() }
             }
-            Command::Submit(arguments) => {
-                let endpoint = coordinator(arguments.client.coordinator.clone())?;
-                resolve_submit(arguments, endpoint)
+            Command::Certs(arguments) => Self::Certs(arguments),
+            Command::Token(arguments) => Self::Token(arguments),
+            Command::Submit(SubmitArguments { job, client, propagate, request_id, json }) => {
+                Self::Submit {
+                    job,
+                    kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
+                    request_id: request_id.unwrap_or_default(),
+                    coordinator: remote(client)?,
+                    format: format(json),
+                }
             }
             Command::Jobs(arguments) => Self::Jobs {
-                coordinator: coordinator(arguments.client.coordinator)?,
+                coordinator: remote(arguments.client)?,
                 format: format(arguments.json),
             },
-            Command::Watch(arguments) => Self::Watch {
-                job: arguments.job,
-                coordinator: coordinator(arguments.client.coordinator)?,
-            },
-            Command::Cancel(arguments) => Self::Cancel {
-                job: arguments.job,
-                coordinator: coordinator(arguments.client.coordinator)?,
-            },
+            Command::Watch(arguments) => {
+                Self::Watch { job: arguments.job, coordinator: remote(arguments.client)? }
+            }
+            Command::Cancel(arguments) => {
+                Self::Cancel { job: arguments.job, coordinator: remote(arguments.client)? }
+            }
             Command::Fetch(arguments) => Self::Fetch {
                 job: arguments.job,
-                coordinator: coordinator(arguments.client.coordinator)?,
+                coordinator: remote(arguments.client)?,
                 out: arguments.out,
             },
         })
@@ -188,7 +210,7 @@ impl Resolved {
     /// Services tell what happens; commands only what is wrong.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Coordinator(_) | Self::Worker(_) => "info",
+            Self::Coordinator(_) | Self::Worker { .. } => "info",
             _ => "warn",
         }
     }
@@ -233,20 +255,26 @@ fn resolve_run(
     cores: u32,
     environment: Option<&str>,
 ) -> Result<Run, Failure> {
-    let RunArguments { job, workers, threads, coordinator, out, json } = arguments;
+    let RunArguments { job, workers, threads, coordinator, credentials, out, json } = arguments;
+    let files = CredentialFiles::from(credentials);
     let here = workers.is_some() || threads.is_some();
     let there = match (coordinator, environment) {
         (Some(endpoint), _) => Some(endpoint),
         (None, Some(url)) if !here => Some(parse_environment(url)?),
         _ => None,
     };
-    let place = there.map_or_else(
-        || {
+    let place = match (there, files.first_given()) {
+        (Some(endpoint), _) => Place::There(Remote { endpoint, files }),
+        (None, Some(option)) => {
+            return Err(Failure::bad_input(anyhow!(
+                "{option} is for a coordinator, and none is given; add --coordinator URL"
+            )));
+        }
+        (None, None) => {
             let workers = workers.unwrap_or(WORKERS_DEFAULT);
             Place::Here { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
-        },
-        Place::There,
-    );
+        }
+    };
     Ok(Run { kind, job, place, out, format: format(json) })
 }
 
@@ -258,6 +286,7 @@ fn resolve_worker(
 ) -> WorkerConfig {
     WorkerConfig {
         endpoint,
+        credentials: Credentials::default(),
         threads: arguments.threads.unwrap_or(cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
@@ -265,14 +294,10 @@ fn resolve_worker(
     }
 }
 
-fn resolve_submit(arguments: SubmitArguments, coordinator: Endpoint) -> Resolved {
-    let SubmitArguments { job, client: _, propagate, request_id, json } = arguments;
-    Resolved::Submit {
-        job,
-        kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
-        request_id: request_id.unwrap_or_default(),
-        coordinator,
-        format: format(json),
+impl From<CredentialArguments> for CredentialFiles {
+    fn from(arguments: CredentialArguments) -> Self {
+        let CredentialArguments { tls_ca, tls_cert, tls_key, token_file } = arguments;
+        Self { ca: tls_ca, certificate: tls_cert, key: tls_key, token: token_file }
     }
 }
 
@@ -296,7 +321,7 @@ mod tests {
     fn here(line: &str, cores: u32) -> (u32, u32) {
         match run(line, cores, None).place {
             Place::Here { workers, threads } => (workers, threads),
-            Place::There(endpoint) => panic!("{endpoint}"),
+            Place::There(remote) => panic!("{}", remote.endpoint),
         }
     }
 
@@ -313,7 +338,7 @@ mod tests {
     #[test]
     fn the_flag_counts_before_the_environment() {
         let there = |line: &str, environment| match run(line, 2, environment).place {
-            Place::There(endpoint) => Some(endpoint.to_string()),
+            Place::There(remote) => Some(remote.endpoint.to_string()),
             Place::Here { .. } => None,
         };
         let environment = Some("unix:/run/osteon");

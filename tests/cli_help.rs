@@ -21,6 +21,8 @@ fn help_of_every_command() {
         "watch",
         "cancel",
         "fetch",
+        "certs",
+        "token",
         "study",
         "study failures",
         "study accuracy",

@@ -9,7 +9,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
-use support::{Scratch, osteon};
+use support::{Owned, Scratch, osteon};
 
 /// Commands in the `console` blocks of a page, in order, without the program's name.
 fn commands(page: &str) -> Vec<String> {
@@ -87,5 +87,44 @@ fn the_readmes_commands_do_what_they_say() {
         let relative = model.as_f64().unwrap() / data.as_f64().unwrap() - 1.0;
         // √cost_tolerance
         assert!(relative.abs() <= 1e-4, "{moment}: {relative}");
+    }
+}
+
+#[test]
+fn the_network_pages_commands_make_what_a_coordinator_takes() {
+    let scratch = Scratch::new();
+    let all = commands("docs/network.md");
+    assert!(all.len() > 3, "{all:?}");
+    for command in &all {
+        let words = command.split_whitespace();
+        let output = osteon().args(words).current_dir(scratch.path(".")).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "osteon {command}: {errors}");
+    }
+    // What the page's table lists is there, and the coordinator's command takes it.
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/network.md"));
+    let listed: Vec<String> = page
+        .unwrap()
+        .lines()
+        .filter(|line| line.starts_with("| `") && line.contains(".pem`"))
+        .flat_map(|line| line.split('`').filter(|word| word.ends_with(".pem")).map(str::to_owned))
+        .collect();
+    assert_eq!(listed.len(), 8, "{listed:?}");
+    for name in listed {
+        assert!(scratch.path("certs").join(&name).exists(), "{name}");
+    }
+    for certs in ["certs", "certs-2"] {
+        let store = scratch.path(certs).join("store");
+        let file = |name: &str| scratch.path(certs).join(name);
+        let mut command = osteon();
+        command.args(["coordinator", "--listen", "0.0.0.0:0", "--store"]).arg(store);
+        command.arg("--tls-ca").arg(file("ca.pem"));
+        command.arg("--tls-cert").arg(file("server.pem"));
+        command.arg("--tls-key").arg(file("server-key.pem"));
+        command.arg("--tokens").arg(scratch.path("tokens"));
+        let mut process = Owned::spawn(command.env("RUST_LOG", "warn"));
+        // Its name is the certificate's, which other machines know.
+        let url = process.line();
+        assert!(url.starts_with("https://node-1.example:"), "{url}");
     }
 }

@@ -42,3 +42,23 @@ pub const JOBS_MAX: usize = 10_000;
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;
+/// Longest message of a worker, bytes: a batch's answer has 1.1 MB.
+pub const WORKER_MESSAGE_BYTES_MAX: usize = 4 << 20;
+/// Longest file of certificates, keys or tokens, bytes.
+pub const CREDENTIAL_FILE_BYTES_MAX: u64 = 4 << 20;
+/// Most tokens that a coordinator knows.
+pub const TOKENS_MAX: usize = 10_000;
+/// Most connections to a coordinator at a time.
+pub const CONNECTIONS_MAX: usize = 3 * WORKERS_MAX;
+/// Most TLS handshakes that a coordinator has under way.
+pub const HANDSHAKES_MAX: usize = 256;
+/// Most submissions whose messages a coordinator reads at a time; others wait.
+pub const SUBMISSIONS_AT_ONCE_MAX: usize = 16;
+/// Longest time from a call to the beginning of its answer, s.
+pub const CALL_S_MAX: u64 = 60;
+/// Longest list of headers of a call, bytes.
+pub const HEADER_BYTES_MAX: u32 = 16 << 10;
+/// Most fetches that a coordinator holds results for at a time; others wait.
+pub const FETCHES_AT_ONCE_MAX: usize = 8;
+/// A fetch ends when its reader takes nothing for this long, s.
+pub const READER_PATIENCE_S: u64 = 30;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_common::limits::ACTIVE_JOBS_MAX;
+use osteon_common::limits::{ACTIVE_JOBS_MAX, CALL_S_MAX};
 
 /// Settings of a coordinator. None of them changes a bit of any result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +25,8 @@ pub struct Config {
     /// When the store has refused a record for this long, [`crate::Coordinator::failed`] says so;
     /// `None`: never. In either case the record is tried again until it is taken.
     pub store_patience: Option<Duration>,
+    /// Longest time from a call to the beginning of its answer.
+    pub call_timeout: Duration,
     /// Longest time that a shutdown waits for streams to end and for the store.
     pub shutdown_timeout: Duration,
 }
@@ -40,6 +42,7 @@ impl Default for Config {
             active_jobs_max: ACTIVE_JOBS_MAX,
             store_retry: Duration::from_secs(2),
             store_patience: None,
+            call_timeout: Duration::from_secs(CALL_S_MAX),
             shutdown_timeout: Duration::from_secs(5),
         }
     }

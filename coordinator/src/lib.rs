@@ -6,6 +6,9 @@
 //! worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
 //! a worker solves.
 
+mod accept;
+pub mod access;
+mod access_layer;
 pub mod config;
 mod core_task;
 pub mod effect;
@@ -13,6 +16,7 @@ pub mod evaluation;
 pub mod event;
 mod failing;
 pub mod failure;
+mod fetching;
 pub mod ids;
 pub mod leftover;
 pub mod listen;
@@ -28,8 +32,13 @@ mod snapshot;
 pub mod state;
 pub mod store;
 mod store_thread;
+pub mod tls;
+pub mod tokens;
 
+pub use access::Policy;
 pub use config::Config;
 pub use failing::Failed;
 pub use listen::{BindError, ListenAddress, Listener};
 pub use shell::{Coordinator, StartError, start};
+pub use tls::Tls;
+pub use tokens::Tokens;

@@ -1,7 +1,7 @@
 //! Where a coordinator listens: a TCP address or a Unix socket.
 //!
-//! Without TLS, which this build does not have, every local user is trusted and nobody else:
-//! an address that other machines can reach is refused unless the operator insists.
+//! Without TLS and tokens every local user is trusted and nobody else: an address that other
+//! machines can reach needs TLS, unless the operator insists.
 
 use std::io;
 use std::net::SocketAddr;
@@ -10,6 +10,11 @@ use std::str::FromStr;
 
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
+
+use crate::accept::Bound;
+use crate::access::Policy;
+use crate::tls::Tls;
+use crate::tokens::Tokens;
 
 /// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. Port 0
 /// takes a free port.
@@ -37,9 +42,9 @@ pub struct AddressError {
 pub enum BindError {
     /// Other machines could reach it.
     #[error(
-        "{address} can be reached from other machines, and this build has no TLS to protect it; \
-         listen on 127.0.0.1, on [::1] or on unix:PATH, or pass --insecure to trust everybody who \
-         can reach the port"
+        "{address} can be reached from other machines; give --tls-cert, --tls-key, --tls-ca and \
+         --tokens, or listen on 127.0.0.1, on [::1] or on unix:PATH, or pass --insecure to trust \
+         everybody who can reach the port"
     )]
     NotLoopback {
         /// The address.
@@ -72,14 +77,12 @@ pub enum BindError {
 /// A bound address, ready to be served by [`crate::start`].
 #[derive(Debug)]
 pub struct Listener {
-    pub(crate) socket: Socket,
+    pub(crate) bound: Bound,
+    /// Of a Unix socket.
+    pub(crate) file: Option<SocketFile>,
+    pub(crate) tls: Option<Tls>,
+    pub(crate) policy: Policy,
     url: String,
-}
-
-#[derive(Debug)]
-pub(crate) enum Socket {
-    Tcp(TcpListener),
-    Unix(UnixListener, SocketFile),
 }
 
 /// The file of a Unix socket; removed with the last that needs it.
@@ -100,7 +103,36 @@ impl Listener {
         }
     }
 
-    /// URL that clients and workers use: `http://127.0.0.1:PORT` or `unix:PATH`.
+    /// Binds an address that anybody may reach: who gets in is decided by certificates and
+    /// `tokens`.
+    ///
+    /// # Errors
+    /// When the operating system refuses the address.
+    pub async fn bind_tls(
+        address: SocketAddr,
+        tls: Tls,
+        tokens: Tokens,
+    ) -> Result<Self, BindError> {
+        let refused = |source| BindError::Tcp { address, source };
+        let listener = TcpListener::bind(address).await.map_err(refused)?;
+        let local = listener.local_addr().map_err(refused)?;
+        let url = match tls.host() {
+            // Every address of this machine: none of them is its name.
+            Some(host) if local.ip().is_unspecified() => format!("https://{host}:{}", local.port()),
+            _ => format!("https://{local}"),
+        };
+        let (bound, policy) = (Bound::Tcp(listener), Policy::Tls(tokens));
+        Ok(Self { bound, file: None, tls: Some(tls), policy, url })
+    }
+
+    /// Lets in only who holds a token.
+    #[must_use]
+    pub fn with_tokens(self, tokens: Tokens) -> Self {
+        Self { policy: Policy::Tokens(tokens), ..self }
+    }
+
+    /// URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT` or
+    /// `unix:PATH`.
     pub fn url(&self) -> &str {
         &self.url
     }
@@ -112,7 +144,7 @@ impl Listener {
         let refused = |source| BindError::Tcp { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let url = format!("http://{}", listener.local_addr().map_err(refused)?);
-        Ok(Self { socket: Socket::Tcp(listener), url })
+        Ok(Self::open(Bound::Tcp(listener), None, url))
     }
 
     async fn bind_unix(path: &Path) -> Result<Self, BindError> {
@@ -128,7 +160,22 @@ impl Listener {
             bound => bound.map_err(refused)?,
         };
         let url = format!("unix:{}", path.display());
-        Ok(Self { socket: Socket::Unix(listener, SocketFile(path.to_owned())), url })
+        Ok(Self::open(Bound::Unix(listener), Some(SocketFile(path.to_owned())), url))
+    }
+
+    /// For everybody who reaches it.
+    fn open(bound: Bound, file: Option<SocketFile>, url: String) -> Self {
+        Self { bound, file, tls: None, policy: Policy::Everybody, url }
+    }
+}
+
+impl ListenAddress {
+    /// Whether only this machine can reach it.
+    pub fn is_local(&self) -> bool {
+        match self {
+            Self::Tcp(address) => address.ip().is_loopback(),
+            Self::Unix(_) => true,
+        }
     }
 }
 
@@ -182,7 +229,7 @@ mod tests {
         let everywhere = "0.0.0.0:0".parse().unwrap();
         let error = Listener::bind(&everywhere, false).await.unwrap_err();
         assert!(error.to_string().contains("--insecure"), "{error}");
-        assert!(error.to_string().contains("no TLS"), "{error}");
+        assert!(error.to_string().contains("--tls-cert"), "{error}");
         assert!(Listener::bind(&everywhere, true).await.is_ok());
     }
 

@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use futures::{Stream, StreamExt as _, stream};
-use osteon_common::limits::NAME_BYTES_MAX;
+use osteon_common::limits::{FETCHES_AT_ONCE_MAX, NAME_BYTES_MAX};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
@@ -13,12 +13,13 @@ use osteon_proto::v1::{
     WatchRequest, WatchResponse,
 };
 use osteon_proto::{realizations, results, specification, status};
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use tonic::{Request, Response, Status};
 
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
 use crate::event;
+use crate::fetching;
 use crate::ids::JobId;
 use crate::leftover::Leftover;
 use crate::store_thread::Command;
@@ -34,13 +35,15 @@ const REALIZATION_BLOCK: usize = 65_536;
 pub(crate) struct JobsService {
     messages: mpsc::Sender<Message>,
     store: mpsc::Sender<Command>,
+    /// What jobs left may be large: a few at a time are held in memory.
+    fetches: Arc<Semaphore>,
 }
 
 type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        Self { messages, store }
+        Self { messages, store, fetches: Arc::new(Semaphore::new(FETCHES_AT_ONCE_MAX)) }
     }
 
     async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
@@ -149,9 +152,9 @@ impl Jobs for JobsService {
         request: Request<FetchRequest>,
     ) -> Result<Response<Self::FetchStream>, Status> {
         let job = job(&request.into_inner().job)?;
+        let place = Arc::clone(&self.fetches).acquire_owned().await.map_err(|_| stopped())?;
         let leftover = self.leftover(job).await?;
-        let parts = parts(leftover).map(|part| Ok(FetchResponse { part: Some(part) }));
-        Ok(Response::new(Box::pin(stream::iter(parts))))
+        Ok(Response::new(Box::pin(fetching::paced(parts(leftover), place))))
     }
 }
 

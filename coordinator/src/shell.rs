@@ -5,21 +5,23 @@
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use osteon_common::limits::MESSAGE_BYTES_MAX;
+use osteon_common::limits::{HEADER_BYTES_MAX, MESSAGE_BYTES_MAX, WORKER_MESSAGE_BYTES_MAX};
 use osteon_proto::v1;
 use osteon_proto::v1::jobs_server::JobsServer;
 use osteon_proto::v1::workers_server::WorkersServer;
 use thiserror::Error;
 use tokio::sync::{mpsc, oneshot};
-use tokio_stream::StreamExt as _;
-use tokio_stream::wrappers::{TcpListenerStream, UnixListenerStream};
 use tonic::transport::Server;
 use tonic::transport::server::Router;
+use tower::layer::util::{Identity, Stack};
 
+use crate::accept;
+use crate::access::Policy;
+use crate::access_layer::AccessLayer;
 use crate::config::Config;
 use crate::core_task::{Clock, Core, Message};
 use crate::failing::{Failed, Failing, Guard};
-use crate::listen::{Listener, Socket};
+use crate::listen::Listener;
 use crate::reactor::{RestoreError, RestoredJob};
 use crate::service_jobs::JobsService;
 use crate::service_workers::WorkersService;
@@ -33,6 +35,9 @@ const EVENTS_MAX: usize = 1024;
 const STREAMS_PER_CONNECTION_MAX: u32 = 256;
 /// A silent connection is probed this often, and given up when a probe stays unanswered as long.
 const KEEPALIVE: Duration = Duration::from_secs(10);
+
+/// The services behind their door.
+type GuardedRouter = Router<Stack<AccessLayer, Identity>>;
 
 /// Why a coordinator does not start.
 #[derive(Debug, Error)]
@@ -93,10 +98,10 @@ pub async fn start(
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
     let (commands, store) = store_thread::start(store, events, failing.guard(Failed::Store))
         .map_err(|source| StartError::Thread { source })?;
-    let router = services(&messages, &commands).await?;
+    let router = services(&messages, &commands, listener.policy.clone(), config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let server = serve(router, listener.socket, stopped);
+    let server = serve(router, listener, stopped);
     let server = tokio::spawn(guarded(failing.guard(Failed::Server), server));
     let guard = failing.guard(Failed::Core);
     let core = Core::new(state, clock, commands, failing.clone());
@@ -160,7 +165,9 @@ async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
 async fn services(
     messages: &mpsc::Sender<Message>,
     commands: &mpsc::Sender<Command>,
-) -> Result<Router, StartError> {
+    policy: Policy,
+    config: Config,
+) -> Result<GuardedRouter, StartError> {
     let jobs = JobsService::new(messages.clone(), commands.clone());
     let workers = WorkersService::new(messages.clone());
     let (health, health_service) = tonic_health::server::health_reporter();
@@ -175,6 +182,9 @@ async fn services(
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE))
         .max_concurrent_streams(Some(STREAMS_PER_CONNECTION_MAX))
+        .http2_max_header_list_size(HEADER_BYTES_MAX)
+        .timeout(config.call_timeout)
+        .layer(AccessLayer::new(policy))
         .add_service(health_service)
         .add_service(reflection)
         .add_service(
@@ -184,29 +194,19 @@ async fn services(
         )
         .add_service(
             WorkersServer::new(workers)
-                .max_decoding_message_size(MESSAGE_BYTES_MAX)
+                .max_decoding_message_size(WORKER_MESSAGE_BYTES_MAX)
                 .max_encoding_message_size(MESSAGE_BYTES_MAX),
         ))
 }
 
-async fn serve(router: Router, socket: Socket, stopped: oneshot::Receiver<()>) {
+async fn serve(router: GuardedRouter, listener: Listener, stopped: oneshot::Receiver<()>) {
     let signal = async {
         // Told, or the coordinator was dropped: both mean stop.
         let _ = stopped.await;
     };
-    let served = match socket {
-        Socket::Tcp(listener) => {
-            let connections = TcpListenerStream::new(listener).map(|connection| {
-                // Small messages shall not wait for more; without it they are only slower.
-                connection.inspect(|stream| drop(stream.set_nodelay(true)))
-            });
-            router.serve_with_incoming_shutdown(connections, signal).await
-        }
-        Socket::Unix(listener, _file) => {
-            router.serve_with_incoming_shutdown(UnixListenerStream::new(listener), signal).await
-        }
-    };
-    if let Err(error) = served {
+    let Listener { bound, tls, file: _file, .. } = listener;
+    let connections = accept::connections(bound, tls);
+    if let Err(error) = router.serve_with_incoming_shutdown(connections, signal).await {
         tracing::error!(%error, "the server ended");
     }
 }

@@ -1,6 +1,8 @@
 //! Where a coordinator is, and a channel to it.
 
 use std::fmt;
+use std::io;
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
@@ -8,10 +10,18 @@ use std::time::Duration;
 use hyper_util::rt::TokioIo;
 use osteon_common::limits::MESSAGE_BYTES_MAX;
 use thiserror::Error;
-use tokio::net::UnixStream;
+use tokio::net::{TcpStream, UnixStream};
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::pki_types::ServerName;
+use tonic::body::Body;
+use tonic::client::GrpcService;
+use tonic::codegen::{self, StdError};
+use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint as Transport, Uri};
 use tower::service_fn;
 
+use crate::credentials::{Bearer, Connector, Credentials};
+use crate::tls_failure::TlsFailure;
 use crate::v1::jobs_client::JobsClient;
 use crate::v1::workers_client::WorkersClient;
 
@@ -22,9 +32,14 @@ const KEEPALIVE_INTERVAL_S: u64 = 5;
 /// A connection is given up when a probe stays unanswered for this long, s.
 const KEEPALIVE_TIMEOUT_S: u64 = 10;
 
-/// Address of a coordinator: `http://HOST:PORT` or `unix:PATH`.
+/// What addresses look like, for messages.
+const FORMS: &str = "https://HOST:PORT, http://HOST:PORT or unix:PATH";
+
+/// Address of a coordinator: `https://HOST:PORT`, `http://HOST:PORT` or `unix:PATH`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Endpoint {
+    /// HTTP/2 in TLS over TCP; the host and port.
+    Https(String),
     /// Plain HTTP/2 over TCP; the host and port.
     Http(String),
     /// A Unix socket.
@@ -34,23 +49,19 @@ pub enum Endpoint {
 /// Why a text is no address of a coordinator.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EndpointError {
-    /// Neither of the known schemes.
-    #[error("`{text}` is no coordinator URL; write http://HOST:PORT or unix:PATH")]
+    /// None of the known schemes.
+    #[error("`{text}` is no coordinator URL; write {FORMS}")]
     Scheme {
         /// What was given.
         text: String,
     },
-    /// TLS is asked for.
-    #[error(
-        "`{text}` asks for TLS, which this build does not have; use http://HOST:PORT or unix:PATH"
-    )]
-    Tls {
-        /// What was given.
-        text: String,
-    },
     /// The host or port cannot be read.
-    #[error("`{text}` must be http://HOST:PORT with a port from 1 to 65535 and nothing behind it")]
+    #[error(
+        "`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing behind it"
+    )]
     Authority {
+        /// `http` or `https`.
+        scheme: &'static str,
         /// What was given.
         text: String,
     },
@@ -75,6 +86,14 @@ pub enum ConnectError {
         /// What the operating system says.
         reason: String,
     },
+    /// Something answers there, but there is no trust.
+    #[error("cannot trust the coordinator at {endpoint}: {failure}")]
+    Tls {
+        /// The address.
+        endpoint: Endpoint,
+        /// Why.
+        failure: TlsFailure,
+    },
     /// No connection in time.
     #[error("the coordinator at {endpoint} did not answer within {seconds} s")]
     Timeout {
@@ -97,42 +116,116 @@ impl FromStr for Endpoint {
             }
             return Ok(Self::Unix(PathBuf::from(path)));
         }
-        if text.starts_with("https://") {
-            return Err(EndpointError::Tls { text: owned() });
+        if let Some(authority) = text.strip_prefix("https://") {
+            return whole(text, "https", authority).map(Self::Https);
         }
-        let Some(authority) = text.strip_prefix("http://") else {
-            return Err(EndpointError::Scheme { text: owned() });
-        };
-        let authority = authority.strip_suffix('/').unwrap_or(authority);
-        let uri: Option<Uri> = format!("http://{authority}").parse().ok();
-        let whole = uri.filter(|uri| {
-            let port = uri.port_u16().is_some_and(|port| port > 0);
-            let host = uri.host().is_some_and(|host| !host.is_empty());
-            port && host && uri.path() == "/" && uri.query().is_none() && !authority.contains('@')
-        });
-        match whole {
-            Some(_) => Ok(Self::Http(authority.to_owned())),
-            None => Err(EndpointError::Authority { text: owned() }),
+        match text.strip_prefix("http://") {
+            Some(authority) => whole(text, "http", authority).map(Self::Http),
+            None => Err(EndpointError::Scheme { text: owned() }),
         }
     }
+}
+
+/// The host and port of a URL that has nothing else.
+fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, EndpointError> {
+    let authority = authority.strip_suffix('/').unwrap_or(authority);
+    let uri: Option<Uri> = format!("{scheme}://{authority}").parse().ok();
+    let whole = uri.filter(|uri| {
+        let port = uri.port_u16().is_some_and(|port| port > 0);
+        let host = uri.host().is_some_and(|host| !host.is_empty());
+        port && host && uri.path() == "/" && uri.query().is_none() && !authority.contains('@')
+    });
+    match whole {
+        Some(_) => Ok(authority.to_owned()),
+        None => Err(EndpointError::Authority { scheme, text: text.to_owned() }),
+    }
+}
+
+impl Endpoint {
+    /// What broke a connection, with a word about TLS where that may be the cause.
+    pub fn explained(&self, reason: &str) -> String {
+        match self {
+            // The answer to plain HTTP/2 was no HTTP/2.
+            Self::Http(authority) if reason.contains("protocol error") => {
+                format!("{reason}; if it speaks TLS, write https://{authority}")
+            }
+            _ => reason.to_owned(),
+        }
+    }
+
+    /// Whether what is sent there stays on this machine: a Unix socket or a loopback address.
+    pub fn is_local(&self) -> bool {
+        let authority = match self {
+            Self::Unix(_) => return true,
+            Self::Https(authority) | Self::Http(authority) => authority,
+        };
+        let host = host(authority);
+        host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+    }
+}
+
+/// Whether `text` is a host name or an IP address, as a certificate can be for.
+pub fn is_host(text: &str) -> bool {
+    ServerName::try_from(text).is_ok()
+}
+
+/// The host of `HOST:PORT`, without the brackets of an IPv6 address.
+fn host(authority: &str) -> &str {
+    let host = authority.rsplit_once(':').map_or(authority, |(host, _)| host);
+    host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host)
 }
 
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Https(authority) => write!(f, "https://{authority}"),
             Self::Http(authority) => write!(f, "http://{authority}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
         }
     }
 }
 
-/// A channel to the coordinator at `endpoint`; dead connections are noticed by keepalive probes.
+/// A channel that shows a token with every call, if there is one.
+pub type Connection = InterceptedService<Channel, Bearer>;
+
+/// As [`connect_with`], without any credentials.
 ///
 /// # Errors
 /// When nothing answers there, or not within `timeout`.
 pub async fn connect(endpoint: &Endpoint, timeout: Duration) -> Result<Channel, ConnectError> {
+    channel(endpoint, None, timeout).await
+}
+
+/// A connection to the coordinator at `endpoint`; dead ones are noticed by keepalive probes.
+///
+/// # Errors
+/// When nothing answers there, or not within `timeout`, or there is no trust.
+pub async fn connect_with(
+    endpoint: &Endpoint,
+    credentials: &Credentials,
+    timeout: Duration,
+) -> Result<Connection, ConnectError> {
+    let channel = channel(endpoint, credentials.tls.clone(), timeout).await?;
+    Ok(InterceptedService::new(channel, credentials.bearer.clone()))
+}
+
+async fn channel(
+    endpoint: &Endpoint,
+    tls: Option<Connector>,
+    timeout: Duration,
+) -> Result<Channel, ConnectError> {
     let attempt = async {
         match endpoint {
+            Endpoint::Https(authority) => {
+                let dialed = authority.clone();
+                let connector = service_fn(move |_: Uri| dial_tls(dialed.clone(), tls.clone()));
+                let origin = Uri::try_from(format!("https://{authority}"));
+                let mut transport = transport(format!("http://{authority}"), timeout)?;
+                if let Ok(origin) = origin {
+                    transport = transport.origin(origin);
+                }
+                transport.connect_with_connector(connector).await
+            }
             Endpoint::Http(authority) => {
                 transport(format!("http://{authority}"), timeout)?.connect().await
             }
@@ -153,9 +246,7 @@ pub async fn connect(endpoint: &Endpoint, timeout: Duration) -> Result<Channel, 
     };
     match tokio::time::timeout(timeout, attempt).await {
         Ok(Ok(channel)) => Ok(channel),
-        Ok(Err(error)) => {
-            Err(ConnectError::Unreachable { endpoint: endpoint.clone(), reason: innermost(&error) })
-        }
+        Ok(Err(error)) => Err(unconnected(endpoint, &error)),
         Err(_) => Err(ConnectError::Timeout {
             endpoint: endpoint.clone(),
             seconds: timeout.as_secs_f64(),
@@ -163,15 +254,49 @@ pub async fn connect(endpoint: &Endpoint, timeout: Duration) -> Result<Channel, 
     }
 }
 
+/// A TLS connection to HOST:PORT. Without credentials there is nobody to believe.
+async fn dial_tls(
+    authority: String,
+    tls: Option<Connector>,
+) -> io::Result<TokioIo<TlsStream<TcpStream>>> {
+    let unnamed = |_| io::Error::new(io::ErrorKind::InvalidInput, "the host name is not valid");
+    let name = ServerName::try_from(host(&authority).to_owned()).map_err(unnamed)?;
+    let Connector(connector) =
+        tls.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "TLS needs --tls-ca FILE"))?;
+    let stream = TcpStream::connect(authority).await?;
+    stream.set_nodelay(true)?;
+    Ok(TokioIo::new(connector.connect(name, stream).await?))
+}
+
+fn unconnected(endpoint: &Endpoint, error: &(dyn std::error::Error + 'static)) -> ConnectError {
+    let endpoint = endpoint.clone();
+    match TlsFailure::of(error) {
+        Some(failure) => ConnectError::Tls { endpoint, failure },
+        None => ConnectError::Unreachable { endpoint, reason: innermost(error) },
+    }
+}
+
 /// A client of the service of jobs, with this project's limit of message sizes.
-pub fn jobs_client(channel: Channel) -> JobsClient<Channel> {
+pub fn jobs_client<T>(channel: T) -> JobsClient<T>
+where
+    T: GrpcService<Body>,
+    T::Error: Into<StdError>,
+    T::ResponseBody: codegen::Body<Data = codegen::Bytes> + Send + 'static,
+    <T::ResponseBody as codegen::Body>::Error: Into<StdError> + Send,
+{
     JobsClient::new(channel)
         .max_decoding_message_size(MESSAGE_BYTES_MAX)
         .max_encoding_message_size(MESSAGE_BYTES_MAX)
 }
 
 /// A client of the service of workers, with this project's limit of message sizes.
-pub fn workers_client(channel: Channel) -> WorkersClient<Channel> {
+pub fn workers_client<T>(channel: T) -> WorkersClient<T>
+where
+    T: GrpcService<Body>,
+    T::Error: Into<StdError>,
+    T::ResponseBody: codegen::Body<Data = codegen::Bytes> + Send + 'static,
+    <T::ResponseBody as codegen::Body>::Error: Into<StdError> + Send,
+{
     WorkersClient::new(channel)
         .max_decoding_message_size(MESSAGE_BYTES_MAX)
         .max_encoding_message_size(MESSAGE_BYTES_MAX)
@@ -209,6 +334,7 @@ mod tests {
     fn addresses_are_read_and_written_back() {
         for text in [
             "http://127.0.0.1:50051",
+            "https://node-3.cluster:443",
             "http://[::1]:1",
             "http://node-3.cluster:65535",
             "unix:/tmp/a b",
@@ -226,9 +352,9 @@ mod tests {
             assert!(message.contains(expected) && message.contains(text), "{message}");
         };
         for text in ["", "localhost:80", "ftp://a:1", "/tmp/socket"] {
-            check(text, "write http://HOST:PORT or unix:PATH");
+            check(text, "write https://HOST:PORT, http://HOST:PORT or unix:PATH");
         }
-        check("https://a:1", "TLS");
+        check("https://a", "must be https://HOST:PORT");
         for text in [
             "http://",
             "http://host",
@@ -243,6 +369,23 @@ mod tests {
         }
         check("unix:", "it has 0");
         check(&format!("unix:/{}", "x".repeat(107)), "it has 108");
+    }
+
+    #[test]
+    fn what_stays_on_this_machine_is_known() {
+        for (url, local) in [
+            ("unix:a", true),
+            ("http://127.0.0.1:1", true),
+            ("http://127.9.9.9:1", true),
+            ("http://[::1]:1", true),
+            ("https://localhost:1", true),
+            ("http://localhost.example:1", false),
+            ("http://10.0.0.1:1", false),
+            ("http://0.0.0.0:1", false),
+            ("http://node-3:1", false),
+        ] {
+            assert_eq!(url.parse::<Endpoint>().unwrap().is_local(), local, "{url}");
+        }
     }
 
     #[tokio::test]

@@ -6,6 +6,8 @@
 //! worker sends is either well formed or a typed [`malformed::Malformed`].
 
 pub mod batch;
+pub mod credential_file;
+pub mod credentials;
 pub mod endpoint;
 pub mod malformed;
 pub mod realizations;
@@ -13,6 +15,8 @@ pub mod results;
 pub mod setup;
 pub mod specification;
 pub mod status;
+pub mod tls_failure;
+pub mod token;
 
 /// The generated messages, clients and servers of package `osteon.v1`.
 #[expect(

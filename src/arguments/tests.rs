@@ -24,10 +24,16 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon identify a.toml --workers 257", "257 is not in 1..=256");
     check("osteon identify a.toml --threads 4097", "4097 is not in 1..=4096");
     check("osteon identify a.toml --workers two", "invalid digit");
-    check("osteon identify a.toml --coordinator https://a:1", "TLS");
+    check("osteon identify a.toml --coordinator https://a", "https://HOST:PORT");
     check("osteon identify a.toml --coordinator http://a:1 --workers 2", "cannot be used with");
     check("osteon identify a.toml --coordinator http://a:1 --threads 2", "cannot be used with");
-    check("osteon identify a.toml --tls-ca ca.pem", "unexpected argument");
+    check("osteon identify a.toml --tokens list", "unexpected argument");
+    check("osteon coordinator --listen a:1 --store s --tls-cert c", "--tls-key");
+    check("osteon coordinator --listen a:1 --store s --insecure --tokens t", "cannot be used with");
+    check("osteon certs", "<DIR>");
+    check("osteon certs d --days 4000", "4000 is not in 1..=3650");
+    check("osteon token a --role write --out t", "[possible values: read, submit, admin]");
+    check("osteon token a --role read", "--out");
     check("osteon simulate a.toml --duration 0", "it must be a number above 0");
     check("osteon simulate a.toml --duration nan", "it must be a number above 0");
     check("osteon simulate a.toml --time-step -1e-8", "unexpected argument");

@@ -4,18 +4,22 @@ use std::fs;
 
 use anyhow::Context as _;
 use osteon_coordinator::store::sqlite::SqliteStore;
-use osteon_coordinator::{BindError, Config, ListenAddress, Listener};
+use osteon_coordinator::{BindError, Config, ListenAddress};
 
 use crate::arguments::CoordinatorArguments;
+use crate::door::Door;
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::resolved::Format;
 use crate::results_directory;
 use crate::signals;
 
-/// Serves until SIGINT or SIGTERM, or until a part of it has ended unasked. The URL in use is printed, and stands in DIR/address.
+/// Serves until SIGINT or SIGTERM, or until a part of it has ended unasked. The URL in use is
+/// printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
+    // Read before anything is bound or made.
+    let door = Door::open(&arguments, &address)?;
     let interruption = signals::interruption()?;
     let directory = arguments.store;
     if matches!(address, ListenAddress::Unix(_)) {
@@ -24,7 +28,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
             .with_context(|| format!("cannot create the directory {}", directory.display()))
             .map_err(Failure::Failed)?;
     }
-    let listener = Listener::bind(&address, arguments.insecure).await.map_err(bind_failure)?;
+    let listener = door.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
     let store = SqliteStore::open(&directory).map_err(Failure::failed)?;
     let coordinator = osteon_coordinator::start(listener, Box::new(store), Config::default())
         .await

@@ -7,12 +7,11 @@ use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_common::job_file;
 use osteon_common::results::Status;
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
 use serde_json::Value;
 use tonic::Code;
 
-use crate::client::{self, Client, ClientError, Fetched};
+use crate::client::{self, Client, ClientError, Fetched, Remote};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::resolved::Format;
@@ -27,7 +26,7 @@ pub(super) async fn submit(
     job: &Path,
     kind: JobKind,
     request_id: &str,
-    coordinator: &Endpoint,
+    coordinator: &Remote,
     format: Format,
 ) -> Result<Ending, Failure> {
     let specification = job_file::read(job, kind).map_err(Failure::bad_input)?;
@@ -38,14 +37,14 @@ pub(super) async fn submit(
 }
 
 /// `jobs`: prints all jobs.
-pub(super) async fn list(coordinator: &Endpoint, format: Format) -> Result<Ending, Failure> {
+pub(super) async fn list(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
     let jobs = Client::connect(coordinator).await?.list().await?;
     output::stdout(format).jobs(&jobs).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
-pub(super) async fn watch(job: &str, coordinator: &Endpoint) -> Result<Ending, Failure> {
+pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
     let mut client = Client::connect(coordinator).await?;
     let mut output = output::stdout(Format::Text);
     let mut last_line: Option<Instant> = None;
@@ -62,18 +61,14 @@ pub(super) async fn watch(job: &str, coordinator: &Endpoint) -> Result<Ending, F
 }
 
 /// `cancel`: prints how the job is then.
-pub(super) async fn cancel(job: &str, coordinator: &Endpoint) -> Result<Ending, Failure> {
+pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
     let snapshot = Client::connect(coordinator).await?.cancel(job).await?;
     output::stdout(Format::Text).snapshot(&snapshot).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
 /// `fetch`: writes what an ended job left. Nothing is written while it has not ended.
-pub(super) async fn fetch(
-    job: &str,
-    coordinator: &Endpoint,
-    out: &Path,
-) -> Result<Ending, Failure> {
+pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<Ending, Failure> {
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {

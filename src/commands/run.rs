@@ -7,10 +7,11 @@ use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
 use osteon_common::results::Status;
+use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
 
-use crate::client::{Client, Fetched};
+use crate::client::{Client, Fetched, Remote};
 use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownResult};
@@ -39,7 +40,7 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
             here(workers, threads, &specification, directory.as_ref(), interruption).await?
         }
         Computers::There(client, endpoint) => {
-            there(client, endpoint, &specification, directory.as_ref(), interruption).await?
+            there(*client, endpoint, &specification, directory.as_ref(), interruption).await?
         }
     };
     let json = keep(run.kind, &fetched, directory.as_ref())?;
@@ -49,14 +50,17 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
 /// Who computes, and is there.
 enum Computers<'a> {
     Here { workers: u32, threads: u32 },
-    There(Client, &'a Endpoint),
+    There(Box<Client>, &'a Endpoint),
 }
 
 impl<'a> Computers<'a> {
     async fn find(place: &'a Place) -> Result<Self, Failure> {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
-            Place::There(endpoint) => Self::There(Client::connect(endpoint).await?, endpoint),
+            Place::There(remote) => {
+                let client = Client::connect(remote).await?;
+                Self::There(Box::new(client), &remote.endpoint)
+            }
         })
     }
 }
@@ -109,8 +113,9 @@ async fn here(
     let progress = Arc::new(AtomicU64::new(0));
     let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
     let endpoint = embedded.endpoint().clone();
+    let remote = Remote { endpoint, files: CredentialFiles::default() };
     let driven = async {
-        let client = Client::connect(&endpoint).await?;
+        let client = Client::connect(&remote).await?;
         let note = |snapshot: &JobSnapshot| {
             let done = snapshot.evaluations.wrapping_mul(snapshot.realizations);
             progress.store(done.wrapping_add(snapshot.realizations_done), Ordering::Relaxed);

@@ -129,6 +129,12 @@ impl Owned {
         Self(command.stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap())
     }
 
+    /// With stderr in a file.
+    pub(crate) fn logged(command: &mut Command, log: &Path) -> Self {
+        let log = fs::File::create(log).unwrap();
+        Self(command.stdout(Stdio::piped()).stderr(log).spawn().unwrap())
+    }
+
     pub(crate) fn id(&self) -> u32 {
         self.0.id()
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::malformed::Malformed;
+use osteon_proto::tls_failure::TlsFailure;
 use thiserror::Error;
 
 /// Why a worker ends before it is told to.
@@ -33,6 +34,14 @@ pub enum WorkerError {
         endpoint: Endpoint,
         /// What the coordinator says.
         reason: String,
+    },
+    /// There is no trust between coordinator and worker.
+    #[error("no trust between this worker and the coordinator at {endpoint}: {failure}")]
+    Distrust {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// Why.
+        failure: TlsFailure,
     },
     /// No coordinator for longer than was asked for.
     #[error("gave up after {seconds} s without the coordinator at {endpoint}; last: {last}")]

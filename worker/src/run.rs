@@ -6,7 +6,9 @@ use std::pin::{Pin, pin};
 use std::time::{Duration, Instant};
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
-use osteon_proto::endpoint::{self, Endpoint};
+use osteon_proto::credentials::Credentials;
+use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
 use osteon_solver::Isa;
@@ -35,6 +37,8 @@ const OUTBOX_MAX: usize = 2 * BATCHES_HELD_MAX;
 pub struct WorkerConfig {
     /// Address of the coordinator.
     pub endpoint: Endpoint,
+    /// What the worker shows to the coordinator, and whom it believes.
+    pub credentials: Credentials,
     /// Threads to compute on, 1 to [`WORKER_THREADS_MAX`].
     pub threads: u32,
     /// The instruction set to compute on; results do not depend on it.
@@ -77,7 +81,9 @@ pub async fn run(
         finished,
         started: Instant::now(),
         last_attached: Instant::now(),
+        ever_attached: false,
         endpoint: config.endpoint.clone(),
+        credentials: config.credentials.clone(),
     };
     let leave = async {
         match config.time_limit {
@@ -99,7 +105,9 @@ struct Worker {
     started: Instant,
     /// The last moment with a lease, or the start.
     last_attached: Instant,
+    ever_attached: bool,
     endpoint: Endpoint,
+    credentials: Credentials,
 }
 
 /// How an attachment ended.
@@ -146,15 +154,16 @@ impl Worker {
         backoff: &mut Backoff,
     ) -> Result<End, WorkerError> {
         let (outbox, requests) = mpsc::channel(OUTBOX_MAX);
-        let endpoint = self.endpoint.clone();
+        let (endpoint, credentials) = (self.endpoint.clone(), self.credentials.clone());
         let hello = self.state.attach();
         let opened = tokio::select! {
             () = leave.as_mut() => return Ok(End::Left),
-            opened = open(&endpoint, hello, &outbox, requests) => opened,
+            opened = open(&endpoint, &credentials, hello, &outbox, requests) => opened,
         };
         let mut responses = match opened {
             Ok(responses) => responses,
             Err(NotOpened::Unreachable(reason)) => return Ok(End::Lost(reason)),
+            Err(NotOpened::Distrust(failure)) => return self.distrusted(failure),
             Err(NotOpened::Status(status)) => return self.ended_with(&status),
         };
         let mut ticks = interval(Duration::from_millis(TICK_MS));
@@ -191,6 +200,7 @@ impl Worker {
             }
             if !was_attached && self.state.is_attached() {
                 backoff.reset();
+                self.ever_attached = true;
                 info!(endpoint = %self.endpoint, "attached");
             }
             if !self.state.is_attached() && Instant::now() > greeted_by {
@@ -242,7 +252,10 @@ impl Worker {
 
     /// What a status means: a refusal is final, everything else is a loss.
     fn ended_with(&self, status: &Status) -> Result<End, WorkerError> {
-        let reason = status.message().to_owned();
+        if let Some(failure) = TlsFailure::of(status) {
+            return self.distrusted(failure);
+        }
+        let reason = self.endpoint.explained(status.message());
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument
@@ -253,6 +266,16 @@ impl Worker {
             }
             code => Ok(End::Lost(format!("{code}: {reason}"))),
         }
+    }
+
+    /// A worker that was taken before waits for certificates to be put right; one that never was
+    /// has the wrong ones.
+    fn distrusted(&self, failure: TlsFailure) -> Result<End, WorkerError> {
+        let endpoint = self.endpoint.clone();
+        if self.ever_attached {
+            return Ok(End::Lost(ConnectError::Tls { endpoint, failure }.to_string()));
+        }
+        Err(WorkerError::Distrust { endpoint, failure })
     }
 
     fn failed(&self, failure: Failure) -> WorkerError {
@@ -268,20 +291,24 @@ impl Worker {
 /// Why there is no stream.
 enum NotOpened {
     Unreachable(String),
+    Distrust(TlsFailure),
     Status(Status),
 }
 
 /// Connects and says hello.
 async fn open(
     endpoint: &Endpoint,
+    credentials: &Credentials,
     hello: Request,
     outbox: &mpsc::Sender<AttachRequest>,
     requests: mpsc::Receiver<AttachRequest>,
 ) -> Result<Streaming<AttachResponse>, NotOpened> {
     let limit = Duration::from_secs(ATTACH_S_MAX);
-    let channel = endpoint::connect(endpoint, limit)
-        .await
-        .map_err(|error| NotOpened::Unreachable(error.to_string()))?;
+    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
+    let channel = connected.map_err(|error| match error {
+        ConnectError::Tls { failure, .. } => NotOpened::Distrust(failure),
+        other => NotOpened::Unreachable(other.to_string()),
+    })?;
     let unanswered = || NotOpened::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty: the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;

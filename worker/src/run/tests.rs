@@ -97,6 +97,7 @@ fn config(scene: &Scene) -> WorkerConfig {
     let endpoint = scene.endpoint.clone();
     WorkerConfig {
         endpoint,
+        credentials: Credentials::default(),
         threads: 1,
         isa: Isa::fastest(),
         give_up_after: None,
@@ -145,6 +146,7 @@ async fn threads_have_bounds() {
         let endpoint = endpoint.clone();
         let config = WorkerConfig {
             endpoint,
+            credentials: Credentials::default(),
             threads,
             isa: Isa::fastest(),
             give_up_after: None,

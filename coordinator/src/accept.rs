@@ -1,0 +1,253 @@
+//! Accepting connections: bounded in number, each with a bounded time to say who it is.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use futures::{Stream, stream};
+use osteon_common::limits::{CONNECTIONS_MAX, HANDSHAKES_MAX};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::JoinSet;
+use tokio::time::{Sleep, sleep, timeout};
+use tokio_rustls::server::TlsStream;
+use tonic::transport::server::Connected;
+
+use crate::access::Certificate;
+use crate::tls::Tls;
+
+/// A peer must complete its handshake, and then send its first bytes, within this time each.
+pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Wait after the operating system gave no connection, e.g. because too many files are open.
+const REFUSED_WAIT: Duration = Duration::from_millis(100);
+
+/// A bound socket.
+#[derive(Debug)]
+pub(crate) enum Bound {
+    Tcp(TcpListener),
+    Unix(UnixListener),
+}
+
+/// A connection whose handshake is over.
+#[derive(Debug)]
+pub(crate) struct Connection {
+    io: Io,
+    certificate: Certificate,
+    /// Until the first byte has come: when to give up.
+    patience: Option<Pin<Box<Sleep>>>,
+    /// One of [`CONNECTIONS_MAX`].
+    _place: OwnedSemaphorePermit,
+}
+
+/// What is known of the peer of a call.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Peer {
+    /// What its certificate says.
+    pub(crate) certificate: Certificate,
+}
+
+#[derive(Debug)]
+enum Io {
+    Tcp(TcpStream),
+    Unix(UnixStream),
+    Tls(Box<TlsStream<TcpStream>>),
+}
+
+/// Connections as they come, with TLS if there is any. A peer that does not complete its handshake
+/// is dropped without a word.
+pub(crate) fn connections(
+    bound: Bound,
+    tls: Option<Tls>,
+) -> impl Stream<Item = io::Result<Connection>> {
+    let acceptor = Acceptor {
+        bound,
+        tls,
+        places: Arc::new(Semaphore::new(CONNECTIONS_MAX)),
+        handshakes: JoinSet::new(),
+    };
+    stream::unfold(acceptor, |mut acceptor| async {
+        let connection = acceptor.next().await;
+        Some((Ok(connection), acceptor))
+    })
+}
+
+struct Acceptor {
+    bound: Bound,
+    tls: Option<Tls>,
+    places: Arc<Semaphore>,
+    handshakes: JoinSet<Option<Connection>>,
+}
+
+impl Acceptor {
+    async fn next(&mut self) -> Connection {
+        loop {
+            tokio::select! {
+                Some(ended) = self.handshakes.join_next() => {
+                    if let Ok(Some(connection)) = ended {
+                        return connection;
+                    }
+                }
+                accepted = accept(&self.bound, &self.places),
+                    if self.handshakes.len() < HANDSHAKES_MAX =>
+                {
+                    let (io, place) = match accepted {
+                        Ok(accepted) => accepted,
+                        Err(error) => {
+                            tracing::warn!(%error, "cannot accept a connection");
+                            sleep(REFUSED_WAIT).await;
+                            continue;
+                        }
+                    };
+                    match (&self.tls, io) {
+                        (Some(tls), Io::Tcp(stream)) => {
+                            self.handshakes.spawn(handshake(tls.clone(), stream, place));
+                        }
+                        (_, io) => return Connection::new(io, Certificate::Absent, place),
+                    }
+                }
+            }
+        }
+    }
+}
+
+async fn accept(bound: &Bound, places: &Arc<Semaphore>) -> io::Result<(Io, OwnedSemaphorePermit)> {
+    let place = Arc::clone(places).acquire_owned().await.map_err(io::Error::other)?;
+    let io = match bound {
+        Bound::Tcp(listener) => {
+            let (stream, _) = listener.accept().await?;
+            // Small messages shall not wait for more; without it they are only slower.
+            drop(stream.set_nodelay(true));
+            Io::Tcp(stream)
+        }
+        Bound::Unix(listener) => Io::Unix(listener.accept().await?.0),
+    };
+    Ok((io, place))
+}
+
+async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> Option<Connection> {
+    let peer = stream.peer_addr().ok();
+    match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
+        Ok(Ok(stream)) => {
+            let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
+            Some(Connection::new(Io::Tls(Box::new(stream)), certificate, place))
+        }
+        Ok(Err(error)) => {
+            tracing::debug!(?peer, %error, "a TLS handshake failed");
+            None
+        }
+        Err(_) => {
+            tracing::debug!(?peer, "a TLS handshake took too long");
+            None
+        }
+    }
+}
+
+impl Connection {
+    fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
+        let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
+        Self { io, certificate, patience, _place: place }
+    }
+}
+
+impl Connected for Connection {
+    type ConnectInfo = Peer;
+
+    fn connect_info(&self) -> Peer {
+        Peer { certificate: self.certificate }
+    }
+}
+
+impl AsyncRead for Connection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        match self.io.poll_read(cx, buffer) {
+            Poll::Ready(read) => {
+                if buffer.filled().len() > before {
+                    self.patience = None;
+                }
+                Poll::Ready(read)
+            }
+            Poll::Pending => {
+                if let Some(patience) = &mut self.patience {
+                    ready!(patience.as_mut().poll(cx));
+                    return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+                }
+                Poll::Pending
+            }
+        }
+    }
+}
+
+impl AsyncWrite for Connection {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        match &mut self.io {
+            Io::Tcp(io) => Pin::new(io).poll_write(cx, bytes),
+            Io::Unix(io) => Pin::new(io).poll_write(cx, bytes),
+            Io::Tls(io) => Pin::new(io).poll_write(cx, bytes),
+        }
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        match &mut self.io {
+            Io::Tcp(io) => Pin::new(io).poll_write_vectored(cx, slices),
+            Io::Unix(io) => Pin::new(io).poll_write_vectored(cx, slices),
+            Io::Tls(io) => Pin::new(io).poll_write_vectored(cx, slices),
+        }
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        match &self.io {
+            Io::Tcp(io) => io.is_write_vectored(),
+            Io::Unix(io) => io.is_write_vectored(),
+            Io::Tls(io) => io.is_write_vectored(),
+        }
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match &mut self.io {
+            Io::Tcp(io) => Pin::new(io).poll_flush(cx),
+            Io::Unix(io) => Pin::new(io).poll_flush(cx),
+            Io::Tls(io) => Pin::new(io).poll_flush(cx),
+        }
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match &mut self.io {
+            Io::Tcp(io) => Pin::new(io).poll_shutdown(cx),
+            Io::Unix(io) => Pin::new(io).poll_shutdown(cx),
+            Io::Tls(io) => Pin::new(io).poll_shutdown(cx),
+        }
+    }
+}
+
+impl Io {
+    fn poll_read(
+        &mut self,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        match self {
+            Self::Tcp(io) => Pin::new(io).poll_read(cx, buffer),
+            Self::Unix(io) => Pin::new(io).poll_read(cx, buffer),
+            Self::Tls(io) => Pin::new(io).poll_read(cx, buffer),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,119 @@
+//! The door of every call: what it says of itself goes to [`crate::access`], whose answer counts.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use osteon_common::limits::SUBMISSIONS_AT_ONCE_MAX;
+use tokio::sync::Semaphore;
+use tonic::body::Body;
+use tonic::codegen::{Service, http};
+use tonic::{Code, Status};
+use tower::Layer;
+
+use crate::accept::Peer;
+use crate::access::{self, Certificate, Denied, Need, Policy};
+use crate::tokens::Role;
+
+/// The one method whose message may be large.
+const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
+
+/// Puts a [`Door`] before a service.
+#[derive(Debug, Clone)]
+pub(crate) struct AccessLayer {
+    policy: Arc<Policy>,
+    submissions: Arc<Semaphore>,
+}
+
+/// A service that only those may call whom the policy lets in.
+#[derive(Debug, Clone)]
+pub(crate) struct Door<S> {
+    inner: S,
+    layer: AccessLayer,
+}
+
+impl AccessLayer {
+    pub(crate) fn new(policy: Policy) -> Self {
+        let submissions = Arc::new(Semaphore::new(SUBMISSIONS_AT_ONCE_MAX));
+        Self { policy: Arc::new(policy), submissions }
+    }
+
+    fn decide<B>(&self, request: &http::Request<B>) -> Result<(), Status> {
+        let path = request.uri().path();
+        let peer = request.extensions().get::<Peer>();
+        let certificate = peer.map_or(Certificate::Absent, |peer| peer.certificate);
+        let header = request.headers().get(http::header::AUTHORIZATION);
+        let presented = access::presented(header.map(http::HeaderValue::as_bytes));
+        let need = access::need(path);
+        match access::decide(&self.policy, certificate, presented, need) {
+            Ok(holder) => {
+                // Who changed something shall be found in the log; who looks is no news.
+                if let (Some(holder), Need::Role(Role::Submit | Role::Admin)) = (holder, need) {
+                    tracing::info!(path, holder, "admitted");
+                }
+                Ok(())
+            }
+            Err(denied) => {
+                tracing::debug!(path, %denied, "a call was refused");
+                Err(denied.into())
+            }
+        }
+    }
+}
+
+impl<S> Layer<S> for AccessLayer {
+    type Service = Door<S>;
+
+    fn layer(&self, inner: S) -> Door<S> {
+        Door { inner, layer: self.clone() }
+    }
+}
+
+impl<S> Service<http::Request<Body>> for Door<S>
+where
+    S: Service<http::Request<Body>, Response = http::Response<Body>> + Clone + Send + 'static,
+    S::Future: Send,
+    S::Error: Send,
+{
+    type Response = http::Response<Body>;
+    type Error = S::Error;
+    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Self::Error>> + Send>>;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.inner.poll_ready(cx)
+    }
+
+    fn call(&mut self, request: http::Request<Body>) -> Self::Future {
+        if let Err(status) = self.layer.decide(&request) {
+            // Before a byte of the message is read.
+            return Box::pin(async move { Ok(status.into_http()) });
+        }
+        if request.uri().path() != SUBMIT {
+            return Box::pin(self.inner.call(request));
+        }
+        // The service that is ready is this one; its clone may not be.
+        let fresh = self.inner.clone();
+        let mut inner = std::mem::replace(&mut self.inner, fresh);
+        let submissions = Arc::clone(&self.layer.submissions);
+        Box::pin(async move {
+            // Large messages are held in memory a few at a time; the others wait their turn, no
+            // longer than a call may take. The semaphore is never closed.
+            let _turn = submissions.acquire_owned().await;
+            inner.call(request).await
+        })
+    }
+}
+
+impl From<Denied> for Status {
+    fn from(denied: Denied) -> Self {
+        let code = match denied {
+            Denied::WeakRole { .. } | Denied::NotAWorker => Code::PermissionDenied,
+            Denied::NoToken
+            | Denied::Unreadable
+            | Denied::UnknownToken
+            | Denied::Faulty(_)
+            | Denied::NoCertificate => Code::Unauthenticated,
+        };
+        Self::new(code, denied.to_string())
+    }
+}

@@ -1,0 +1,185 @@
+//! The coordinator's side of TLS: its files, and what a peer's certificate says of the peer.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use osteon_proto::credential_file::{self, CredentialError};
+use osteon_proto::credentials::{self, ALPN};
+use osteon_proto::tls_failure::TlsFailure;
+use thiserror::Error;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::client::danger::HandshakeSignatureValid;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::{CertificateDer, UnixTime};
+use tokio_rustls::rustls::server::danger::{ClientCertVerified, ClientCertVerifier};
+use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
+use tokio_rustls::rustls::version::TLS13;
+use tokio_rustls::rustls::{
+    self, DigitallySignedStruct, DistinguishedName, ServerConfig, SignatureScheme,
+};
+use webpki::EndEntityCert;
+
+use crate::access::{Certificate, Fault, WORKER_NAME};
+
+/// The files of a listener with TLS.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TlsFiles {
+    /// Certificates of the authorities that workers' certificates may be signed by.
+    pub ca: PathBuf,
+    /// The coordinator's certificate.
+    pub certificate: PathBuf,
+    /// The key of the certificate.
+    pub key: PathBuf,
+}
+
+/// Why TLS cannot be set up.
+#[derive(Debug, Error)]
+pub enum TlsError {
+    /// A file cannot be used.
+    #[error(transparent)]
+    File(#[from] CredentialError),
+    /// The authority's certificate cannot be used.
+    #[error("the certificate of the authority in {} cannot be used: {source}", path.display())]
+    Authority {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: VerifierBuilderError,
+    },
+    /// TLS refuses what the files hold.
+    #[error("TLS cannot be set up: {source}")]
+    Setup {
+        /// Why.
+        source: rustls::Error,
+    },
+}
+
+/// Makes connections into TLS connections.
+#[derive(Clone)]
+pub struct Tls {
+    pub(crate) acceptor: TlsAcceptor,
+    /// Decides of clients' certificates.
+    verifier: Arc<dyn ClientCertVerifier>,
+    /// A host name that the certificate is for, if possible one for other machines.
+    host: Option<String>,
+}
+
+impl Tls {
+    /// Reads and checks the files.
+    ///
+    /// # Errors
+    /// When one of them cannot be used.
+    pub fn load(files: &TlsFiles) -> Result<Self, TlsError> {
+        let setup = |source| TlsError::Setup { source };
+        let provider = Arc::new(ring::default_provider());
+        let identity = credential_file::identity(&files.certificate, &files.key)?;
+        let host = identity.chain.first().and_then(host_name);
+        let roots = Arc::new(credentials::roots(&files.ca)?);
+        let verifier: Arc<dyn ClientCertVerifier> =
+            WebPkiClientVerifier::builder_with_provider(roots, Arc::clone(&provider))
+                // Clients come without; what they may call is decided call by call.
+                .allow_unauthenticated()
+                .build()
+                .map_err(|source| TlsError::Authority { path: files.ca.clone(), source })?;
+        let mut config = ServerConfig::builder_with_provider(provider)
+            .with_protocol_versions(&[&TLS13])
+            .map_err(setup)?
+            .with_client_cert_verifier(Arc::new(LateVerifier(Arc::clone(&verifier))))
+            .with_single_cert(identity.chain, identity.key)
+            .map_err(setup)?;
+        config.alpn_protocols = vec![ALPN.to_vec()];
+        Ok(Self { acceptor: TlsAcceptor::from(Arc::new(config)), verifier, host })
+    }
+
+    /// What the certificates of a peer say, which has proved that it holds the key of the first.
+    pub(crate) fn certificate(&self, chain: Option<&[CertificateDer<'_>]>) -> Certificate {
+        let Some((first, intermediates)) = chain.and_then(|chain| chain.split_first()) else {
+            return Certificate::Absent;
+        };
+        match self.verifier.verify_client_cert(first, intermediates, UnixTime::now()) {
+            Ok(_) if is_workers(first) => Certificate::Worker,
+            Ok(_) => Certificate::Other,
+            Err(error) => Certificate::Faulty(fault(&error)),
+        }
+    }
+
+    /// A host name that the certificate is for.
+    pub(crate) fn host(&self) -> Option<&str> {
+        self.host.as_deref()
+    }
+}
+
+impl std::fmt::Debug for Tls {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tls").field("host", &self.host).finish_non_exhaustive()
+    }
+}
+
+/// Lets every certificate through the handshake whose key the peer holds. Whether it is in order
+/// is looked at behind the handshake ([`Tls::certificate`]) and told in the answer to the first
+/// call: an alert of TLS, which may be lost with the connection, would leave people guessing.
+#[derive(Debug)]
+struct LateVerifier(Arc<dyn ClientCertVerifier>);
+
+impl ClientCertVerifier for LateVerifier {
+    fn root_hint_subjects(&self) -> &[DistinguishedName] {
+        self.0.root_hint_subjects()
+    }
+
+    fn verify_client_cert(
+        &self,
+        _: &CertificateDer<'_>,
+        _: &[CertificateDer<'_>],
+        _: UnixTime,
+    ) -> Result<ClientCertVerified, rustls::Error> {
+        Ok(ClientCertVerified::assertion())
+    }
+
+    fn verify_tls12_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signed: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        self.0.verify_tls12_signature(message, certificate, signed)
+    }
+
+    fn verify_tls13_signature(
+        &self,
+        message: &[u8],
+        certificate: &CertificateDer<'_>,
+        signed: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        self.0.verify_tls13_signature(message, certificate, signed)
+    }
+
+    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
+        self.0.supported_verify_schemes()
+    }
+
+    fn client_auth_mandatory(&self) -> bool {
+        false
+    }
+}
+
+fn is_workers(certificate: &CertificateDer<'_>) -> bool {
+    EndEntityCert::try_from(certificate)
+        .is_ok_and(|certificate| certificate.valid_uri_names().any(|name| name == WORKER_NAME))
+}
+
+fn fault(error: &rustls::Error) -> Fault {
+    match TlsFailure::of(error) {
+        Some(TlsFailure::UnknownAuthority) => Fault::UnknownAuthority,
+        Some(TlsFailure::Expired) => Fault::Expired,
+        Some(TlsFailure::NotYetValid) => Fault::NotYetValid,
+        Some(TlsFailure::OtherPurpose) => Fault::OtherUsage,
+        _ => Fault::Unusable,
+    }
+}
+
+/// The first of the certificate's names, `localhost` only if there is no other.
+fn host_name(certificate: &CertificateDer<'_>) -> Option<String> {
+    let certificate = EndEntityCert::try_from(certificate).ok()?;
+    let names = || certificate.valid_dns_names().filter(|name| !name.contains('*'));
+    names().find(|name| *name != "localhost").or_else(|| names().next()).map(str::to_owned)
+}

@@ -1,0 +1,292 @@
+//! The tokens that a coordinator takes: names, roles, hashes. Read from a text, compared without
+//! telling by time how much of a hash was right.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use osteon_common::limits::{NAME_BYTES_MAX, TOKENS_MAX};
+use osteon_proto::credential_file::{self, CredentialError};
+use osteon_proto::token::{Token, TokenHash};
+use thiserror::Error;
+
+/// What the holder of a token may do; each role may do what those before it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// See every job and fetch every result.
+    Read,
+    /// Submit and cancel jobs.
+    Submit,
+    /// Everything.
+    Admin,
+}
+
+/// The tokens that are taken.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Tokens(Vec<Entry>);
+
+/// Whom a token belongs to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Holder {
+    /// The name, for logs.
+    pub name: String,
+    /// What the holder may do.
+    pub role: Role,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Entry {
+    holder: Holder,
+    hash: TokenHash,
+}
+
+/// Why a file of tokens cannot be used. No message holds a word of the file but names and roles.
+#[derive(Debug, Error)]
+pub enum TokensError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] CredentialError),
+    /// A line cannot be read.
+    #[error("{}: line {line} {fault}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        fault: LineFault,
+    },
+    /// Nobody could do anything.
+    #[error("{} holds no tokens; `osteon token` makes one", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// More than there can be people.
+    #[error("{} holds more than {max} tokens", path.display())]
+    TooMany {
+        /// The file.
+        path: PathBuf,
+        /// Most tokens.
+        max: usize,
+    },
+}
+
+/// What is wrong with a line of a file of tokens.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum LineFault {
+    /// Not three words.
+    #[error("has {words} words; it must be `NAME ROLE HASH`, as `osteon token` prints it")]
+    Words {
+        /// How many there are.
+        words: usize,
+    },
+    /// The name is unusable.
+    #[error(
+        "has no usable name; allowed are 1 to {NAME_BYTES_MAX} letters, digits and `.`, `_`, `-`, `@`"
+    )]
+    Name,
+    /// The role is unknown.
+    #[error("gives `{name}` an unknown role; allowed are read, submit, admin")]
+    Role {
+        /// Of whom.
+        name: String,
+    },
+    /// The token itself stands where its hash should.
+    #[error(
+        "holds the token of `{name}` itself, not its hash; make a new token with `osteon token`, \
+         which prints the hash"
+    )]
+    TokenItself {
+        /// Of whom.
+        name: String,
+    },
+    /// The hash is none.
+    #[error("gives `{name}` what is no hash (`blake3:` and 64 hexadecimal digits)")]
+    Hash {
+        /// Of whom.
+        name: String,
+    },
+    /// The hash is there already.
+    #[error("gives `{name}` a token that line {first} has already")]
+    Twice {
+        /// Of whom.
+        name: String,
+        /// The other line, from 1.
+        first: usize,
+    },
+}
+
+impl Tokens {
+    /// Reads the file of tokens at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, holds no token, or a line is wrong.
+    pub fn read(path: &Path) -> Result<Self, TokensError> {
+        let text = credential_file::secret_text(path)?;
+        Self::parse(&text, path)
+    }
+
+    /// One token that may do everything, read from the file that its holder uses, too.
+    ///
+    /// # Errors
+    /// When the file cannot be used.
+    pub fn with_admin(mut self, path: &Path) -> Result<Self, TokensError> {
+        let token = credential_file::token(path)?;
+        let holder = Holder { name: "token-file".to_owned(), role: Role::Admin };
+        self.0.push(Entry { holder, hash: token.hash() });
+        Ok(self)
+    }
+
+    /// Whose token a text is. Every hash is compared, each in constant time.
+    pub fn holder(&self, text: &str) -> Option<&Holder> {
+        let hash = Token::parse(text).ok()?.hash();
+        let mut found = None;
+        for entry in &self.0 {
+            if entry.hash == hash {
+                found = Some(&entry.holder);
+            }
+        }
+        found
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self, TokensError> {
+        let mut entries = Vec::new();
+        let mut lines: BTreeMap<String, usize> = BTreeMap::new();
+        for (line, words) in text.lines().enumerate() {
+            let line = line + 1;
+            let words = words.split('#').next().unwrap_or_default();
+            if words.trim().is_empty() {
+                continue;
+            }
+            let wrong = |fault| TokensError::Line { path: path.to_owned(), line, fault };
+            let entry = entry(words).map_err(wrong)?;
+            if let Some(first) = lines.insert(entry.hash.to_string(), line) {
+                return Err(wrong(LineFault::Twice { name: entry.holder.name, first }));
+            }
+            if entries.len() == TOKENS_MAX {
+                return Err(TokensError::TooMany { path: path.to_owned(), max: TOKENS_MAX });
+            }
+            entries.push(entry);
+        }
+        if entries.is_empty() {
+            return Err(TokensError::Empty { path: path.to_owned() });
+        }
+        Ok(Self(entries))
+    }
+}
+
+impl Role {
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Submit => "submit",
+            Self::Admin => "admin",
+        }
+    }
+
+    /// The role of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Read, Self::Submit, Self::Admin].into_iter().find(|role| role.name() == name)
+    }
+}
+
+/// Whether a token can have this name.
+pub fn is_name(name: &str) -> bool {
+    let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-@".contains(&byte);
+    (1..=NAME_BYTES_MAX).contains(&name.len()) && name.bytes().all(allowed)
+}
+
+/// The line of a file of tokens.
+pub fn line(name: &str, role: Role, hash: &TokenHash) -> String {
+    format!("{name} {} {hash}", role.name())
+}
+
+fn entry(text: &str) -> Result<Entry, LineFault> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let [name, role, hash] = words[..] else {
+        return Err(LineFault::Words { words: words.len() });
+    };
+    // A token in the wrong place must not be shown as a name.
+    if !is_name(name) || Token::parse(name).is_ok() {
+        return Err(LineFault::Name);
+    }
+    let name = name.to_owned();
+    let Some(role) = Role::named(role) else { return Err(LineFault::Role { name }) };
+    if Token::parse(hash).is_ok() {
+        return Err(LineFault::TokenItself { name });
+    }
+    let Some(hash) = TokenHash::parse(hash) else { return Err(LineFault::Hash { name }) };
+    Ok(Entry { holder: Holder { name, role }, hash })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Tokens, String> {
+        Tokens::parse(text, Path::new("tokens")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_token_has_its_holder() {
+        let tokens: Vec<_> = (0..3).map(|_| Token::generate().unwrap()).collect();
+        let lines = [("ann", Role::Read), ("bob@lab", Role::Submit), ("root", Role::Admin)];
+        let text: String = lines
+            .iter()
+            .zip(&tokens)
+            .map(|((name, role), token)| line(name, *role, &token.hash()) + "  # since May\n\n")
+            .collect();
+        let read = parse(&format!("# tokens\n{text}")).unwrap();
+        for ((name, role), token) in lines.iter().zip(&tokens) {
+            let holder = read.holder(token.reveal()).unwrap();
+            assert_eq!((holder.name.as_str(), holder.role), (*name, *role));
+            let hash = token.hash().to_string();
+            assert!(read.holder(&hash).is_none(), "a hash is no token");
+        }
+        assert_eq!(read.holder(Token::generate().unwrap().reveal()), None);
+        assert_eq!(read.holder(""), None);
+    }
+
+    #[test]
+    fn a_wrong_line_is_named_and_never_shown() {
+        let token = Token::generate().unwrap();
+        let (secret, hash) = (token.reveal(), token.hash());
+        let long = "n".repeat(NAME_BYTES_MAX + 1);
+        for (text, expected) in [
+            (String::new(), "holds no tokens"),
+            ("# nobody\n".to_owned(), "holds no tokens"),
+            (format!("\nann read\n{hash}"), "line 2 has 2 words"),
+            (format!("ann read {hash} more"), "line 1 has 4 words"),
+            (secret.to_owned(), "line 1 has 1 words"),
+            (format!("ann/ read {hash}"), "no usable name"),
+            (format!("{long} read {hash}"), "no usable name"),
+            (format!("{secret} read {hash}"), "no usable name"),
+            (format!("ann write {hash}"), "gives `ann` an unknown role"),
+            (format!("ann {secret} {hash}"), "gives `ann` an unknown role"),
+            (format!("ann read {secret}"), "holds the token of `ann` itself"),
+            ("ann read blake3:12".to_owned(), "what is no hash"),
+            (
+                format!("ann read {hash}\n\nbob read {hash}"),
+                "line 3 gives `bob` a token that line 1",
+            ),
+        ] {
+            let error = parse(&text).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+            assert!(!error.contains(secret), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_has_a_bound() {
+        let line = |i: usize| format!("n{i} read {}\n", TokenHash::parse(&hash(i)).unwrap());
+        let at: String = (0..TOKENS_MAX).map(line).collect();
+        assert!(parse(&at).is_ok());
+        let error = parse(&(at + &line(TOKENS_MAX))).unwrap_err();
+        assert!(error.contains("more than 10000"), "{error}");
+    }
+
+    fn hash(i: usize) -> String {
+        format!("blake3:{i:064x}")
+    }
+}

@@ -1,0 +1,136 @@
+//! What is larger than allowed is refused, what is as large as allowed is not, and many may come
+//! at once.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod fake;
+
+use std::time::Duration;
+
+use osteon_common::limits::{HEADER_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX, WORKER_MESSAGE_BYTES_MAX};
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_proto::endpoint::{connect, jobs_client, workers_client};
+use osteon_proto::specification;
+use osteon_proto::v1::attach_request::Message;
+use osteon_proto::v1::{AttachRequest, ListRequest, SubmitRequest, SubmitResponse, WorkerHello};
+use prost::Message as _;
+use tonic::client::Grpc;
+use tonic::codegen::http::uri::PathAndQuery;
+use tonic::transport::Channel;
+use tonic::{Code, Request};
+use tonic_prost::ProstCodec;
+
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+async fn coordinator() -> (Coordinator, Channel) {
+    coordinator_with(Config::default()).await
+}
+
+async fn coordinator_with(config: Config) -> (Coordinator, Channel) {
+    let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
+    let store = Box::new(MemoryStore::new());
+    let coordinator = start(listener, store, config).await.unwrap();
+    let channel = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
+    (coordinator, channel)
+}
+
+/// A hello whose message has `bytes` bytes.
+fn hello(bytes: usize) -> AttachRequest {
+    let with = |length: usize| AttachRequest {
+        message: Some(Message::Hello(WorkerHello {
+            host: "h".repeat(length),
+            ..WorkerHello::default()
+        })),
+    };
+    // Two lengths stand before the name, each in as many bytes as it takes.
+    let mut length = bytes;
+    while with(length).encoded_len() > bytes {
+        length -= with(length).encoded_len() - bytes;
+    }
+    with(length)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_workers_message_is_read_up_to_its_bound() {
+    let (coordinator, channel) = coordinator().await;
+    for (bytes, code) in [
+        // Read, and refused for what it says.
+        (WORKER_MESSAGE_BYTES_MAX, Some(Code::InvalidArgument)),
+        // Not read: the stream ends.
+        (WORKER_MESSAGE_BYTES_MAX + 1, None),
+    ] {
+        let message = hello(bytes);
+        assert_eq!(message.encoded_len(), bytes);
+        let outgoing =
+            tokio_stream::StreamExt::chain(tokio_stream::once(message), tokio_stream::pending());
+        let attached = workers_client(channel.clone()).attach(outgoing).await;
+        let first = tokio::time::timeout(TIMEOUT, attached.unwrap().get_mut().message()).await;
+        let found = first.unwrap().map(|message| assert!(message.is_none()));
+        assert_eq!(found.err().map(|status| status.code()), code, "{bytes} bytes");
+    }
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn headers_are_read_up_to_their_bound() {
+    let (coordinator, channel) = coordinator().await;
+    let mut client = jobs_client(channel);
+    // What gRPC itself sends takes some room.
+    for (bytes, passes) in
+        [(HEADER_BYTES_MAX as usize - 1000, true), (HEADER_BYTES_MAX as usize, false)]
+    {
+        let mut request = Request::new(ListRequest::default());
+        request.metadata_mut().insert("x-long", "x".repeat(bytes).parse().unwrap());
+        let answer = client.list(request).await;
+        assert_eq!(answer.is_ok(), passes, "{bytes} bytes: {answer:?}");
+    }
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn more_submissions_than_are_read_at_a_time_wait_their_turn() {
+    let (coordinator, channel) = coordinator().await;
+    let specification = specification::to_message(&fake::identification(100, 10, 7));
+    let mut calls = tokio::task::JoinSet::new();
+    for _ in 0..10 * SUBMISSIONS_AT_ONCE_MAX {
+        let mut client = jobs_client(channel.clone());
+        let specification = Some(specification.clone());
+        calls.spawn(async move {
+            let request = SubmitRequest { specification, request_id: String::new() };
+            client.submit(request).await.map(drop)
+        });
+    }
+    while let Some(call) = calls.join_next().await {
+        call.unwrap().unwrap();
+    }
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_call_whose_message_never_ends_is_given_up() {
+    let call_timeout = Duration::from_millis(200);
+    let (coordinator, channel) =
+        coordinator_with(Config { call_timeout, ..Config::default() }).await;
+    // More of them than submissions are read at a time: they must not block the others for ever.
+    let mut calls = tokio::task::JoinSet::new();
+    for _ in 0..2 * SUBMISSIONS_AT_ONCE_MAX {
+        let mut grpc = Grpc::new(channel.clone());
+        calls.spawn(async move {
+            grpc.ready().await.unwrap();
+            let path = PathAndQuery::from_static("/osteon.v1.Jobs/Submit");
+            let endless = Request::new(tokio_stream::pending::<SubmitRequest>());
+            let codec = ProstCodec::<SubmitRequest, SubmitResponse>::default();
+            grpc.client_streaming(endless, path, codec).await.map(drop)
+        });
+    }
+    while let Some(call) = tokio::time::timeout(TIMEOUT, calls.join_next()).await.unwrap() {
+        let status = call.unwrap().unwrap_err();
+        assert!(matches!(status.code(), Code::DeadlineExceeded | Code::Cancelled), "{status}");
+    }
+    let specification = Some(specification::to_message(&fake::identification(100, 10, 7)));
+    let request = SubmitRequest { specification, request_id: String::new() };
+    jobs_client(channel).submit(request).await.unwrap();
+    coordinator.shutdown().await;
+}

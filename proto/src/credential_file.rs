@@ -1,0 +1,279 @@
+//! Files of certificates, keys and tokens: read with bounds, refused when others can read what is
+//! secret or change what is trusted. Errors name the file and what to do, never what it holds.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+
+use osteon_common::limits::CREDENTIAL_FILE_BYTES_MAX;
+use thiserror::Error;
+use tokio_rustls::rustls;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::{self, PemObject as _};
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
+use tokio_rustls::rustls::sign::CertifiedKey;
+use webpki::{EndEntityCert, KeyUsage};
+
+use crate::token::{NoToken, Token};
+
+/// What others may do with a file.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// Nothing; the group may read, as services that get their secrets mounted need.
+    Secret,
+    /// Read, but not change.
+    Trusted,
+}
+
+/// Why a file of certificates, keys or tokens cannot be used.
+#[derive(Debug, Error)]
+pub enum CredentialError {
+    /// The operating system does not give it.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is no such file at all.
+    #[error("{} has more than {max} bytes, and is no file of certificates, keys or tokens", path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Most bytes.
+        max: u64,
+    },
+    /// It holds bytes that are no text.
+    #[error("{} holds bytes that are no text", path.display())]
+    NoText {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Others can read a secret.
+    #[error(
+        "{0} is open to other users (mode {mode:04o}); it is a secret: chmod 600 {0}, and make it \
+         anew if somebody may have read it",
+        path.display()
+    )]
+    Exposed {
+        /// The file.
+        path: PathBuf,
+        /// Its permissions.
+        mode: u32,
+    },
+    /// Others can change what is trusted.
+    #[error("{0} can be changed by other users (mode {mode:04o}): chmod 644 {0}", path.display())]
+    Changeable {
+        /// The file.
+        path: PathBuf,
+        /// Its permissions.
+        mode: u32,
+    },
+    /// It is damaged.
+    #[error("{} is no PEM file: {source}", path.display())]
+    Pem {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        source: pem::Error,
+    },
+    /// It holds no certificate.
+    #[error(
+        "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` makes \
+         them", path.display()
+    )]
+    NoCertificate {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It holds no private key.
+    #[error(
+        "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` makes \
+         them", path.display()
+    )]
+    NoKey {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It holds a key that cannot be used.
+    #[error("the key in {} cannot be used: {source}", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: rustls::Error,
+    },
+    /// Certificate and key do not belong together.
+    #[error(
+        "the key in {} is not the one of the certificate in {}; give the two that were made together",
+        key.display(), certificate.display()
+    )]
+    Mismatch {
+        /// The file of the certificate.
+        certificate: PathBuf,
+        /// The file of the key.
+        key: PathBuf,
+    },
+    /// The certificate's time is over.
+    #[error("the certificate in {} has expired; make a new one", path.display())]
+    Expired {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The certificate's time has not come.
+    #[error("the certificate in {} is not valid yet; is this machine's clock right?", path.display())]
+    NotYetValid {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The certificate cannot be understood.
+    #[error("the certificate in {} cannot be used: {source}", path.display())]
+    Certificate {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: webpki::Error,
+    },
+    /// The certificate cannot be an authority's.
+    #[error("the certificate in {} is no authority's: {source}", path.display())]
+    Root {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: rustls::Error,
+    },
+    /// It holds no token.
+    #[error("what {} holds {source}", path.display())]
+    Token {
+        /// The file.
+        path: PathBuf,
+        /// What a token is.
+        source: NoToken,
+    },
+}
+
+/// A certificate with the chain above it, and its key.
+#[derive(Debug)]
+pub struct Identity {
+    /// The certificate first.
+    pub chain: Vec<CertificateDer<'static>>,
+    /// The key of the first.
+    pub key: PrivateKeyDer<'static>,
+}
+
+/// Reads a certificate and its key, and checks that they belong together and are in their time.
+///
+/// # Errors
+/// When a file cannot be used.
+pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialError> {
+    let chain = certificates(certificate)?;
+    in_its_time(certificate, &chain)?;
+    let private = private_key(key)?;
+    let cannot = |source| CredentialError::Key { path: key.to_owned(), source };
+    let provider = ring::default_provider();
+    match CertifiedKey::from_der(chain.clone(), private.clone_key(), &provider) {
+        Ok(_) => {}
+        Err(rustls::Error::InconsistentKeys(_)) => {
+            let (certificate, key) = (certificate.to_owned(), key.to_owned());
+            return Err(CredentialError::Mismatch { certificate, key });
+        }
+        Err(source) => return Err(cannot(source)),
+    }
+    Ok(Identity { chain, key: private })
+}
+
+/// Reads a file of certificates; there is at least one.
+///
+/// # Errors
+/// When the file cannot be used.
+pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, CredentialError> {
+    let bytes = read(path, Kind::Trusted)?;
+    let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&bytes).collect();
+    let found = found.map_err(|source| CredentialError::Pem { path: path.to_owned(), source })?;
+    if found.is_empty() {
+        return Err(CredentialError::NoCertificate { path: path.to_owned() });
+    }
+    Ok(found)
+}
+
+/// Reads a client's token.
+///
+/// # Errors
+/// When the file cannot be used.
+pub fn token(path: &Path) -> Result<Token, CredentialError> {
+    let text = secret_text(path)?;
+    Token::parse(&text).map_err(|source| CredentialError::Token { path: path.to_owned(), source })
+}
+
+/// Reads a text that others must not see.
+///
+/// # Errors
+/// When the file cannot be used.
+pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
+    let bytes = read(path, Kind::Secret)?;
+    String::from_utf8(bytes).map_err(|_| CredentialError::NoText { path: path.to_owned() })
+}
+
+fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CredentialError> {
+    let bytes = read(path, Kind::Secret)?;
+    PrivateKeyDer::from_pem_slice(&bytes).map_err(|source| match source {
+        pem::Error::NoItemsFound => CredentialError::NoKey { path: path.to_owned() },
+        source => CredentialError::Pem { path: path.to_owned(), source },
+    })
+}
+
+/// The permissions looked at are those of the file that is read, whatever its name means later.
+fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
+    let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
+    let file = File::open(path).map_err(unreadable)?;
+    let mode = file.metadata().map_err(unreadable)?.permissions().mode() & 0o7777;
+    match kind {
+        Kind::Secret if mode & 0o027 != 0 => {
+            return Err(CredentialError::Exposed { path: path.to_owned(), mode });
+        }
+        Kind::Trusted if mode & 0o022 != 0 => {
+            return Err(CredentialError::Changeable { path: path.to_owned(), mode });
+        }
+        Kind::Secret | Kind::Trusted => {}
+    }
+    let mut bytes = Vec::new();
+    let max = CREDENTIAL_FILE_BYTES_MAX;
+    file.take(max + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > max {
+        return Err(CredentialError::TooLong { path: path.to_owned(), max });
+    }
+    Ok(bytes)
+}
+
+/// Refuses a certificate that its peer would refuse for its dates. Who trusts it is the peer's
+/// matter: here there is no trust anchor, and the search for one ends behind the check of dates.
+fn in_its_time(path: &Path, chain: &[CertificateDer<'static>]) -> Result<(), CredentialError> {
+    let path = || path.to_owned();
+    let unusable = |source| CredentialError::Certificate { path: path(), source };
+    let Some(first) = chain.first() else {
+        return Err(CredentialError::NoCertificate { path: path() });
+    };
+    let certificate = EndEntityCert::try_from(first).map_err(unusable)?;
+    let usage = KeyUsage::server_auth();
+    let now = UnixTime::now();
+    match certificate.verify_for_usage(
+        webpki::ALL_VERIFICATION_ALGS,
+        &[],
+        &[],
+        now,
+        usage,
+        None,
+        None,
+    ) {
+        Err(webpki::Error::CertExpired { .. }) => Err(CredentialError::Expired { path: path() }),
+        Err(webpki::Error::CertNotValidYet { .. }) => {
+            Err(CredentialError::NotYetValid { path: path() })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,114 @@
+use std::fs;
+
+use rcgen::{CertificateParams, KeyPair};
+use tempfile::TempDir;
+
+use super::*;
+
+/// A directory with files as an operator may have them.
+struct Place(TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn write(&self, name: &str, text: impl AsRef<[u8]>, mode: u32) -> PathBuf {
+        let path = self.0.path().join(name);
+        fs::write(&path, text).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+        path
+    }
+
+    /// A certificate with its key, valid from one year to another.
+    fn pair(&self, name: &str, from: i32, to: i32) -> (PathBuf, PathBuf) {
+        let key = KeyPair::generate().unwrap();
+        let mut params = CertificateParams::default();
+        params.not_before = rcgen::date_time_ymd(from, 1, 1);
+        params.not_after = rcgen::date_time_ymd(to, 1, 1);
+        let certificate = params.self_signed(&key).unwrap();
+        (
+            self.write(&format!("{name}.pem"), certificate.pem(), 0o644),
+            self.write(&format!("{name}-key.pem"), key.serialize_pem(), 0o600),
+        )
+    }
+}
+
+#[test]
+fn a_certificate_and_its_key_are_read() {
+    let place = Place::new();
+    let (certificate, key) = place.pair("good", 2000, 4000);
+    assert_eq!(identity(&certificate, &key).unwrap().chain.len(), 1);
+    // As services get their secrets mounted.
+    fs::set_permissions(&key, fs::Permissions::from_mode(0o440)).unwrap();
+    assert!(identity(&certificate, &key).is_ok());
+}
+
+#[test]
+fn what_cannot_be_used_is_named_with_what_to_do() {
+    let place = Place::new();
+    let (certificate, key) = place.pair("good", 2000, 4000);
+    let (_, other_key) = place.pair("other", 2000, 4000);
+    let (expired, expired_key) = place.pair("expired", 2000, 2001);
+    let (future, future_key) = place.pair("future", 3999, 4000);
+    let text = fs::read_to_string(&key).unwrap();
+    let half = &text[..text.len() / 2];
+    let begin = "-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n";
+    let absent = place.0.path().join("absent");
+    let check = |certificate: &Path, key: &Path, named: &Path, expected: &str| {
+        let error = identity(certificate, key).unwrap_err().to_string();
+        let name = named.to_str().unwrap();
+        assert!(error.contains(expected) && error.contains(name), "{name}, {expected}: {error}");
+        assert!(!error.contains(text.lines().nth(1).unwrap()), "the key is told: {error}");
+    };
+    check(&absent, &key, &absent, "cannot read");
+    check(&certificate, &absent, &absent, "cannot read");
+    check(place.0.path(), &key, place.0.path(), "can");
+    check(&certificate, &other_key, &other_key, "is not the one of the certificate");
+    check(&expired, &expired_key, &expired, "has expired; make a new one");
+    check(&future, &future_key, &future, "not valid yet");
+    check(&key, &key, &key, "holds no certificate");
+    check(&certificate, &certificate, &certificate, "open to other users");
+    for (name, bytes, mode, expected) in [
+        ("world", text.as_bytes(), 0o604, "chmod 600"),
+        ("open", text.as_bytes(), 0o644, "(mode 0644)"),
+        ("group", text.as_bytes(), 0o660, "open to other users"),
+        ("empty", b"", 0o600, "holds no private key"),
+        ("half", half.as_bytes(), 0o600, "PEM"),
+        ("wrong", begin.as_bytes(), 0o600, "cannot be used"),
+        ("long", &vec![b'x'; CREDENTIAL_FILE_BYTES_MAX as usize + 1], 0o600, "more than 4194304"),
+    ] {
+        let path = place.write(name, bytes, mode);
+        check(&certificate, &path, &path, expected);
+    }
+    let garbled = place.write(
+        "garbled.pem",
+        "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n",
+        0o644,
+    );
+    check(&garbled, &key, &garbled, "garbled");
+    let changeable = place.write("changeable.pem", fs::read(&certificate).unwrap(), 0o666);
+    check(&changeable, &key, &changeable, "chmod 644");
+}
+
+#[test]
+fn a_token_is_read_or_refused_without_being_told() {
+    let place = Place::new();
+    let good = Token::generate().unwrap();
+    let file = place.write("token", format!("{}\n", good.reveal()), 0o600);
+    assert_eq!(token(&file).unwrap(), good);
+    for (name, bytes, mode, expected) in [
+        ("open", good.reveal().as_bytes(), 0o644, "chmod 600"),
+        ("word", b"correct horse".as_slice(), 0o600, "is no token of osteon"),
+        ("hash", good.hash().to_string().as_bytes(), 0o600, "is no token of osteon"),
+        ("bytes", b"\xff\xfe", 0o600, "no text"),
+        ("empty", b"", 0o600, "is no token of osteon"),
+    ] {
+        let path = place.write(name, bytes, mode);
+        let error = token(&path).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains(name), "{name}: {error}");
+        for secret in [good.reveal(), "correct horse"] {
+            assert!(!error.contains(secret), "{error}");
+        }
+    }
+}

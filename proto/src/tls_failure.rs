@@ -1,0 +1,110 @@
+//! Why TLS did not come about, in words that tell what to do.
+
+use std::error::Error;
+use std::io;
+
+use thiserror::Error;
+use tokio_rustls::rustls::{self, CertificateError};
+
+/// Why there is no trust between two peers.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TlsFailure {
+    /// Another authority signed the peer's certificate.
+    #[error("its certificate is not signed by the authority in --tls-ca; is that the right file?")]
+    UnknownAuthority,
+    /// The peer's certificate is too old.
+    #[error("its certificate has expired; it needs a new one")]
+    Expired,
+    /// The peer's certificate is too young.
+    #[error("its certificate is not valid yet; are the clocks right?")]
+    NotYetValid,
+    /// The peer is somebody else, or has another name.
+    #[error("its certificate is not for this host name; it is for {names}")]
+    OtherName {
+        /// Whom the certificate is for.
+        names: String,
+    },
+    /// The peer's certificate is for something else.
+    #[error("its certificate is not one for coordinators")]
+    OtherPurpose,
+    /// The peer speaks no TLS.
+    #[error("it does not speak TLS; write http://HOST:PORT if that is meant")]
+    NoTls,
+    /// Something else.
+    #[error("TLS failed: {0}")]
+    Other(rustls::Error),
+}
+
+impl TlsFailure {
+    /// What an error says of TLS, if it does.
+    pub fn of(error: &(dyn Error + 'static)) -> Option<Self> {
+        let mut cause = Some(error);
+        while let Some(error) = cause {
+            if let Some(tls) = error.downcast_ref::<rustls::Error>() {
+                return Some(Self::from_rustls(tls));
+            }
+            // An I/O error hides the error that it was made of from the chain of causes.
+            let hidden = error.downcast_ref::<io::Error>().and_then(io::Error::get_ref);
+            cause = match hidden {
+                Some(hidden) => Some(hidden),
+                None => error.source(),
+            };
+        }
+        None
+    }
+
+    fn from_rustls(error: &rustls::Error) -> Self {
+        use rustls::Error as Tls;
+        match error {
+            Tls::InvalidCertificate(certificate) => Self::from_certificate(certificate, error),
+            Tls::InvalidMessage(_) => Self::NoTls,
+            other => Self::Other(other.clone()),
+        }
+    }
+
+    fn from_certificate(certificate: &CertificateError, error: &rustls::Error) -> Self {
+        use CertificateError as Certificate;
+        match certificate {
+            Certificate::UnknownIssuer | Certificate::BadSignature => Self::UnknownAuthority,
+            Certificate::Expired | Certificate::ExpiredContext { .. } => Self::Expired,
+            Certificate::NotValidYet | Certificate::NotValidYetContext { .. } => Self::NotYetValid,
+            Certificate::NotValidForName => Self::OtherName { names: "other names".to_owned() },
+            Certificate::NotValidForNameContext { presented, .. } if presented.is_empty() => {
+                Self::OtherName { names: "no name at all".to_owned() }
+            }
+            Certificate::NotValidForNameContext { presented, .. } => {
+                Self::OtherName { names: presented.join(", ") }
+            }
+            Certificate::InvalidPurpose | Certificate::InvalidPurposeContext { .. } => {
+                Self::OtherPurpose
+            }
+            _ => Self::Other(error.clone()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_found_under_others_and_told_in_words() {
+        let check = |error: rustls::Error, expected: &str| {
+            let hidden = io::Error::new(io::ErrorKind::InvalidData, error);
+            let outer = io::Error::other(tonic::Status::from_error(Box::new(hidden)));
+            let failure = TlsFailure::of(&outer).map(|failure| failure.to_string());
+            assert!(failure.as_ref().is_some_and(|text| text.contains(expected)), "{failure:?}");
+        };
+        let certificate = rustls::Error::InvalidCertificate;
+        check(certificate(CertificateError::UnknownIssuer), "--tls-ca");
+        check(certificate(CertificateError::Expired), "expired");
+        check(certificate(CertificateError::NotValidYet), "clocks");
+        check(certificate(CertificateError::NotValidForName), "host name");
+        check(certificate(CertificateError::InvalidPurpose), "not one for coordinators");
+        let alert = rustls::AlertDescription::InternalError;
+        check(rustls::Error::AlertReceived(alert), "TLS failed");
+        let no_tls = rustls::InvalidMessage::InvalidContentType;
+        check(rustls::Error::InvalidMessage(no_tls), "http://");
+        assert_eq!(TlsFailure::of(&io::Error::other("reset")), None);
+    }
+}

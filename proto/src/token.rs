@@ -1,0 +1,137 @@
+//! Bearer tokens of clients: 256 random bits in a text, and the hash by which a coordinator knows
+//! them. Nothing here prints a token.
+
+use std::fmt;
+
+use thiserror::Error;
+use tokio_rustls::rustls::crypto::ring;
+
+/// Every token begins so; scanners for leaked secrets can look for it.
+const PREFIX: &str = "osteon_";
+/// Random bytes of a token.
+const RANDOM_BYTES: usize = 32;
+/// Characters of a token: the prefix and two hexadecimal digits for each byte.
+const TOKEN_CHARACTERS: usize = PREFIX.len() + 2 * RANDOM_BYTES;
+/// What a line of hashes calls the hash.
+const HASH_PREFIX: &str = "blake3:";
+
+/// A token. It has so many random bits that a fast hash hides it; therefore only tokens of
+/// [`Token::generate`]'s form are taken, never a password that a person thought of.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Token(String);
+
+/// A text that is no token. It says nothing of the text, which may be another secret.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error(
+    "is no token of osteon (`{PREFIX}` and {} hexadecimal digits, as `osteon token` makes them)",
+    2 * RANDOM_BYTES
+)]
+pub struct NoToken;
+
+/// The operating system gives no random numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the operating system gives no random numbers")]
+pub struct NoRandomness;
+
+/// The BLAKE3 hash of a token. Comparing two takes the same time wherever they differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TokenHash(blake3::Hash);
+
+impl Token {
+    /// A new token.
+    ///
+    /// # Errors
+    /// When the operating system gives no random numbers.
+    pub fn generate() -> Result<Self, NoRandomness> {
+        let mut random = [0; RANDOM_BYTES];
+        ring::default_provider().secure_random.fill(&mut random).map_err(|_| NoRandomness)?;
+        let digits: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self(format!("{PREFIX}{digits}")))
+    }
+
+    /// Reads a token, without the white space around it.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn parse(text: &str) -> Result<Self, NoToken> {
+        let text = text.trim();
+        let digits = text.strip_prefix(PREFIX).ok_or(NoToken)?;
+        let hexadecimal = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+        if text.len() != TOKEN_CHARACTERS || !digits.bytes().all(hexadecimal) {
+            return Err(NoToken);
+        }
+        Ok(Self(text.to_owned()))
+    }
+
+    /// Its hash.
+    pub fn hash(&self) -> TokenHash {
+        TokenHash(blake3::hash(self.0.as_bytes()))
+    }
+
+    /// The token itself, for the one file or the one header that holds it.
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Token(…)")
+    }
+}
+
+impl TokenHash {
+    /// Reads a hash as [`Display`](fmt::Display) writes it.
+    pub fn parse(text: &str) -> Option<Self> {
+        let digits = text.strip_prefix(HASH_PREFIX)?;
+        blake3::Hash::from_hex(digits).ok().map(Self)
+    }
+}
+
+impl fmt::Display for TokenHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{HASH_PREFIX}{}", self.0.to_hex())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_are_read_or_refused() {
+        let digits = "0123456789abcdef".repeat(4);
+        let good = format!("osteon_{digits}");
+        assert_eq!(Token::parse(&format!(" {good}\n")).unwrap().reveal(), good);
+        for bad in [
+            String::new(),
+            "secret".to_owned(),
+            digits.clone(),
+            format!("osteon_{}", &digits[1..]),
+            format!("osteon_{digits}0"),
+            format!("osteon_{}", digits.to_uppercase()),
+            format!("Osteon_{digits}"),
+            format!("osteon_{}é", &digits[2..]),
+        ] {
+            assert_eq!(Token::parse(&bad), Err(NoToken), "{bad}");
+        }
+    }
+
+    #[test]
+    fn two_tokens_differ_and_neither_is_printed() {
+        let (one, other) = (Token::generate().unwrap(), Token::generate().unwrap());
+        assert_eq!(Token::parse(one.reveal()), Ok(one.clone()));
+        assert_ne!(one, other);
+        assert_ne!(one.hash(), other.hash());
+        assert_eq!(TokenHash::parse(&one.hash().to_string()), Some(one.hash()));
+        assert!(!format!("{one:?} {}", one.hash()).contains(&one.reveal()[PREFIX.len()..]));
+    }
+
+    #[test]
+    fn what_is_no_hash_is_refused() {
+        let hash = Token::generate().unwrap().hash().to_string();
+        for bad in ["", "blake3:", &hash[1..], &hash[..hash.len() - 1], "blake3:é"] {
+            assert_eq!(TokenHash::parse(bad), None, "{bad}");
+        }
+    }
+}

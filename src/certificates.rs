@@ -1,0 +1,103 @@
+//! A certificate authority for one installation, and the certificates that it signs. Knows no
+//! file.
+
+use osteon_coordinator::access::{CLIENT_NAME, WORKER_NAME};
+use rcgen::{
+    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
+    KeyUsagePurpose, SanType,
+};
+use time::{Duration, OffsetDateTime};
+
+/// Days that an authority is valid.
+const AUTHORITY_DAYS: i64 = 3650;
+/// Certificates are valid a little before they are made: clocks differ.
+const CLOCK_MARGIN: Duration = Duration::hours(1);
+/// Names of this machine that every coordinator's certificate is for.
+const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
+
+/// A certificate and its key, both in PEM.
+pub(crate) struct Made {
+    /// The certificate.
+    pub(crate) certificate: String,
+    /// Its key: a secret.
+    pub(crate) key: String,
+}
+
+/// An authority that can sign.
+pub(crate) struct Authority(Issuer<'static, KeyPair>);
+
+/// Whom a certificate is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bearer<'a> {
+    /// A coordinator, and the hosts that it can be reached by, besides this machine's own names.
+    Coordinator(&'a [String]),
+    /// A worker.
+    Worker,
+    /// A client.
+    Client,
+}
+
+impl Authority {
+    /// A new authority, valid from `now` on.
+    pub(crate) fn new(now: OffsetDateTime) -> Result<(Self, Made), rcgen::Error> {
+        let key = KeyPair::generate()?;
+        let mut params = CertificateParams::default();
+        params.distinguished_name = named(&format!("osteon authority of {}", now.date()));
+        params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+        params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+        params.not_before = now - CLOCK_MARGIN;
+        params.not_after = now + Duration::days(AUTHORITY_DAYS);
+        let certificate = params.self_signed(&key)?.pem();
+        let made = Made { certificate, key: key.serialize_pem() };
+        Ok((Self(Issuer::new(params, key)), made))
+    }
+
+    /// An authority that was made earlier.
+    pub(crate) fn from_pem(certificate: &str, key: &str) -> Result<Self, rcgen::Error> {
+        Ok(Self(Issuer::from_ca_cert_pem(certificate, KeyPair::from_pem(key)?)?))
+    }
+
+    /// A certificate for `bearer`, valid for `days` from `now` on.
+    pub(crate) fn sign(
+        &self,
+        bearer: Bearer<'_>,
+        now: OffsetDateTime,
+        days: u16,
+    ) -> Result<Made, rcgen::Error> {
+        let mut params = match bearer {
+            Bearer::Coordinator(hosts) => {
+                let local = LOCAL_HOSTS.map(str::to_owned);
+                CertificateParams::new(hosts.iter().cloned().chain(local).collect::<Vec<_>>())?
+            }
+            Bearer::Worker => with_uri(WORKER_NAME)?,
+            Bearer::Client => with_uri(CLIENT_NAME)?,
+        };
+        let (name, usage) = match bearer {
+            Bearer::Coordinator(_) => ("osteon coordinator", ExtendedKeyUsagePurpose::ServerAuth),
+            Bearer::Worker => ("osteon worker", ExtendedKeyUsagePurpose::ClientAuth),
+            Bearer::Client => ("osteon client", ExtendedKeyUsagePurpose::ClientAuth),
+        };
+        params.distinguished_name = named(name);
+        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+        params.extended_key_usages = vec![usage];
+        params.use_authority_key_identifier_extension = true;
+        params.not_before = now - CLOCK_MARGIN;
+        params.not_after = now + Duration::days(i64::from(days));
+        let key = KeyPair::generate()?;
+        let certificate = params.signed_by(&key, &self.0)?.pem();
+        Ok(Made { certificate, key: key.serialize_pem() })
+    }
+}
+
+fn named(name: &str) -> rcgen::DistinguishedName {
+    let mut distinguished = rcgen::DistinguishedName::new();
+    distinguished.push(DnType::OrganizationName, "osteon");
+    distinguished.push(DnType::CommonName, name);
+    distinguished
+}
+
+fn with_uri(uri: &str) -> Result<CertificateParams, rcgen::Error> {
+    let mut params = CertificateParams::default();
+    params.subject_alt_names = vec![SanType::URI(uri.try_into()?)];
+    Ok(params)
+}

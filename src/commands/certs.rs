@@ -1,0 +1,79 @@
+//! `certs`: a certificate authority and the certificates of one installation.
+
+use std::path::Path;
+
+use anyhow::{Context as _, anyhow};
+use osteon_proto::credential_file;
+use osteon_proto::endpoint;
+use time::OffsetDateTime;
+
+use crate::arguments::CertsArguments;
+use crate::certificates::{Authority, Bearer, Made};
+use crate::ending::{Ending, Failure, stdout_failure};
+use crate::new_files::{self, NewFile};
+use crate::output;
+use crate::resolved::Format;
+
+/// Name of the authority's files.
+const AUTHORITY: &str = "ca";
+
+/// Writes `NAME.pem` and `NAME-key.pem` for the authority, the coordinator (`server`), workers
+/// (`worker`) and clients (`client`); prints their names.
+pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
+    let CertsArguments { directory, host, days, ca } = arguments;
+    if let Some(wrong) = host.iter().find(|host| !endpoint::is_host(host)) {
+        return Err(Failure::bad_input(anyhow!(
+            "--host `{wrong}` is neither a host name nor an IP address"
+        )));
+    }
+    let now = OffsetDateTime::now_utc();
+    let (authority, mut files) = match ca {
+        Some(ca) => existing(ca, directory)?,
+        None => {
+            let (authority, made) = Authority::new(now).map_err(unmade)?;
+            (authority, pair(directory, AUTHORITY, made))
+        }
+    };
+    let bearers = [
+        ("server", Bearer::Coordinator(host)),
+        ("worker", Bearer::Worker),
+        ("client", Bearer::Client),
+    ];
+    for (name, bearer) in bearers {
+        let made = authority.sign(bearer, now, *days).map_err(unmade)?;
+        files.extend(pair(directory, name, made));
+    }
+    new_files::private_directory(directory)?;
+    new_files::create(&files)?;
+    let names: String = files.iter().map(|file| format!("{}\n", file.path.display())).collect();
+    output::stdout(Format::Text).verbatim(&names).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+/// The authority in `ca`, whose certificate is to stand in `directory`, too.
+fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Failure> {
+    let (certificate, key) = (ca.join("ca.pem"), ca.join("ca-key.pem"));
+    credential_file::identity(&certificate, &key).map_err(Failure::bad_input)?;
+    let text = std::fs::read_to_string(&certificate)
+        .with_context(|| format!("cannot read {}", certificate.display()))
+        .map_err(Failure::BadInput)?;
+    let secret = credential_file::secret_text(&key).map_err(Failure::bad_input)?;
+    let authority = Authority::from_pem(&text, &secret)
+        .with_context(|| format!("{} is no authority that can sign", certificate.display()))
+        .map_err(Failure::BadInput)?;
+    let copy = NewFile { path: directory.join("ca.pem"), text, secret: false };
+    Ok((authority, vec![copy]))
+}
+
+fn pair(directory: &Path, name: &str, made: Made) -> Vec<NewFile> {
+    let file = |suffix: &str, text, secret| NewFile {
+        path: directory.join(format!("{name}{suffix}")),
+        text,
+        secret,
+    };
+    vec![file(".pem", made.certificate, false), file("-key.pem", made.key, true)]
+}
+
+fn unmade(error: rcgen::Error) -> Failure {
+    Failure::Failed(anyhow::Error::new(error).context("cannot make a certificate"))
+}

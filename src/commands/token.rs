@@ -1,0 +1,41 @@
+//! `token`: a token for a client, and the line that admits it.
+
+use anyhow::anyhow;
+use osteon_coordinator::tokens::{self, Role};
+use osteon_proto::token::Token;
+
+use crate::arguments::TokenArguments;
+use crate::ending::{Ending, Failure, stdout_failure};
+use crate::new_files::{self, NewFile};
+use crate::output;
+use crate::resolved::Format;
+
+/// Writes the token to its file; its line goes to the coordinator's list, or to stdout.
+pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
+    let TokenArguments { name, role, out, tokens: list } = arguments;
+    let role = Role::named(role).ok_or_else(|| {
+        Failure::bad_input(anyhow!("there is no role `{role}`; allowed are read, submit, admin"))
+    })?;
+    if !tokens::is_name(name) {
+        return Err(Failure::bad_input(anyhow!(
+            "`{name}` cannot be a token's name; allowed are 1 to 256 letters, digits and . _ - @"
+        )));
+    }
+    let token = Token::generate().map_err(Failure::failed)?;
+    let text = format!("{}\n", token.reveal());
+    new_files::create(&[NewFile { path: out.clone(), text, secret: true }])?;
+    let line = tokens::line(name, role, &token.hash());
+    match list {
+        Some(list) => {
+            if let Err(failure) = new_files::append(list, &line) {
+                // A token that nobody admits is of no use.
+                drop(std::fs::remove_file(out));
+                return Err(failure);
+            }
+        }
+        None => {
+            output::stdout(Format::Text).verbatim(&format!("{line}\n")).map_err(stdout_failure)?
+        }
+    }
+    Ok(Ending::Done)
+}

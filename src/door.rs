@@ -1,0 +1,89 @@
+//! Who gets in at a coordinator: options about certificates and tokens, checked against the
+//! address.
+
+use anyhow::anyhow;
+use osteon_coordinator::tls::TlsFiles;
+use osteon_coordinator::{BindError, ListenAddress, Listener, Tls, Tokens};
+
+use crate::arguments::CoordinatorArguments;
+use crate::ending::Failure;
+
+/// What a listener asks of those who come.
+pub(crate) enum Door {
+    /// Nothing.
+    Open,
+    /// A token, without TLS.
+    Tokens(Tokens),
+    /// Certificates and tokens.
+    Tls(Tls, Tokens),
+}
+
+impl Door {
+    /// Reads the files that the options name.
+    ///
+    /// # Errors
+    /// When one cannot be used, or the options do not fit the address.
+    pub(crate) fn open(
+        arguments: &CoordinatorArguments,
+        address: &ListenAddress,
+    ) -> Result<Self, Failure> {
+        let CoordinatorArguments { tls_ca, tls_cert, tls_key, .. } = arguments;
+        let tokens = tokens(arguments)?;
+        let (Some(ca), Some(certificate), Some(key)) = (tls_ca, tls_cert, tls_key) else {
+            return match tokens {
+                None => Ok(Self::Open),
+                Some(_) if !address.is_local() => Err(Failure::bad_input(anyhow!(
+                    "tokens would be readable on their way to {}; give --tls-cert, --tls-key and \
+                     --tls-ca, or listen on a loopback address or unix:PATH",
+                    arguments.listen
+                ))),
+                Some(tokens) => Ok(Self::Tokens(tokens)),
+            };
+        };
+        if matches!(address, ListenAddress::Unix(_)) {
+            return Err(Failure::bad_input(anyhow!(
+                "a Unix socket has no TLS; leave out --tls-ca, --tls-cert and --tls-key"
+            )));
+        }
+        let files = TlsFiles { ca: ca.clone(), certificate: certificate.clone(), key: key.clone() };
+        let tls = Tls::load(&files).map_err(Failure::bad_input)?;
+        let tokens = tokens.ok_or_else(|| {
+            Failure::bad_input(anyhow!(
+                "without --tokens FILE no client can do anything; `osteon token` makes one"
+            ))
+        })?;
+        Ok(Self::Tls(tls, tokens))
+    }
+
+    /// Binds the address.
+    ///
+    /// # Errors
+    /// When it cannot be listened on.
+    pub(crate) async fn bind(
+        self,
+        address: &ListenAddress,
+        insecure: bool,
+    ) -> Result<Listener, BindError> {
+        match (self, address) {
+            (Self::Tls(tls, tokens), ListenAddress::Tcp(address)) => {
+                Listener::bind_tls(*address, tls, tokens).await
+            }
+            (Self::Tokens(tokens) | Self::Tls(_, tokens), _) => {
+                Ok(Listener::bind(address, insecure).await?.with_tokens(tokens))
+            }
+            (Self::Open, _) => Listener::bind(address, insecure).await,
+        }
+    }
+}
+
+fn tokens(arguments: &CoordinatorArguments) -> Result<Option<Tokens>, Failure> {
+    let CoordinatorArguments { tokens, token_file, .. } = arguments;
+    let listed = tokens.as_deref().map(Tokens::read).transpose().map_err(Failure::bad_input)?;
+    match token_file {
+        None => Ok(listed),
+        Some(file) => {
+            let listed = listed.unwrap_or_default();
+            listed.with_admin(file).map(Some).map_err(Failure::bad_input)
+        }
+    }
+}

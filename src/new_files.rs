@@ -1,0 +1,98 @@
+//! Files that are made and never replaced: certificates, keys, tokens.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow};
+
+use crate::ending::Failure;
+
+/// A file to be made.
+pub(crate) struct NewFile {
+    /// Where.
+    pub(crate) path: PathBuf,
+    /// What it holds.
+    pub(crate) text: String,
+    /// Whether only its owner may read it.
+    pub(crate) secret: bool,
+}
+
+/// Makes all files, or none.
+///
+/// # Errors
+/// When one of them is there already (bad input), or cannot be written.
+pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
+    for NewFile { path, .. } in files {
+        if path.symlink_metadata().is_ok() {
+            return Err(Failure::bad_input(anyhow!(
+                "{} exists already and is not replaced; remove it, or choose another place",
+                path.display()
+            )));
+        }
+    }
+    for (made, file) in files.iter().enumerate() {
+        if let Err(error) = write(file) {
+            for earlier in &files[..made] {
+                // The first error is the one to tell.
+                drop(fs::remove_file(&earlier.path));
+            }
+            return Err(Failure::Failed(error));
+        }
+    }
+    Ok(())
+}
+
+/// Makes a directory that only its owner can enter; one that is there stays as it is.
+///
+/// # Errors
+/// When it cannot be made.
+pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
+    let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
+    made.with_context(|| format!("cannot create the directory {}", path.display()))
+        .map_err(Failure::Failed)
+}
+
+/// Adds a line to a secret file, which is made if need be.
+///
+/// # Errors
+/// When it cannot be written.
+pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
+    let write = || -> std::io::Result<()> {
+        let mut file =
+            OpenOptions::new().read(true).append(true).create(true).mode(0o600).open(path)?;
+        let whole = ends_with_newline(&file)?;
+        // In one piece: others may add lines at the same time.
+        file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
+        file.sync_all()
+    };
+    write().with_context(|| format!("cannot add to {}", path.display())).map_err(Failure::Failed)
+}
+
+fn write(file: &NewFile) -> anyhow::Result<()> {
+    let mode = if file.secret { 0o600 } else { 0o644 };
+    let write = || -> std::io::Result<()> {
+        let mut options = OpenOptions::new();
+        let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
+        let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
+        if written.is_err() {
+            // Half a file is none.
+            drop(fs::remove_file(&file.path));
+        }
+        written
+    };
+    write().with_context(|| format!("cannot write {}", file.path.display()))
+}
+
+/// Whether a line can be added behind the last byte.
+fn ends_with_newline(file: &fs::File) -> std::io::Result<bool> {
+    use std::os::unix::fs::FileExt as _;
+    let length = file.metadata()?.len();
+    if length == 0 {
+        return Ok(true);
+    }
+    let mut last = [0];
+    file.read_exact_at(&mut last, length - 1)?;
+    Ok(last == *b"\n")
+}
