@@ -126,6 +126,7 @@ impl Client {
         let request = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
             request_id: request_id.to_owned(),
+            ..v1::SubmitRequest::default()
         };
         let call = self.jobs.submit(request);
         Ok(answered(&self.endpoint, call).await?.job)

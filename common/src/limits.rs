@@ -42,3 +42,5 @@ pub const JOBS_MAX: usize = 10_000;
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;
+/// Highest priority of a job among those of its client.
+pub const PRIORITY_MAX: u32 = 9;

@@ -4,22 +4,24 @@ use osteon_common::outcome::{Solved, encode};
 use osteon_common::parameters::Point;
 use thiserror::Error;
 
-use crate::evaluation::Contradiction;
+use crate::dispute::Contradiction;
 use crate::search::ReplayError;
 
 /// A failure of a job.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Failure {
-    /// Two answers for one index differ.
+    /// Two answers for one index differ, and there is nobody to decide.
     #[error(
-        "integrity error: two workers answered realization {} at the point {:?} differently, \
-         {} and {}; one of them computes wrongly: run the job on each machine alone and compare \
-         the digests",
-        contradiction.index, point.0, shown(contradiction.earlier), shown(contradiction.later)
+        "integrity error: realization {} at the point {:?} is {} by {} and {} by {}; one of them \
+         computes wrongly, and no third worker was there to decide: attach three workers and \
+         submit the job again, or run it on each machine alone and compare the digests",
+        contradiction.index, point.0,
+        shown(contradiction.answers[0].1), contradiction.answers[0].0,
+        shown(contradiction.answers[1].1), contradiction.answers[1].0
     )]
     Contradiction {
         /// The answers.
-        contradiction: Contradiction,
+        contradiction: Box<Contradiction>,
         /// The point.
         point: Point,
     },
@@ -40,9 +42,16 @@ pub enum Failure {
     /// The stored evaluations are not those of the job's search.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// A stored evaluation is gone.
+    #[error("the store has no evaluation {number} of this job any more; submit it again")]
+    Missing {
+        /// Number of the evaluation.
+        number: u64,
+    },
 }
 
-fn shown(solved: Solved) -> String {
+/// An answer, for people.
+pub(crate) fn shown(solved: Solved) -> String {
     match solved.outcome {
         Ok(velocity) => format!(
             "{velocity} m/s (bits {:016x}, estimated error {:?})",

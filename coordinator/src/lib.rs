@@ -6,8 +6,10 @@
 //! worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
 //! a worker solves.
 
+mod audit;
 pub mod config;
 mod core_task;
+pub mod dispute;
 pub mod effect;
 pub mod evaluation;
 pub mod event;
@@ -28,6 +30,7 @@ mod snapshot;
 pub mod state;
 pub mod store;
 mod store_thread;
+pub mod worker_name;
 
 pub use config::Config;
 pub use failing::Failed;

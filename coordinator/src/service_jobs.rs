@@ -2,14 +2,16 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
+use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
-use osteon_common::limits::NAME_BYTES_MAX;
+use osteon_common::limits::{NAME_BYTES_MAX, PRIORITY_MAX};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
-    CancelRequest, CancelResponse, FetchRequest, FetchResponse, GetRequest, GetResponse,
-    HistoryBlock, JobSnapshot, JobState, ListRequest, ListResponse, SubmitRequest, SubmitResponse,
+    CancelRequest, CancelResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest,
+    GetResponse, HistoryBlock, JobSnapshot, JobState, ListExpelledRequest, ListExpelledResponse,
+    ListRequest, ListResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse,
     WatchRequest, WatchResponse,
 };
 use osteon_proto::{realizations, results, specification, status};
@@ -18,9 +20,9 @@ use tonic::{Request, Response, Status};
 
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
-use crate::event;
+use crate::event::{self, Retention};
 use crate::ids::JobId;
-use crate::leftover::Leftover;
+use crate::leftover::{Leftover, ReadError};
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
@@ -60,14 +62,16 @@ impl JobsService {
     }
 
     async fn leftover(&self, job: JobId) -> Result<Leftover, Status> {
-        let Answer::Ended { record, end } = self.ask(event::Request::Fetch(job)).await? else {
+        let Answer::Ended(end) = self.ask(event::Request::Fetch(job)).await? else {
             return Err(unexpected());
         };
         let (reply, leftover) = oneshot::channel();
-        let read = Command::Read { record, end, reply };
-        self.store.send(read).await.map_err(|_| stopped())?;
-        let leftover = leftover.await.map_err(|_| stopped())?;
-        leftover.map_err(|error| Status::data_loss(error.to_string()))
+        let fetch = Command::Fetch { end, reply };
+        self.store.send(fetch).await.map_err(|_| stopped())?;
+        leftover.await.map_err(|_| stopped())?.map_err(|error| match error {
+            ReadError::Pruned { .. } => Status::not_found(error.to_string()),
+            _ => Status::data_loss(error.to_string()),
+        })
     }
 }
 
@@ -80,11 +84,19 @@ impl Jobs for JobsService {
         &self,
         request: Request<SubmitRequest>,
     ) -> Result<Response<SubmitResponse>, Status> {
-        let SubmitRequest { specification: message, request_id } = request.into_inner();
-        if request_id.len() > NAME_BYTES_MAX {
+        let SubmitRequest { specification: message, request_id, client, priority } =
+            request.into_inner();
+        for (field, value) in [("request_id", &request_id), ("client", &client)] {
+            if value.len() > NAME_BYTES_MAX {
+                return Err(Status::invalid_argument(format!(
+                    "{field} has {} bytes; at most {NAME_BYTES_MAX} are allowed",
+                    value.len()
+                )));
+            }
+        }
+        if priority > PRIORITY_MAX {
             return Err(Status::invalid_argument(format!(
-                "request_id has {} bytes; at most {NAME_BYTES_MAX} are allowed",
-                request_id.len()
+                "priority is {priority}; 0 to {PRIORITY_MAX} are allowed"
             )));
         }
         let message =
@@ -92,7 +104,8 @@ impl Jobs for JobsService {
         let specification = specification::from_message(&message)
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
-        match self.ask(event::Request::Submit { specification, request_id }).await? {
+        let submit = event::Request::Submit { specification, request_id, client, priority };
+        match self.ask(submit).await? {
             Answer::Submitted(job) => Ok(Response::new(SubmitResponse { job: job.to_string() })),
             _ => Err(unexpected()),
         }
@@ -152,6 +165,43 @@ impl Jobs for JobsService {
         let leftover = self.leftover(job).await?;
         let parts = parts(leftover).map(|part| Ok(FetchResponse { part: Some(part) }));
         Ok(Response::new(Box::pin(stream::iter(parts))))
+    }
+
+    async fn prune(
+        &self,
+        request: Request<PruneRequest>,
+    ) -> Result<Response<PruneResponse>, Status> {
+        let PruneRequest { keep_for_s, keep_last } = request.into_inner();
+        let keep_for = keep_for_s.map(Duration::try_from_secs_f64).transpose().map_err(|_| {
+            Status::invalid_argument(format!(
+                "keep_for_s is {}; it must be a number from 0 to 3.2e9 (s)",
+                keep_for_s.unwrap_or_default()
+            ))
+        })?;
+        match self.ask(event::Request::Prune(Retention { keep_for, keep_last })).await? {
+            Answer::Pruned(jobs) => {
+                let jobs = jobs.iter().map(JobId::to_string).collect();
+                Ok(Response::new(PruneResponse { jobs }))
+            }
+            _ => Err(unexpected()),
+        }
+    }
+
+    async fn list_expelled(
+        &self,
+        _: Request<ListExpelledRequest>,
+    ) -> Result<Response<ListExpelledResponse>, Status> {
+        let Answer::Expelled(expelled) = self.ask(event::Request::Expelled).await? else {
+            return Err(unexpected());
+        };
+        let workers = expelled.into_iter().map(|(record, elapsed)| ExpelledWorker {
+            host: record.worker.host().to_owned(),
+            process: record.worker.process(),
+            job: record.job.to_string(),
+            reason: record.reason,
+            elapsed_s: elapsed.as_secs_f64(),
+        });
+        Ok(Response::new(ListExpelledResponse { workers: workers.collect() }))
     }
 }
 
@@ -219,7 +269,7 @@ fn refused(refusal: &Refusal) -> Status {
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } => Status::resource_exhausted(message),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
-        Refusal::Draining | Refusal::Store { .. } => Status::unavailable(message),
+        Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => Status::unavailable(message),
     }
 }
 

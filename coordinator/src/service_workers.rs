@@ -203,6 +203,7 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
         | CloseReason::Malformed(_)
         | CloseReason::WrongCount { .. }
         | CloseReason::SecondHello => Code::InvalidArgument,
+        CloseReason::Expelled { .. } => Code::PermissionDenied,
         CloseReason::TooManyWorkers { .. } => Code::ResourceExhausted,
         CloseReason::Expired { .. } | CloseReason::Unanswering { .. } | CloseReason::NotReading => {
             Code::Aborted

@@ -17,7 +17,7 @@ use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, Token, WorkerId};
 use osteon_coordinator::leftover;
-use osteon_coordinator::reactor::{RestoredJob, react};
+use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::search::{Search, Step};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::SqliteStore;
@@ -71,8 +71,9 @@ fn evaluations_of_other_numerics_are_computed_again() {
             point,
             outcomes: outcomes.clone(),
             estimated_error: None,
+            workers: [].into(),
         };
-        store.put_evaluation(&record).unwrap();
+        store.put_evaluation(&record, true).unwrap();
         search.tell(outcomes, None);
     }
     drop(store);
@@ -85,7 +86,7 @@ fn evaluations_of_other_numerics_are_computed_again() {
 /// One life of a coordinator with one worker; whether it got to the end of the job.
 fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>) -> bool {
     let mut store = SqliteStore::open(directory).unwrap();
-    let restored = RestoredJob::load(&mut store).unwrap();
+    let restored = Restored::load(&mut store).unwrap();
     let (mut state, effects) = State::restore(Config::default(), restored, Duration::ZERO);
     let worker = WorkerId(1);
     let hello = Hello {
@@ -99,6 +100,8 @@ fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>
     let submit = Request::Submit {
         specification: Arc::new(specification.clone()),
         request_id: "the one".to_owned(),
+        client: String::new(),
+        priority: 0,
     };
     let mut effects = VecDeque::from(effects);
     for event in
@@ -120,14 +123,21 @@ fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>
                 }
                 match &record {
                     Record::Job(record) => store.put_job(record).unwrap(),
-                    Record::Evaluation(record) => store.put_evaluation(record).unwrap(),
+                    Record::Evaluation { record, is_last } => {
+                        store.put_evaluation(record, *is_last).unwrap();
+                    }
                     Record::End { end, summary } => store.finish_job(end, summary).unwrap(),
+                    Record::Expulsion(_) => unreachable!("there is one worker, and it is honest"),
                 }
                 if death == Some(Death::After(writes)) {
                     return false;
                 }
                 let (job, key) = record.key();
                 Event::Stored { job, key }
+            }
+            Effect::Read { job, number } => {
+                let found = Ok(store.evaluation(job, number).unwrap());
+                Event::Read { job, number, found }
             }
             _ => continue,
         };
@@ -141,6 +151,6 @@ fn result(directory: &Path) -> String {
     let mut store = SqliteStore::open(directory).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!(jobs.len(), 1);
-    let left = leftover::read(&mut store, &jobs[0].record, jobs[0].end.as_ref().unwrap());
+    let left = leftover::read(&mut store, jobs[0].end.as_ref().unwrap());
     format!("{:?}", left.unwrap().result)
 }

@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use osteon_common::results::Status;
 
-use super::{Effects, batches};
+use super::{Effects, batches, expulsion, reread};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Ending, Search, Step, Summary};
+use crate::search::{Ending, Step};
 use crate::snapshot;
-use crate::state::{Job, Stage, State, Trouble};
+use crate::state::{EndedJob, Job, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord};
 
 /// A record is durable: the job goes on.
@@ -24,6 +24,10 @@ pub(super) fn stored(
     now: Duration,
     effects: &mut Effects,
 ) {
+    if let RecordKey::Expulsion(number) = key {
+        expulsion::stored(state, number, effects);
+        return;
+    }
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
@@ -37,12 +41,19 @@ pub(super) fn stored(
             }
             begin_waiting(state, now, effects);
         }
-        (RecordKey::Evaluation(number), Stage::Storing(record)) if record.number == number => {
-            if let Some(search) = &mut job.search {
-                search.tell(record.outcomes.clone(), record.estimated_error);
-            }
+        (RecordKey::Evaluation(number), Stage::Storing { record, is_last })
+            if record.number == number =>
+        {
+            let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
+            job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+            job.workers.append(&mut record.workers);
             job.trouble = None;
-            advance(state, id, now, effects);
+            job.search.tell(outcomes, estimated_error);
+            if job.rewind {
+                reread::rewind(state, id, now, effects);
+            } else {
+                advance(state, id, now, effects);
+            }
         }
         (RecordKey::End, Stage::Finishing(_)) => ended(state, id, now, effects),
         // A report of a write that was repeated meanwhile.
@@ -77,37 +88,62 @@ pub(super) fn store_failed(
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
     job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
     state.changed.insert(id);
+    despair_if_late(state, since, error, now, effects);
+}
+
+/// Says that the store takes or gives nothing any more, once it has refused for too long.
+pub(super) fn despair_if_late(
+    state: &State,
+    since: Duration,
+    error: String,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let waited = now.saturating_sub(since);
     if state.config.store_patience.is_some_and(|patience| waited >= patience) {
         effects.push(Effect::Despair { error, waited });
     }
 }
 
-/// Writes the present record of a job again.
+/// Writes the present record of a job again, or asks again for the one it reads.
 pub(super) fn store_again(job: &mut Job, effects: &mut Effects) {
-    let record = match &job.stage {
-        Stage::Storing(record) => Record::Evaluation(record.clone()),
-        Stage::Finishing(end) => Record::End { end: end.clone(), summary: job.summary() },
-        Stage::Accepting | Stage::Waiting | Stage::Computing(_) | Stage::Ended(_) => return,
-    };
-    effects.push(Effect::Store(record));
+    effects.push(match &job.stage {
+        Stage::Storing { record, is_last } => {
+            let record = record.clone();
+            Effect::Store(Record::Evaluation { record, is_last: *is_last })
+        }
+        Stage::Finishing(end) => {
+            let summary = Arc::new(job.search.summary());
+            Effect::Store(Record::End { end: end.clone(), summary })
+        }
+        Stage::Rereading { asked: true } => {
+            Effect::Read { job: job.record.job, number: job.search.evaluations() }
+        }
+        Stage::Accepting
+        | Stage::Waiting
+        | Stage::Rereading { asked: false }
+        | Stage::Computing(_) => return,
+    });
 }
 
-/// Stores the evaluation of a job once it is complete.
+/// Stores the evaluation of a job once it is complete and checked.
 pub(super) fn store_if_complete(state: &mut State, id: JobId, effects: &mut Effects) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let Stage::Computing(evaluation) = &job.stage else {
+    let Stage::Computing(evaluation) = &mut job.stage else {
         return;
     };
     let Some((outcomes, estimated_error)) = evaluation.complete() else {
         return;
     };
     let (number, point) = (evaluation.number, evaluation.point);
-    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error };
-    effects.push(Effect::Store(Record::Evaluation(record.clone())));
-    job.stage = Stage::Storing(record);
+    // Only what was there and is the same leaves the path behind it as it was.
+    let is_last = evaluation.changes(&outcomes);
+    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
+    effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    job.stage = Stage::Storing { record, is_last };
 }
 
 /// Ends a job because of `failure`.
@@ -128,8 +164,18 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
         return;
     };
     job.cancelled = true;
-    if matches!(job.stage, Stage::Waiting | Stage::Computing(_)) {
-        finish(state, id, cancelled(), now, effects);
+    match job.stage {
+        Stage::Waiting if job.stored > 0 => {
+            // What it leaves is in the store: nothing of it is computed, it waits for nobody.
+            state.waiting.retain(|waiting| *waiting != id);
+            state.active.insert(id);
+            advance(state, id, now, effects);
+        }
+        Stage::Waiting | Stage::Computing(_) => finish(state, id, cancelled(), now, effects),
+        Stage::Accepting
+        | Stage::Rereading { .. }
+        | Stage::Storing { .. }
+        | Stage::Finishing(_) => {}
     }
 }
 
@@ -148,21 +194,23 @@ pub(super) fn begin_waiting(state: &mut State, now: Duration, effects: &mut Effe
     }
 }
 
-/// Goes where the search wants to go.
-fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+/// Goes where the search wants to go, after it was told what the store has.
+pub(super) fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    let round = state.round();
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let Some(search) = &job.search else {
+    state.changed.insert(id);
+    if job.search.evaluations() < job.stored {
+        reread::read_next(state, id, effects);
         return;
-    };
-    let ending = match search.ask() {
+    }
+    let ending = match job.search.ask() {
         Step::Evaluate(_) if job.cancelled => cancelled(),
         Step::Evaluate(point) => {
             let realizations = job.record.specification.monte_carlo.realizations;
-            let evaluation = Evaluation::new(search.evaluations(), point, realizations);
+            let evaluation = Evaluation::new(job.search.evaluations(), round, point, realizations);
             job.stage = Stage::Computing(evaluation);
-            state.changed.insert(id);
             return;
         }
         Step::Done(ending) => ending,
@@ -171,12 +219,19 @@ fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 }
 
 /// Stores the end of a job; the world hears of it when it is durable.
-fn finish(state: &mut State, id: JobId, ending: Ending, now: Duration, effects: &mut Effects) {
+pub(super) fn finish(
+    state: &mut State,
+    id: JobId,
+    ending: Ending,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let record = job.end(ending, now);
-    let summary = job.summary();
+    let (search, best) = (&job.search, job.search.best());
+    let record = EndRecord::new(id, ending, now, search.evaluations(), best);
+    let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
     leave(state, id, now, effects);
@@ -198,23 +253,20 @@ fn leave(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 
 /// The end of a job is durable.
 fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    let Some(job) = state.jobs.get_mut(&id) else {
+    let Some(Job { record, stage: Stage::Finishing(end), tokens, .. }) = state.jobs.remove(&id)
+    else {
         return;
     };
-    if let Stage::Finishing(record) = &job.stage {
-        job.stage = Stage::Ended(record.clone());
-        state.ended += 1;
-        job.search = None;
-        job.trouble = None;
-    }
-    for token in std::mem::take(&mut job.tokens) {
+    state.ended.insert(id, EndedJob::new(&record, end));
+    for token in tokens {
         if let Some(snapshot) = snapshot::of(state, id, now) {
             effects.push(Effect::Answer { token, answer: Answer::Snapshot(snapshot) });
         }
     }
 }
 
-fn cancelled() -> Ending {
+/// The end of a job whose client does not want it any more.
+pub(super) fn cancelled() -> Ending {
     Ending { status: Status::Cancelled, reason: None }
 }
 
@@ -223,21 +275,9 @@ impl Job {
     fn awaits(&self) -> Option<RecordKey> {
         match &self.stage {
             Stage::Accepting => Some(RecordKey::Job),
-            Stage::Storing(record) => Some(RecordKey::Evaluation(record.number)),
+            Stage::Storing { record, .. } => Some(RecordKey::Evaluation(record.number)),
             Stage::Finishing(_) => Some(RecordKey::End),
-            Stage::Waiting | Stage::Computing(_) | Stage::Ended(_) => None,
+            Stage::Waiting | Stage::Rereading { .. } | Stage::Computing(_) => None,
         }
-    }
-
-    /// What its path has come to.
-    fn summary(&self) -> Arc<Summary> {
-        Arc::new(self.search.as_ref().map_or_else(Summary::empty, Search::summary))
-    }
-
-    /// The record of the job's end.
-    fn end(&self, ending: Ending, now: Duration) -> EndRecord {
-        let search = self.search.as_ref();
-        let best = search.and_then(Search::best);
-        EndRecord::new(self.record.job, ending, now, search.map_or(0, Search::evaluations), best)
     }
 }

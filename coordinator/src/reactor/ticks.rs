@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Effects, jobs, workers};
+use super::{Effects, checks, expulsion, jobs, prune, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
@@ -14,8 +14,11 @@ const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     expire(state, now, effects);
     beat(state, now, effects);
+    checks::give_up(state, now, effects);
     if !state.draining {
         store_again(state, now, effects);
+        expulsion::store_again(state, now, effects);
+        prune::tick(state, now, effects);
     }
     publish(state, now, effects);
 }
