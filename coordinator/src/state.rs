@@ -136,6 +136,8 @@ pub(crate) struct Expelled {
     /// When its record is written again; `None` once it is durable. Until then no job reads its
     /// stored evaluations: after a crash nobody would know which of them are wrong.
     pub(crate) store_at: Option<Duration>,
+    /// The store refused it, and it is not on its way again.
+    pub(crate) refused: bool,
 }
 
 /// A refusal of the store.
@@ -240,9 +242,12 @@ impl State {
         self.jobs.len()
     }
 
-    /// Jobs with a record on its way to the store.
+    /// Records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
-        self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none()).count()
+        let on_its_way = |expelled: &&Expelled| expelled.store_at.is_some() && !expelled.refused;
+        let expelled = self.expelled.iter().filter(on_its_way).count();
+        let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
+        jobs.count() + expelled
     }
 
     /// The work of an assignment, while its evaluation is under way.

@@ -88,6 +88,7 @@ async fn submit(
     let request = SubmitRequest {
         specification: Some(specification::to_message(job)),
         request_id: request_id.to_owned(),
+        ..SubmitRequest::default()
     };
     Ok(client.submit(request).await?.into_inner().job)
 }

@@ -48,14 +48,27 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }
-        let world::Counts { stops, cancelled, exposed, outages, .. } = seen;
+        let world::Counts { stops, cancelled, outages, expelled, pruned, lies, .. } = seen;
         for (name, count) in [
             ("clean stops", stops),
             ("jobs cancelled", cancelled),
-            ("jobs with contradicting answers", exposed),
             ("outages of the store", outages),
+            ("wrong answers", lies),
+            ("workers expelled", expelled),
+            ("jobs forgotten", pruned),
         ] {
             assert!(count > SCHEDULES / 20, "{name}: {count}");
         }
+        let world::Counts { exposed, replaced, confirmed, remembered, repaired, .. } = seen;
+        for (name, count) in [
+            ("jobs failed over contradicting answers", exposed),
+            ("stored evaluations replaced by others", replaced),
+            ("stored evaluations computed again and the same", confirmed),
+            ("restarts with expelled workers", remembered),
+            ("jobs that ended right although somebody lied", repaired),
+        ] {
+            assert!(count > SCHEDULES / 100, "{name}: {count}");
+        }
+        println!("{seen:?}");
     }
 }

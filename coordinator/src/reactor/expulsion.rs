@@ -28,7 +28,7 @@ pub(super) fn expel(
     let record = ExpulsionRecord { number, worker, job, reason: reason.clone(), at: now };
     effects.push(Effect::Store(Record::Expulsion(record.clone())));
     let store_at = Some(now + state.config.store_retry);
-    state.expelled.push(Expelled { record, store_at });
+    state.expelled.push(Expelled { record, store_at, refused: false });
     let unfinished: Vec<JobId> = state.jobs.keys().copied().collect();
     for job in unfinished {
         forget(state, job, name, now, effects);
@@ -108,12 +108,21 @@ pub(super) fn stored(state: &mut State, number: u64, effects: &mut Effects) {
     }
 }
 
+/// The expulsion with this number could not be stored; it is tried again.
+pub(super) fn store_failed(state: &mut State, number: u64) {
+    let found = state.expelled.iter_mut().find(|expelled| expelled.record.number == number);
+    if let Some(expelled) = found {
+        expelled.refused = true;
+    }
+}
+
 /// Writes expulsions again whose time has come.
 pub(super) fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
     let retry_in = state.config.store_retry;
     for expelled in &mut state.expelled {
         if expelled.store_at.is_some_and(|at| now >= at) {
             expelled.store_at = Some(now + retry_in);
+            expelled.refused = false;
             effects.push(Effect::Store(Record::Expulsion(expelled.record.clone())));
         }
     }

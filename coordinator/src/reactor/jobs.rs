@@ -72,6 +72,10 @@ pub(super) fn store_failed(
     now: Duration,
     effects: &mut Effects,
 ) {
+    if let RecordKey::Expulsion(number) = key {
+        expulsion::store_failed(state, number);
+        return;
+    }
     let retry_at = now + state.config.store_retry;
     let Some(job) = state.jobs.get_mut(&id).filter(|job| job.awaits() == Some(key)) else {
         return;

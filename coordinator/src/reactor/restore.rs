@@ -76,8 +76,8 @@ impl State {
         let mut state = Self::new(config, now);
         let mut effects = Effects::new();
         let Restored { ended, unfinished, expelled } = restored;
-        let expelled = expelled.into_iter().map(|record| Expelled { record, store_at: None });
-        state.expelled = expelled.collect();
+        let durable = |record| Expelled { record, store_at: None, refused: false };
+        state.expelled = expelled.into_iter().map(durable).collect();
         for (id, job) in ended {
             state.know(id, &job.request_id);
             state.ended.insert(id, job);

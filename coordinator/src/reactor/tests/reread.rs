@@ -41,13 +41,18 @@ fn read(rig: &mut Rig, store: &MemoryStore, number: u64) -> Vec<String> {
     rig.event(Event::Read { job: JobId(1), number, found })
 }
 
+/// A batch of a job that somebody holds.
+fn batch_of(rig: &Rig, job: JobId) -> u64 {
+    let held = rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == job);
+    held.map(|(id, _)| id.0).unwrap()
+}
+
 /// Has a worker in `process` contradict itself.
 fn expose(rig: &mut Rig, process: u32) -> Vec<String> {
-    rig.accept(propagation(1));
+    rig.accept(propagation(2));
     rig.event(hello_of(50, process, 1));
     let job = JobId(rig.state.next_job - 1);
-    let held = rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == job);
-    let batch = held.map(|(id, _)| id.0).unwrap();
+    let batch = batch_of(rig, job);
     rig.event(answer(50, batch, 0, 1));
     rig.event(answer(50, batch, 1, 1))
 }
@@ -114,9 +119,8 @@ fn the_evaluations_of_an_expelled_worker_are_computed_again() {
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), [""; 0]);
     rig.event(hello_of(60, 3, 1));
-    let batch = |rig: &Rig| rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == JobId(1)).map(|(id, _)| id.0).unwrap();
     // The same again: what is stored after it is right, and read.
-    let again = answer(60, batch(&rig), 1, 1);
+    let again = answer(60, batch_of(&rig, JobId(1)), 1, 1);
     let effects = react(&mut rig.state, again, rig.now);
     let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
         panic!("{effects:?}");
@@ -134,8 +138,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
     rig.event(stored(2, RecordKey::Expulsion(1)));
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     rig.event(hello_of(60, 3, 1));
-    let held = rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == JobId(1));
-    let different = answer(60, held.map(|(id, _)| id.0).unwrap(), 77, 1);
+    let different = answer(60, batch_of(&rig, JobId(1)), 77, 1);
     let effects = react(&mut rig.state, different, rig.now);
     let Effect::Store(Record::Evaluation { record, is_last: true }) = &effects[0] else {
         panic!("{effects:?}");
