@@ -15,6 +15,7 @@ pub mod evaluation;
 pub mod event;
 mod failing;
 pub mod failure;
+mod fairness;
 pub mod ids;
 pub mod leftover;
 pub mod listen;

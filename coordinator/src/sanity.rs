@@ -103,6 +103,15 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
             return Err(Insane::RequestId(id));
         }
     }
+    for (id, job) in state.active.iter().filter_map(|id| Some((id, state.jobs.get(id)?))) {
+        let client = &job.record.client;
+        let of_client = |id: &&JobId| {
+            state.jobs.get(id).is_some_and(|job| job.record.client == *client)
+        };
+        if state.active.iter().filter(of_client).count() != state.shares.jobs(client) {
+            return Err(Insane::JobList(*id));
+        }
+    }
     let lost = |id: &&JobId| !state.jobs.contains_key(id);
     if let Some(id) = state.active.iter().chain(&state.waiting).find(lost) {
         return Err(Insane::JobList(*id));

@@ -105,11 +105,12 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         return "the coordinator is shutting down".to_owned();
     }
     match &job.stage {
-        Stage::Waiting => {
-            let before =
-                state.waiting.iter().take_while(|waiting| **waiting != job.record.job).count();
-            format!("the end of {} running and {before} waiting jobs", state.active.len())
-        }
+        Stage::Waiting => format!(
+            "its turn: {} jobs run and {} wait {}",
+            state.active.len(),
+            state.waiting.len(),
+            since(job.progressed)
+        ),
         Stage::Rereading { .. } => format!(
             "its stored evaluations, {} of {} are read again",
             job.search.evaluations(),

@@ -14,6 +14,7 @@ use prost::Message as _;
 use crate::config::Config;
 use crate::evaluation::{Evaluation, Indices};
 use crate::event::Hello;
+use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::rate::Rate;
 use crate::search::Search;
@@ -35,10 +36,12 @@ pub struct State {
     pub(crate) ended: BTreeMap<JobId, EndedJob>,
     /// Job of each request id.
     pub(crate) requests: BTreeMap<String, JobId>,
-    /// Jobs that are not begun, oldest first.
+    /// Jobs that are not begun, in the order of their acceptance.
     pub(crate) waiting: VecDeque<JobId>,
     /// Jobs that are computed or whose evaluation is being stored.
     pub(crate) active: BTreeSet<JobId>,
+    /// What the clients of active jobs have had.
+    pub(crate) shares: Shares,
     /// Job that was handed out last.
     pub(crate) last_served: Option<JobId>,
     /// Jobs that changed since they were published.
@@ -78,7 +81,7 @@ pub(crate) struct Job {
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
-    /// When it last got an answer, or began.
+    /// When it last got an answer, or began, or was accepted.
     pub(crate) progressed: Duration,
     /// Requests that are answered when the present record is durable: submissions at first,
     /// cancellations at the end.
@@ -200,6 +203,8 @@ pub(crate) struct Batch {
     pub(crate) purpose: Purpose,
     pub(crate) worker: WorkerId,
     pub(crate) sent: Duration,
+    /// Computing time that its client was charged for it.
+    pub(crate) charged: Duration,
     /// The other batch with the same indices, when there is a copy.
     pub(crate) twin: Option<BatchId>,
     /// A suspect: its worker holds nothing else, and it is never copied.
@@ -216,6 +221,7 @@ impl State {
             requests: BTreeMap::new(),
             waiting: VecDeque::new(),
             active: BTreeSet::new(),
+            shares: Shares::default(),
             last_served: None,
             changed: BTreeSet::new(),
             published: now,

@@ -7,6 +7,7 @@ use osteon_common::outcome::Solved;
 use super::{Effects, checks, jobs, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::failure::Failure;
+use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::state::{Assignment, Batch, Purpose, State};
 use crate::worker_name::WorkerName;
@@ -152,8 +153,14 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let believed = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
     let rate = batch.assignment.indices.count as f64 / if believed { elapsed_s } else { waited_s };
-    if let Some(worker) = state.workers.get_mut(&batch.worker) {
-        let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
-        *known += RATE_WEIGHT * (rate - *known);
+    let Some(worker) = state.workers.get_mut(&batch.worker) else {
+        return;
+    };
+    let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
+    *known += RATE_WEIGHT * (rate - *known);
+    let seconds = batch.assignment.indices.count as f64 / rate;
+    let took = fairness::thread_time(seconds, worker.hello.threads);
+    if let Some(job) = state.jobs.get(&batch.assignment.job) {
+        state.shares.correct(&job.record.client, batch.charged, took);
     }
 }

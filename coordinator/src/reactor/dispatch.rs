@@ -1,13 +1,14 @@
 //! Who computes what next.
 //!
-//! Workers are served in the order of how little they hold, jobs in turn, batch by batch. A batch
+//! Workers are served in the order of how little they hold, clients in the order of how little
+//! computing time they have had, jobs of one client by priority and in turn, batch by batch. A batch
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
 //! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
 //! longest. While a realization waits to be computed alone, one worker is not refilled.
 
-use std::ops::Bound;
+use std::cmp::Reverse;
 use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
@@ -15,8 +16,10 @@ use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 use super::{Effects, checks};
 use crate::effect::Effect;
 use crate::evaluation::Indices;
+use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Purpose, Stage, State, Worker};
+use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Job, Purpose, Stage, State, Worker};
+use crate::store::JobRecord;
 
 /// Realizations for each thread in a worker's first batch of a job: enough to measure its rate,
 /// little enough to be soon answered.
@@ -119,21 +122,48 @@ fn hand_batch(state: &mut State, worker: WorkerId, now: Duration, effects: &mut 
     };
     state.last_served = Some(job);
     let assignment = Assignment { job, round, indices };
-    send(state, worker, assignment, Purpose::Fill, now, effects);
+    let batch = send(state, worker, assignment, Purpose::Fill, now, effects);
+    if let Some(batch) = batch {
+        charge(state, batch);
+    }
     true
 }
 
-/// The first active job with work after the one that was served last, in a circle.
+/// Of the active jobs with work: of the client that has had least computing time those with the
+/// highest priority, and of these the first after the one that was served last, in a circle.
 fn next_job(state: &State) -> Option<JobId> {
-    let has_work = |id: &&JobId| match state.jobs.get(id).map(|job| &job.stage) {
-        Some(Stage::Computing(evaluation)) => !evaluation.queue.is_empty(),
-        _ => false,
+    let with_work = state.active.iter().filter_map(|id| {
+        let job = state.jobs.get(id)?;
+        match &job.stage {
+            Stage::Computing(evaluation) if !evaluation.queue.is_empty() => Some((*id, job)),
+            _ => None,
+        }
+    });
+    let rank = |(id, job): (JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        let had = state.shares.used(client);
+        let served = state.last_served.is_some_and(|last| id <= last);
+        (had, client.clone(), Reverse(*priority), served, id)
     };
-    let after = match state.last_served {
-        Some(job) => (Bound::Excluded(job), Bound::Unbounded),
-        None => (Bound::Unbounded, Bound::Unbounded),
+    with_work.map(rank).min().map(|(.., id)| id)
+}
+
+/// Charges the client of a batch for the time that it will take, as far as that is known.
+fn charge(state: &mut State, id: BatchId) {
+    let target = state.config.batch_target.as_secs_f64();
+    let Some(batch) = state.batches.get_mut(&id) else {
+        return;
     };
-    state.active.range(after).find(has_work).or_else(|| state.active.iter().find(has_work)).copied()
+    let Some(worker) = state.workers.get(&batch.worker) else {
+        return;
+    };
+    let Some(job) = state.jobs.get(&batch.assignment.job) else {
+        return;
+    };
+    let count = batch.assignment.indices.count as f64;
+    let seconds = worker.rates.get(&batch.assignment.job).map_or(target, |rate| count / rate);
+    batch.charged = fairness::thread_time(seconds, worker.hello.threads);
+    state.shares.charge(&job.record.client, batch.charged);
 }
 
 /// Realizations of `job`, of which `queued` are left, that `attached` should get at once: what it
@@ -214,7 +244,15 @@ pub(super) fn send(
     let work = state.work(&assignment)?;
     let id = BatchId(state.next_batch);
     state.next_batch += 1;
-    let batch = Batch { assignment, purpose, worker, sent: now, twin: None, exclusive: false };
+    let batch = Batch {
+        assignment,
+        purpose,
+        worker,
+        sent: now,
+        charged: Duration::ZERO,
+        twin: None,
+        exclusive: false,
+    };
     state.batches.insert(id, batch);
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.in_flight.push(id);

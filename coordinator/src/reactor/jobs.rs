@@ -1,5 +1,6 @@
 //! A job's way from acceptance to its end.
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use crate::ids::JobId;
 use crate::search::{Ending, Step};
 use crate::snapshot;
 use crate::state::{EndedJob, Job, Stage, State, Trouble};
-use crate::store::{EndRecord, EvaluationRecord};
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 
 /// A record is durable: the job goes on.
 pub(super) fn stored(
@@ -39,7 +40,10 @@ pub(super) fn stored(
             for token in std::mem::take(&mut job.tokens) {
                 effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
             }
-            begin_waiting(state, now, effects);
+            let client = job.record.client.clone();
+            if has_room(state, &client) {
+                begin_waiting(state, now, effects);
+            }
         }
         (RecordKey::Evaluation(number), Stage::Storing { record, is_last })
             if record.number == number =>
@@ -171,9 +175,7 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
     match job.stage {
         Stage::Waiting if job.stored > 0 => {
             // What it leaves is in the store: nothing of it is computed, it waits for nobody.
-            state.waiting.retain(|waiting| *waiting != id);
-            state.active.insert(id);
-            advance(state, id, now, effects);
+            begin(state, id, now, effects);
         }
         Stage::Waiting | Stage::Computing(_) => finish(state, id, cancelled(), now, effects),
         Stage::Accepting
@@ -183,16 +185,44 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
     }
 }
 
-/// Begins waiting jobs, oldest first, while there is room.
+/// Begins waiting jobs while there is room: of the clients with the fewest active jobs, the
+/// highest priority first, of equal ones the oldest. A client without any active job finds room
+/// beyond the usual, so that no other client keeps it waiting.
 pub(super) fn begin_waiting(state: &mut State, now: Duration, effects: &mut Effects) {
-    while state.active.len() < state.config.active_jobs_max && !state.draining {
-        let Some(id) = state.waiting.pop_front() else {
+    while !state.waiting.is_empty() && !state.draining {
+        let Some((id, client)) = next_waiting(state) else {
             return;
         };
-        let Some(job) = state.jobs.get_mut(&id) else {
-            continue;
-        };
+        if !has_room(state, &client) {
+            return;
+        }
+        begin(state, id, now, effects);
+    }
+}
+
+/// Whether a job of `client` may begin.
+fn has_room(state: &State, client: &str) -> bool {
+    let most = state.config.active_jobs_max;
+    let active = state.active.len();
+    active < most || (active < 2 * most && state.shares.jobs(client) == 0)
+}
+
+/// The job that begins next, with its client.
+fn next_waiting(state: &State) -> Option<(JobId, String)> {
+    let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
+    let rank = |(id, job): &(JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        (state.shares.jobs(client), Reverse(*priority), *id)
+    };
+    waiting.min_by_key(rank).map(|(id, job)| (id, job.record.client.clone()))
+}
+
+/// Begins a waiting job.
+fn begin(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    state.waiting.retain(|waiting| *waiting != id);
+    if let Some(job) = state.jobs.get_mut(&id) {
         job.progressed = now;
+        state.shares.begin(&job.record.client);
         state.active.insert(id);
         advance(state, id, now, effects);
     }
@@ -243,11 +273,13 @@ pub(super) fn finish(
 
 /// Takes a job out of everything that concerns jobs under way.
 fn leave(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    state.active.remove(&id);
+    if state.active.remove(&id)
+        && let Some(job) = state.jobs.get(&id)
+    {
+        state.shares.end(&job.record.client);
+    }
     state.waiting.retain(|waiting| *waiting != id);
     state.changed.insert(id);
-    // Those that wait are one nearer to their turn.
-    state.changed.extend(&state.waiting);
     batches::revoke_all(state, id, now, effects);
     for worker in state.workers.values_mut() {
         worker.rates.remove(&id);

@@ -18,8 +18,10 @@ use crate::sanity::sanity_check;
 
 mod checks;
 mod dispatch;
+mod fairness;
 mod jobs;
 mod lost;
+mod prune;
 mod reread;
 mod workers;
 

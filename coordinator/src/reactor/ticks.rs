@@ -8,7 +8,7 @@ use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
 use crate::state::{State, Worker};
 
-/// Active jobs are published this often even if nothing about them changed but time.
+/// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
@@ -73,6 +73,7 @@ fn publish(state: &mut State, now: Duration, effects: &mut Effects) {
     if now.saturating_sub(state.published) >= PUBLISH_EVERY {
         state.published = now;
         state.changed.extend(&state.active);
+        state.changed.extend(&state.waiting);
     }
     let changed: Vec<JobId> = std::mem::take(&mut state.changed).into_iter().collect();
     for job in changed {

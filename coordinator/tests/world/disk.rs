@@ -18,6 +18,10 @@ impl World {
                 self.counts.expelled += u64::from(self.expelled.insert(process));
             }
             Record::End { end, .. } => {
+                // Written again, it was decided on before.
+                if self.ends.insert(end.job, end.clone()).is_some_and(|before| before == *end) {
+                    return;
+                }
                 let of_job = self.clients.iter().find(|client| client.job == Some(end.job));
                 // Of a job whose client has not heard of it nothing is known here.
                 let seed = of_job.map(|client| client.specification.monte_carlo.seed);

@@ -15,7 +15,7 @@ use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::sanity::sanity_check;
 use osteon_coordinator::state::{BATCHES_IN_FLIGHT_MAX, State};
 use osteon_coordinator::store::memory::MemoryStore;
-use osteon_coordinator::store::Store;
+use osteon_coordinator::store::{EndRecord, Store};
 use osteon_proto::batch::Work;
 
 use crate::fake;
@@ -157,6 +157,8 @@ pub(crate) struct World {
     expelled: BTreeSet<u32>,
     /// Jobs that end while somebody who lied in them is not found out.
     deceived: BTreeSet<JobId>,
+    /// The last decision on the end of each job.
+    ends: BTreeMap<JobId, EndRecord>,
     processes: u32,
     workers: BTreeMap<WorkerId, Worker>,
     lost_alone: BTreeMap<(u64, u64), u32>,
@@ -204,9 +206,10 @@ impl World {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
         // Of the first workers: those that come later, in the place of others, are honest.
-        let liars = match draw(8) {
+        let liars = match draw(6) {
             0 => [1].into(),
             1 => [1, 2].into(),
+            2 => [2].into(),
             _ => BTreeSet::new(),
         };
         let prune = (draw(3) == 0).then(|| draw(4000));
@@ -226,6 +229,7 @@ impl World {
             lies: BTreeSet::new(),
             expelled: BTreeSet::new(),
             deceived: BTreeSet::new(),
+            ends: BTreeMap::new(),
             processes: 0,
             workers: BTreeMap::new(),
             lost_alone: BTreeMap::new(),
