@@ -1,6 +1,7 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use osteon_proto::endpoint::Endpoint;
@@ -117,6 +118,14 @@ pub(crate) struct CoordinatorArguments {
     /// Serve addresses other than loopback without TLS: whoever reaches them can use them
     #[arg(long)]
     pub(crate) insecure: bool,
+    /// Fraction of the batches that a second worker computes too, 0 to 1: different bits expose a
+    /// worker that computes wrongly
+    #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
+          value_parser = fraction)]
+    pub(crate) audit_fraction: f64,
+    /// Forget ended jobs after this long: a number with s, min, h or d [default: never]
+    #[arg(long, value_name = "AGE", value_parser = age)]
+    pub(crate) keep_ended: Option<Duration>,
 }
 
 /// Of `worker`.
@@ -158,6 +167,10 @@ pub(crate) struct SubmitArguments {
     /// Submitting again with the same ID gives the same job (at most 256 bytes)
     #[arg(long, value_name = "ID", value_parser = request_id)]
     pub(crate) request_id: Option<String>,
+    /// Rank among your own jobs, 0 to 9: a higher one goes first
+    #[arg(long, value_name = "P", default_value_t = 0,
+          value_parser = clap::value_parser!(u32).range(0..=i64::from(osteon_common::limits::PRIORITY_MAX)))]
+    pub(crate) priority: u32,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -166,9 +179,36 @@ pub(crate) struct SubmitArguments {
 /// Of `jobs`.
 #[derive(Debug, Args)]
 pub(crate) struct JobsArguments {
+    /// What else than to list them.
+    #[command(subcommand)]
+    pub(crate) command: Option<JobsCommand>,
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What can be done with jobs.
+#[derive(Debug, Subcommand)]
+pub(crate) enum JobsCommand {
+    /// Forget ended jobs and print their ids; without options all of them
+    Prune(PruneArguments),
+}
+
+/// Of `jobs prune`.
+#[derive(Debug, Args)]
+pub(crate) struct PruneArguments {
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Only those that ended longer ago: a number with s, min, h or d
+    #[arg(long, value_name = "AGE", value_parser = age)]
+    pub(crate) older_than: Option<Duration>,
+    /// Keep the N that ended last
+    #[arg(long, value_name = "N")]
+    pub(crate) keep_last: Option<u64>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -244,6 +284,9 @@ pub(crate) struct DrawsArguments {
 /// Longest span that a command line may ask for, s: a year.
 const SECONDS_MAX: f64 = 366.0 * 86_400.0;
 
+/// Longest age that a command line may ask for, s: a century.
+const AGE_S_MAX: f64 = 100.0 * SECONDS_MAX;
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
@@ -256,6 +299,30 @@ fn seconds(text: &str) -> Result<f64, String> {
         Ok(number) if number > 0.0 && number <= SECONDS_MAX => Ok(number),
         _ => Err(format!("it must be a number above 0 and at most {SECONDS_MAX} (s)")),
     }
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0 to 1".to_owned()),
+    }
+}
+
+fn age(text: &str) -> Result<Duration, String> {
+    let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let seconds = match unit {
+        "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        "d" => 86_400.0,
+        _ => f64::NAN,
+    };
+    let number: Option<f64> = text[..text.len() - unit.len()].parse().ok();
+    number
+        .map(|number| number * seconds)
+        .filter(|age| *age <= AGE_S_MAX)
+        .and_then(|age| Duration::try_from_secs_f64(age).ok())
+        .ok_or_else(|| "it must be a number with a unit, s, min, h or d: 90min, 30d".to_owned())
 }
 
 fn request_id(text: &str) -> Result<String, String> {

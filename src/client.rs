@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::limits::REALIZATIONS_MAX;
+use osteon_common::limits::{NAME_BYTES_MAX, REALIZATIONS_MAX};
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
 use osteon_common::violations::Violations;
 use osteon_proto::endpoint::{self, ConnectError, Endpoint};
@@ -88,6 +88,17 @@ impl ClientError {
     }
 }
 
+/// Who this is for the sharing of workers between users: user and host.
+fn user() -> String {
+    let user = ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let mut name = format!("{}@{}", user.unwrap_or_default(), host.trim());
+    while name.len() > NAME_BYTES_MAX {
+        name.pop();
+    }
+    name
+}
+
 fn indented(violations: &Violations) -> String {
     violations.iter().map(|violation| format!("\n  {violation}")).collect()
 }
@@ -111,10 +122,25 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// Connects to the coordinator at `endpoint`.
+    /// Connects to the coordinator at `endpoint`; one that is not there may be about to come.
     pub(crate) async fn connect(endpoint: &Endpoint) -> Result<Self, ClientError> {
-        let channel = endpoint::connect(endpoint, answer_limit()).await?;
-        Ok(Self { endpoint: endpoint.clone(), jobs: endpoint::jobs_client(channel) })
+        let begun = Instant::now();
+        loop {
+            let left = answer_limit().saturating_sub(begun.elapsed());
+            let error = match endpoint::connect(endpoint, left).await {
+                Ok(channel) => {
+                    let jobs = endpoint::jobs_client(channel);
+                    return Ok(Self { endpoint: endpoint.clone(), jobs });
+                }
+                Err(error) => error,
+            };
+            let pause = Duration::from_millis(RETRY_MS);
+            let again = matches!(error, ConnectError::Unreachable { .. });
+            if !again || begun.elapsed() + pause >= answer_limit() {
+                return Err(error.into());
+            }
+            sleep(pause).await;
+        }
     }
 
     /// Submits a job; its id.
@@ -122,11 +148,13 @@ impl Client {
         &mut self,
         specification: &JobSpecification,
         request_id: &str,
+        priority: u32,
     ) -> Result<String, ClientError> {
         let request = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
             request_id: request_id.to_owned(),
-            ..v1::SubmitRequest::default()
+            client: user(),
+            priority,
         };
         let call = self.jobs.submit(request);
         Ok(answered(&self.endpoint, call).await?.job)
@@ -146,6 +174,23 @@ impl Client {
             }
         }
         Ok(jobs)
+    }
+
+    /// The workers that were found to compute wrongly.
+    pub(crate) async fn expelled(&mut self) -> Result<Vec<v1::ExpelledWorker>, ClientError> {
+        let call = self.jobs.list_expelled(v1::ListExpelledRequest {});
+        Ok(answered(&self.endpoint, call).await?.workers)
+    }
+
+    /// Forgets ended jobs; those that are forgotten.
+    pub(crate) async fn prune(
+        &mut self,
+        older_than: Option<Duration>,
+        keep_last: Option<u64>,
+    ) -> Result<Vec<String>, ClientError> {
+        let keep_for_s = older_than.map(|age| age.as_secs_f64());
+        let call = self.jobs.prune(v1::PruneRequest { keep_for_s, keep_last });
+        Ok(answered(&self.endpoint, call).await?.jobs)
     }
 
     /// Cancels a job; how it is then.
@@ -191,7 +236,7 @@ impl Client {
         show: &mut impl FnMut(&JobSnapshot) -> Result<(), E>,
         lost_since: &mut Option<Instant>,
     ) -> Result<Result<JobSnapshot, ClientError>, E> {
-        let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned() });
+        let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
         let mut stream = match answered(&self.endpoint, call).await {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),

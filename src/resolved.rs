@@ -11,8 +11,8 @@ use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, Command, CoordinatorArguments, DrawArguments, RunArguments, SimulateArguments,
-    Study, SubmitArguments, WorkerArguments,
+    Arguments, Command, CoordinatorArguments, DrawArguments, JobsArguments, JobsCommand,
+    RunArguments, SimulateArguments, Study, SubmitArguments, WorkerArguments,
 };
 use crate::ending::Failure;
 use crate::instruction_set;
@@ -65,6 +65,8 @@ pub(crate) enum Resolved {
         kind: JobKind,
         /// Empty: a new job.
         request_id: String,
+        /// Rank among the user's own jobs.
+        priority: u32,
         /// Where to.
         coordinator: Endpoint,
         /// How to print.
@@ -72,6 +74,17 @@ pub(crate) enum Resolved {
     },
     /// `jobs`.
     Jobs {
+        /// Of whom.
+        coordinator: Endpoint,
+        /// How to print.
+        format: Format,
+    },
+    /// `jobs prune`.
+    Prune {
+        /// Only jobs that ended longer ago.
+        older_than: Option<Duration>,
+        /// So many that ended last are kept.
+        keep_last: Option<u64>,
         /// Of whom.
         coordinator: Endpoint,
         /// How to print.
@@ -165,9 +178,18 @@ impl Resolved {
                 let endpoint = coordinator(arguments.client.coordinator.clone())?;
                 resolve_submit(arguments, endpoint)
             }
-            Command::Jobs(arguments) => Self::Jobs {
-                coordinator: coordinator(arguments.client.coordinator)?,
-                format: format(arguments.json),
+            Command::Jobs(JobsArguments { command: None, client, json }) => {
+                Self::Jobs { coordinator: coordinator(client.coordinator)?, format: format(json) }
+            }
+            Command::Jobs(JobsArguments {
+                command: Some(JobsCommand::Prune(prune)),
+                client,
+                json,
+            }) => Self::Prune {
+                older_than: prune.older_than,
+                keep_last: prune.keep_last,
+                coordinator: coordinator(prune.client.coordinator.or(client.coordinator))?,
+                format: format(json || prune.json),
             },
             Command::Watch(arguments) => Self::Watch {
                 job: arguments.job,
@@ -266,11 +288,12 @@ fn resolve_worker(
 }
 
 fn resolve_submit(arguments: SubmitArguments, coordinator: Endpoint) -> Resolved {
-    let SubmitArguments { job, client: _, propagate, request_id, json } = arguments;
+    let SubmitArguments { job, client: _, propagate, request_id, priority, json } = arguments;
     Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
         request_id: request_id.unwrap_or_default(),
+        priority,
         coordinator,
         format: format(json),
     }

@@ -23,7 +23,9 @@ mod tests {
 
     #[test]
     fn the_fraction_is_kept() {
-        for (fraction, least, most) in [(0.0, 0, 0), (0.01, 70, 130), (0.5, 4800, 5200), (1.0, 10_000, 10_000)] {
+        for (fraction, least, most) in
+            [(0.0, 0, 0), (0.01, 70, 130), (0.5, 4800, 5200), (1.0, 10_000, 10_000)]
+        {
             let batches = (0..10_000).filter(|i| is_chosen(JobId(i % 7), i % 90, i * 16, fraction));
             let chosen = batches.count();
             assert!((least..=most).contains(&chosen), "{chosen} at {fraction}");

@@ -199,7 +199,9 @@ impl Evaluation {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
         };
-        self.before.as_ref().is_none_or(|before| !before.iter().map(bits).eq(outcomes.iter().map(bits)))
+        self.before
+            .as_ref()
+            .is_none_or(|before| !before.iter().map(bits).eq(outcomes.iter().map(bits)))
     }
 
     /// All outcomes in index order and the estimated errors of the successes, once it is settled.

@@ -19,6 +19,7 @@ mod fairness;
 pub mod ids;
 pub mod leftover;
 pub mod listen;
+mod observers;
 mod rate;
 pub mod reactor;
 pub mod sanity;

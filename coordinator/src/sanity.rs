@@ -7,9 +7,7 @@ use thiserror::Error;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{
-    BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, SETTLED_MAX, Stage, State,
-};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, SETTLED_MAX, Stage, State};
 use crate::worker_name::WorkerName;
 
 /// What does not fit together.
@@ -105,9 +103,8 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
     }
     for (id, job) in state.active.iter().filter_map(|id| Some((id, state.jobs.get(id)?))) {
         let client = &job.record.client;
-        let of_client = |id: &&JobId| {
-            state.jobs.get(id).is_some_and(|job| job.record.client == *client)
-        };
+        let of_client =
+            |id: &&JobId| state.jobs.get(id).is_some_and(|job| job.record.client == *client);
         if state.active.iter().filter(of_client).count() != state.shares.jobs(client) {
             return Err(Insane::JobList(*id));
         }

@@ -4,18 +4,19 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use futures::{Stream, StreamExt as _, stream};
+use futures::{Stream, stream};
 use osteon_common::limits::{NAME_BYTES_MAX, PRIORITY_MAX};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
     CancelRequest, CancelResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest,
-    GetResponse, HistoryBlock, JobSnapshot, JobState, ListExpelledRequest, ListExpelledResponse,
-    ListRequest, ListResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse,
-    WatchRequest, WatchResponse,
+    GetResponse, HistoryBlock, JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest,
+    ListResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest,
+    WatchResponse,
 };
 use osteon_proto::{realizations, results, specification, status};
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::sync::mpsc::error::SendTimeoutError;
+use tokio::sync::{mpsc, oneshot};
 use tonic::{Request, Response, Status};
 
 use crate::core_task::Message;
@@ -23,12 +24,17 @@ use crate::effect::{Answer, Refusal};
 use crate::event::{self, Retention};
 use crate::ids::JobId;
 use crate::leftover::{Leftover, ReadError};
+use crate::observers;
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
 const PAGE_JOBS_MAX: u32 = 1000;
 /// Rows of the history in one message.
 const HISTORY_BLOCK_ROWS: usize = 4096;
+/// A request that finds no place among those that wait for this long is refused.
+const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
+/// When what was refused for want of room may be tried again.
+const RETRY: Duration = Duration::from_secs(10);
 /// Realizations in one message.
 const REALIZATION_BLOCK: usize = 65_536;
 
@@ -45,9 +51,20 @@ impl JobsService {
         Self { messages, store }
     }
 
+    /// Queues a message for the core; refused when it does not keep up.
+    async fn send(&self, message: Message) -> Result<(), Status> {
+        self.messages.send_timeout(message, QUEUE_PATIENCE).await.map_err(|error| match error {
+            SendTimeoutError::Closed(_) => stopped(),
+            SendTimeoutError::Timeout(_) => status::resource_exhausted(
+                "the coordinator has more requests than it can answer; try again",
+                RETRY,
+            ),
+        })
+    }
+
     async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
-        self.messages.send(Message::Ask(request, reply)).await.map_err(|_| stopped())?;
+        self.send(Message::Ask(request, reply)).await?;
         match answer.await.map_err(|_| stopped())? {
             Answer::Refused(refusal) => Err(refused(&refusal)),
             answer => Ok(answer),
@@ -141,11 +158,12 @@ impl Jobs for JobsService {
         &self,
         request: Request<WatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let job = job(&request.into_inner().job)?;
+        let WatchRequest { job: text, after } = request.into_inner();
+        let job = job(&text)?;
         let (reply, answer) = oneshot::channel();
-        self.messages.send(Message::Watch(job, reply)).await.map_err(|_| stopped())?;
+        self.send(Message::Watch(job, reply)).await?;
         let snapshots = answer.await.map_err(|_| stopped())?.map_err(|error| refused(&error))?;
-        Ok(Response::new(Box::pin(follow(snapshots))))
+        Ok(Response::new(Box::pin(observers::follow(snapshots, after))))
     }
 
     async fn cancel(
@@ -205,34 +223,6 @@ impl Jobs for JobsService {
     }
 }
 
-/// The newest snapshot whenever there is a new one, the present one first, until the job has
-/// ended. Who reads slowly misses those in between.
-fn follow(
-    snapshots: watch::Receiver<JobSnapshot>,
-) -> impl Stream<Item = Result<WatchResponse, Status>> {
-    enum Next {
-        First,
-        Changed,
-        Over,
-    }
-    stream::unfold((snapshots, Next::First), |(mut snapshots, next)| async move {
-        match next {
-            Next::Over => return None,
-            Next::First => {}
-            Next::Changed => {
-                if snapshots.changed().await.is_err() {
-                    return Some((Err(stopped()), (snapshots, Next::Over)));
-                }
-            }
-        }
-        let snapshot = snapshots.borrow_and_update().clone();
-        let ended = snapshot.state() == JobState::Ended;
-        let next = if ended { Next::Over } else { Next::Changed };
-        Some((Ok(WatchResponse { snapshot: Some(snapshot) }), (snapshots, next)))
-    })
-    .fuse()
-}
-
 /// One specification, one result, history blocks, realization blocks; made as they are sent.
 fn parts(leftover: Leftover) -> impl Iterator<Item = Part> + Send {
     let Leftover { specification, result, history } = leftover;
@@ -267,9 +257,11 @@ fn refused(refusal: &Refusal) -> Status {
     match refusal {
         Refusal::NoJob { .. } => Status::not_found(message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
-        Refusal::TooManyJobs { .. } => Status::resource_exhausted(message),
+        Refusal::TooManyJobs { .. } => status::resource_exhausted(message, RETRY),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
-        Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => Status::unavailable(message),
+        Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => {
+            Status::unavailable(message)
+        }
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
         realizations,
         workers: workers(state),
         elapsed_s: now.saturating_sub(job.record.accepted).as_secs_f64(),
+        sequence: job.sequence,
         ..JobSnapshot::default()
     };
     match &job.stage {
@@ -65,6 +66,7 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
             .map(|moments| moments.coefficient_of_variation),
         workers: workers(state),
         elapsed_s: end.ended.saturating_sub(job.accepted).as_secs_f64(),
+        sequence: job.sequence,
         ..JobSnapshot::default()
     };
     snapshot.set_state(JobState::Ended);
@@ -140,9 +142,8 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
                 None => format!("a worker that takes batches {}", since(job.progressed)),
             }
         }
-        Stage::Accepting
-        | Stage::Computing(_)
-        | Stage::Storing { .. }
-        | Stage::Finishing(_) => String::new(),
+        Stage::Accepting | Stage::Computing(_) | Stage::Storing { .. } | Stage::Finishing(_) => {
+            String::new()
+        }
     }
 }

@@ -81,6 +81,8 @@ pub(crate) struct Job {
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
+    /// Sequence number of its last snapshot that was published.
+    pub(crate) sequence: u64,
     /// When it last got an answer, or began, or was accepted.
     pub(crate) progressed: Duration,
     /// Requests that are answered when the present record is durable: submissions at first,
@@ -129,6 +131,8 @@ pub(crate) struct EndedJob {
     pub(crate) realizations: u64,
     /// When it was accepted, since the Unix epoch.
     pub(crate) accepted: Duration,
+    /// Sequence number of its last snapshot.
+    pub(crate) sequence: u64,
     pub(crate) end: EndRecord,
 }
 
@@ -345,6 +349,7 @@ impl Job {
             rewind: false,
             cancelled: false,
             rate: Rate::default(),
+            sequence: sequence(0, now),
             progressed: now,
             tokens: Vec::new(),
             trouble: None,
@@ -353,8 +358,8 @@ impl Job {
 }
 
 impl EndedJob {
-    /// What is kept of a job that ended.
-    pub(crate) fn new(record: &JobRecord, end: EndRecord) -> Self {
+    /// What is kept of a job that ended, after a snapshot with number `sequence`.
+    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
         let specification = &record.specification;
         Self {
             request_id: record.request_id.clone(),
@@ -363,9 +368,16 @@ impl EndedJob {
             max_evaluations: max_evaluations(specification),
             realizations: specification.monte_carlo.realizations,
             accepted: record.accepted,
+            sequence: self::sequence(sequence, end.ended),
             end,
         }
     }
+}
+
+/// Number of a snapshot at `now` after one with number `last`: it grows, and since it follows the
+/// clock it grows over restarts too.
+pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
+    u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
 }
 
 /// Most evaluations that a job may take.

@@ -289,6 +289,16 @@ pub enum DamagedRecord {
 
 /// A durable place for jobs.
 pub trait Store: Send {
+    /// All jobs, in the order of their identifiers.
+    ///
+    /// # Errors
+    /// As [`visit_jobs`](Self::visit_jobs).
+    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
+        let mut jobs = Vec::new();
+        self.visit_jobs(&mut |job| jobs.push(job))?;
+        Ok(jobs)
+    }
+
     /// Shows `visit` all jobs, in the order of their identifiers. One is in memory at a time.
     ///
     /// # Errors
@@ -371,14 +381,4 @@ pub trait Store: Send {
     /// # Errors
     /// When that is not durable.
     fn forget_expulsions(&mut self) -> Result<(), StoreError>;
-
-    /// All jobs, in the order of their identifiers.
-    ///
-    /// # Errors
-    /// As [`visit_jobs`](Self::visit_jobs).
-    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
-        let mut jobs = Vec::new();
-        self.visit_jobs(&mut |job| jobs.push(job))?;
-        Ok(jobs)
-    }
 }

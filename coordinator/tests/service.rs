@@ -95,7 +95,7 @@ async fn submit(
 
 /// Watches a job to its end; the last snapshot.
 async fn watch(client: &mut JobsClient<Channel>, job: &str) -> JobSnapshot {
-    let request = WatchRequest { job: job.to_owned() };
+    let request = WatchRequest { job: job.to_owned(), ..WatchRequest::default() };
     let mut stream = client.watch(request).await.unwrap().into_inner();
     let mut last = None;
     let follow = async {

@@ -10,8 +10,8 @@ use osteon_common::results::EstimatedError;
 
 use super::*;
 use crate::search::{Ending, Search, Step};
-use crate::store::{EvaluationRecord, JobRecord};
 use crate::store::memory::MemoryStore;
+use crate::store::{EvaluationRecord, JobRecord};
 
 const JOB: JobId = JobId(1);
 
@@ -40,15 +40,14 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
                 let estimated_error =
                     Some(EstimatedError { median: spread, largest: 2.0 * spread });
                 search.tell(outcomes.clone(), estimated_error);
-                let record =
-                    EvaluationRecord {
-                        job: JOB,
-                        number,
-                        point,
-                        outcomes,
-                        estimated_error,
-                        workers: [].into(),
-                    };
+                let record = EvaluationRecord {
+                    job: JOB,
+                    number,
+                    point,
+                    outcomes,
+                    estimated_error,
+                    workers: [].into(),
+                };
                 records.push(record);
             }
         }

@@ -140,13 +140,7 @@ pub(super) fn judged(
 }
 
 /// Expels those who were not believed.
-fn execute(
-    state: &mut State,
-    job: JobId,
-    verdict: Verdict,
-    now: Duration,
-    effects: &mut Effects,
-) {
+fn execute(state: &mut State, job: JobId, verdict: Verdict, now: Duration, effects: &mut Effects) {
     let Verdict { believed: [one, other], liars } = verdict;
     for Contradiction { index, answers: [(_, right), (liar, wrong)] } in liars {
         let reason = format!(

@@ -46,13 +46,7 @@ pub(super) fn expel(
 }
 
 /// Takes the answers of a worker out of a job.
-fn forget(
-    state: &mut State,
-    id: JobId,
-    name: &WorkerName,
-    now: Duration,
-    effects: &mut Effects,
-) {
+fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effects: &mut Effects) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };

@@ -289,11 +289,12 @@ fn leave(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 
 /// The end of a job is durable.
 fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    let Some(Job { record, stage: Stage::Finishing(end), tokens, .. }) = state.jobs.remove(&id)
+    let Some(Job { record, stage: Stage::Finishing(end), tokens, sequence, .. }) =
+        state.jobs.remove(&id)
     else {
         return;
     };
-    state.ended.insert(id, EndedJob::new(&record, end));
+    state.ended.insert(id, EndedJob::new(&record, end, sequence));
     for token in tokens {
         if let Some(snapshot) = snapshot::of(state, id, now) {
             effects.push(Effect::Answer { token, answer: Answer::Snapshot(snapshot) });

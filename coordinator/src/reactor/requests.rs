@@ -158,8 +158,10 @@ fn fetch(state: &State, id: JobId) -> Answer {
 
 fn expelled(state: &State, now: Duration) -> Answer {
     let newest = state.expelled.len().saturating_sub(EXPELLED_SHOWN_MAX);
-    let shown = state.expelled.iter().skip(newest).map(|expelled| {
-        (expelled.record.clone(), now.saturating_sub(expelled.record.at))
-    });
+    let shown = state
+        .expelled
+        .iter()
+        .skip(newest)
+        .map(|expelled| (expelled.record.clone(), now.saturating_sub(expelled.record.at)));
     Answer::Expelled(shown.collect())
 }

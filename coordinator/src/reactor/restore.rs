@@ -34,7 +34,7 @@ impl Restored {
         let mut restored = Self::default();
         store.visit_jobs(&mut |stored| match stored.end {
             Some(end) => {
-                restored.ended.push((stored.record.job, EndedJob::new(&stored.record, end)));
+                restored.ended.push((stored.record.job, EndedJob::new(&stored.record, end, 0)));
             }
             None => restored.unfinished.push((stored.record, stored.evaluations)),
         })?;

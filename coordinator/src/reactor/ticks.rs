@@ -6,7 +6,7 @@ use super::{Effects, checks, expulsion, jobs, prune, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
-use crate::state::{State, Worker};
+use crate::state::{State, Worker, sequence};
 
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
@@ -77,6 +77,9 @@ fn publish(state: &mut State, now: Duration, effects: &mut Effects) {
     }
     let changed: Vec<JobId> = std::mem::take(&mut state.changed).into_iter().collect();
     for job in changed {
+        if let Some(job) = state.jobs.get_mut(&job) {
+            job.sequence = sequence(job.sequence, now);
+        }
         if let Some(snapshot) = snapshot::of(state, job, now) {
             effects.push(Effect::Publish { job, snapshot });
         }

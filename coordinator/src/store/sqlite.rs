@@ -235,14 +235,8 @@ impl Store for SqliteStore {
         let outcomes = pack_outcomes(&record.outcomes);
         let errors = record.estimated_error.map(pack_errors);
         let (job, number, workers) = (record.job, record.number, pack_workers(&record.workers));
-        let checksum = evaluation_checksum(
-            job,
-            number,
-            &point,
-            &outcomes,
-            errors.as_deref(),
-            Some(&workers),
-        );
+        let checksum =
+            evaluation_checksum(job, number, &point, &outcomes, errors.as_deref(), Some(&workers));
         let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
                    estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
         let values = params![job.0, number, point, outcomes, checksum, errors, workers];
@@ -339,9 +333,9 @@ impl Store for SqliteStore {
             self.connection.prepare(sql)?.query_map([], read)?.collect()
         };
         let rows = run().map_err(|source| self.refused(source))?;
-        let checked = rows.into_iter().map(|(intact, record)| {
-            intact.then_some(record.clone()).ok_or(record.job)
-        });
+        let checked = rows
+            .into_iter()
+            .map(|(intact, record)| intact.then_some(record.clone()).ok_or(record.job));
         checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Expulsion))
     }
 

@@ -1,11 +1,24 @@
 //! Workers whose answers are wrong.
 
+use std::collections::BTreeSet;
+
 use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{BatchId, WorkerId};
 use osteon_proto::batch::Work;
 
 use super::World;
 use crate::fake;
+
+/// Processes that lie, if any do. They are of the first workers: those that come in the place of
+/// others are honest.
+pub(super) fn some(draw: &mut impl FnMut(u64) -> u64) -> BTreeSet<u32> {
+    match draw(6) {
+        0 => [1].into(),
+        1 => [1, 2].into(),
+        2 => [2].into(),
+        _ => BTreeSet::new(),
+    }
+}
 
 impl World {
     /// The process of a worker that arrives: a new one, or one that was here and comes back.

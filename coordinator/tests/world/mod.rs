@@ -205,13 +205,7 @@ impl World {
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
-        // Of the first workers: those that come later, in the place of others, are honest.
-        let liars = match draw(6) {
-            0 => [1].into(),
-            1 => [1, 2].into(),
-            2 => [2].into(),
-            _ => BTreeSet::new(),
-        };
+        let liars = liars::some(&mut draw);
         let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,

@@ -20,11 +20,7 @@ fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
     let turns = (0..evaluations).zip(processes.iter().cycle());
     for (worker, (number, process)) in (100..).zip(turns) {
         rig.event(hello_of(worker, *process, 1));
-        let effects = react(
-            &mut rig.state,
-            answer_in(0.1, worker, number + 1, number, 1),
-            rig.now,
-        );
+        let effects = react(&mut rig.state, answer_in(0.1, worker, number + 1, number, 1), rig.now);
         let [Effect::Store(Record::Evaluation { record, is_last: true })] = &effects[..] else {
             panic!("{effects:?}");
         };

@@ -17,7 +17,10 @@ use crate::worker_name::WorkerName;
 const OUTCOME_BYTES: usize = 9;
 
 /// The evaluation of a row, and its number; `None` if it is damaged.
-pub(super) fn evaluation(job: JobId, row: &Row<'_>) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
+pub(super) fn evaluation(
+    job: JobId,
+    row: &Row<'_>,
+) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
     let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
     let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
     let errors = row.get_ref(4)?.as_blob_or_null()?;

@@ -71,7 +71,11 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let read = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
     let (tables, known): (i64, bool) = connection.query_row(sql, [], read).map_err(refused)?;
     if !known {
-        return if tables == 0 { Ok(()) } else { Err(StoreError::Foreign { path: path.to_owned() }) };
+        return if tables == 0 {
+            Ok(())
+        } else {
+            Err(StoreError::Foreign { path: path.to_owned() })
+        };
     }
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))

@@ -346,13 +346,8 @@ fn put_as_of_old(file: &Connection, format: i64) -> EvaluationRecord {
     let encoded = specification::to_message(&specification).encode_to_vec();
     let accepted = nanoseconds(accepted);
     let number = 1_u64.to_le_bytes();
-    let fields: [&[u8]; 5] = [
-        &number,
-        request_id.as_bytes(),
-        &accepted.to_le_bytes(),
-        &encoded,
-        fingerprint.as_bytes(),
-    ];
+    let fields: [&[u8]; 5] =
+        [&number, request_id.as_bytes(), &accepted.to_le_bytes(), &encoded, fingerprint.as_bytes()];
     let sql = "INSERT INTO job VALUES (1, ?1, ?2, ?3, ?4, ?5)";
     let values = params![request_id, accepted, encoded, fingerprint, checksum(&fields)];
     file.execute(sql, values).unwrap();
