@@ -410,4 +410,23 @@ mod tests {
         let refusal = shown(&Status::already_exists("taken"));
         assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
     }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
+        let directory = tempfile::tempdir().unwrap();
+        let socket = directory.path().join("socket");
+        let endpoint = Endpoint::Unix(socket.clone());
+        let begun = Instant::now();
+        let error = Client::connect(&endpoint).await.unwrap_err().to_string();
+        assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
+        let waited = begun.elapsed();
+        assert!(waited > answer_limit() * 9 / 10 && waited <= answer_limit(), "{waited:?}");
+
+        let comes = async {
+            sleep(answer_limit() / 2).await;
+            tokio::net::UnixListener::bind(&socket).unwrap()
+        };
+        let (_listener, connected) = tokio::join!(comes, Client::connect(&endpoint));
+        connected.unwrap();
+    }
 }

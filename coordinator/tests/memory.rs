@@ -39,7 +39,9 @@ fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
             Effect::Store(record) => {
                 match &record {
                     Record::Job(record) => store.put_job(record),
-                    Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+                    Record::Evaluation { record, is_last } => {
+                        store.put_evaluation(record, *is_last)
+                    }
                     Record::End { end, summary } => store.finish_job(end, summary),
                     Record::Expulsion(_) => panic!("there is one worker, and it is honest"),
                 }

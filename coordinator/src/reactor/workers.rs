@@ -95,6 +95,8 @@ pub(super) fn lost(state: &mut State, worker: WorkerId, now: Duration, effects: 
     if state.workers.is_empty() {
         state.no_worker_since = now;
     }
+    tracing::info!(%worker, name = %gone.name, batches = gone.in_flight.len(),
+        "a worker is gone; what it held goes to others");
     let alone = gone.in_flight.len() == 1;
     for batch in gone.in_flight {
         batches::orphaned(state, batch, alone, gone.draining, now, effects);
