@@ -11,8 +11,8 @@ use tonic::Status;
 /// Who reads nothing for this long is dropped.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// The newest snapshot whenever there is a new one after number `after`, until the job has ended.
-/// Who reads slowly misses those in between.
+/// The newest snapshot whenever there is another than number `after`, until the job has ended. Who
+/// reads slowly misses those in between.
 pub(crate) fn follow(
     snapshots: watch::Receiver<JobSnapshot>,
     after: u64,
@@ -38,7 +38,7 @@ async fn feed(
     loop {
         let snapshot = snapshots.borrow_and_update().clone();
         let ended = snapshot.state() == JobState::Ended;
-        if ended || snapshot.sequence > seen {
+        if ended || snapshot.sequence != seen {
             seen = snapshot.sequence;
             let response = WatchResponse { snapshot: Some(snapshot) };
             match sender.send_timeout(response, PATIENCE).await {

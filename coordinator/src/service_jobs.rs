@@ -272,3 +272,29 @@ fn stopped() -> Status {
 fn unexpected() -> Status {
     Status::internal("the coordinator answered another question than was asked")
 }
+
+#[cfg(test)]
+mod tests {
+    use tonic::Code;
+
+    use super::*;
+
+    #[test]
+    fn refusals_have_codes_and_say_when_to_come_back() {
+        let (job, error) = (JobId(1), "full".to_owned());
+        let taken = Refusal::RequestIdTaken { request_id: "a".to_owned(), job };
+        for (refusal, code, retry) in [
+            (Refusal::TooManyJobs { limit: 5 }, Code::ResourceExhausted, Some(RETRY)),
+            (Refusal::NoJob { job }, Code::NotFound, None),
+            (taken, Code::AlreadyExists, None),
+            (Refusal::NotEnded { job }, Code::FailedPrecondition, None),
+            (Refusal::Draining, Code::Unavailable, None),
+            (Refusal::Store { error: error.clone() }, Code::Unavailable, None),
+            (Refusal::NotPruned { error }, Code::Unavailable, None),
+        ] {
+            let status = refused(&refusal);
+            assert_eq!((status.code(), status::retry_after(&status)), (code, retry), "{refusal}");
+            assert_eq!(status.message(), refusal.to_string());
+        }
+    }
+}

@@ -145,8 +145,8 @@ pub enum StoreError {
     },
     /// The file that says who has the store open cannot be written.
     #[error(
-        "cannot write {}: {source}; give the coordinator's user write permission to its \
-         directory, or choose another one",
+        "cannot write and lock {}: {source}; give the coordinator's user write permission to its \
+         directory, or choose another one, on a disk that knows locks",
         path.display()
     )]
     Lock {
