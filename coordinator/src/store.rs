@@ -376,6 +376,12 @@ pub trait Store: Send {
     /// When the store cannot be read.
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError>;
 
+    /// Ended jobs with evaluations that a worker contributed to.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
+
     /// Forgets all expelled workers.
     ///
     /// # Errors

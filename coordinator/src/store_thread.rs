@@ -11,7 +11,7 @@ use crate::event::Event;
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
 use crate::leftover::{self, Leftover, ReadError};
-use crate::store::{EndRecord, Store};
+use crate::store::{EndRecord, ExpulsionRecord, Store, StoreError};
 
 /// Commands that may wait: a record for every job, and some readers.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
@@ -68,7 +68,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::End { end, summary } => store.finish_job(end, summary),
-        Record::Expulsion(record) => store.put_expulsion(record),
+        Record::Expulsion(record) => expel(store, record),
     };
     match done {
         Ok(()) => Event::Stored { job, key },
@@ -77,4 +77,17 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
             Event::StoreFailed { job, key, error: error.to_string() }
         }
     }
+}
+
+/// Stores an expulsion, and says whose results can no longer be relied on.
+fn expel(store: &mut dyn Store, record: &ExpulsionRecord) -> Result<(), StoreError> {
+    store.put_expulsion(record)?;
+    // The log is a service: what it fails to say does not undo what is stored.
+    let ended = store.ended_with(&record.worker).unwrap_or_default();
+    if !ended.is_empty() {
+        let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();
+        tracing::error!(worker = %record.worker, jobs = jobs.join(" "),
+            "these jobs ended before the worker was found to compute wrongly; run them again");
+    }
+    Ok(())
 }

@@ -14,6 +14,7 @@ use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
     EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
 };
+use osteon_coordinator::worker_name::WorkerName;
 use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
@@ -318,6 +319,10 @@ impl Store for BrokenStore {
 
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
         self.sound.expulsions()
+    }
+
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        self.sound.ended_with(worker)
     }
 
     fn forget_expulsions(&mut self) -> Result<(), StoreError> {

@@ -1,6 +1,6 @@
 //! A store that lasts as long as its handles: for runs that keep nothing, and for tests.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{
@@ -8,6 +8,7 @@ use super::{
 };
 use crate::ids::JobId;
 use crate::search::Summary;
+use crate::worker_name::WorkerName;
 
 /// A store in memory. Clones share their content, as two openings of one file would.
 #[derive(Debug, Clone, Default)]
@@ -112,6 +113,14 @@ impl Store for MemoryStore {
 
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
         Ok(self.content().expulsions.values().cloned().collect())
+    }
+
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        let content = self.content();
+        let of_worker = content.evaluations.values().filter(|it| it.workers.contains(worker));
+        let jobs: BTreeSet<JobId> = of_worker.map(|evaluation| evaluation.job).collect();
+        let ended = |job: &JobId| content.jobs.get(job).is_some_and(|job| job.end.is_some());
+        Ok(jobs.into_iter().filter(ended).collect())
     }
 
     fn forget_expulsions(&mut self) -> Result<(), StoreError> {

@@ -339,6 +339,19 @@ impl Store for SqliteStore {
         checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Expulsion))
     }
 
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        let sql = "SELECT DISTINCT evaluation.job FROM evaluation
+                   JOIN ending ON ending.job = evaluation.job
+                   WHERE instr(char(10) || workers || char(10), char(10) || ?1 || char(10)) > 0
+                   ORDER BY evaluation.job";
+        let line = pack_workers(&[worker.clone()].into());
+        let run = || -> rusqlite::Result<Vec<JobId>> {
+            let mut statement = self.connection.prepare(sql)?;
+            statement.query_map([line], |row| row.get(0).map(JobId))?.collect()
+        };
+        run().map_err(|source| self.refused(source))
+    }
+
     fn forget_expulsions(&mut self) -> Result<(), StoreError> {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))

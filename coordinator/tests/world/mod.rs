@@ -481,10 +481,10 @@ impl World {
     }
 
     fn react(&mut self, event: Event) {
-        let shown = format!("{event:?}");
+        let before = event.clone();
         let effects = react(&mut self.state, event, self.now);
         if let Err(insane) = sanity_check(&self.state) {
-            panic!("{insane} after {shown}\n{:#?}", self.state);
+            panic!("{insane} after {before:?}\n{:#?}", self.state);
         }
         self.apply(effects);
     }

@@ -113,6 +113,14 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.job(JobId(2)).unwrap(), Some(job(2)));
     assert_eq!(store.job(JobId(3)).unwrap(), None);
     assert_eq!(store.expulsions().unwrap(), [expulsion(1)]);
+    // Process 0 has computed evaluation 1 of job 1, which has ended, and nobody else has.
+    let ended_with = |store: &mut SqliteStore, host, process| {
+        store.ended_with(&WorkerName::new(host, process)).unwrap()
+    };
+    assert_eq!(ended_with(&mut store, "a node", 0), [JobId(1)]);
+    for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
+        assert_eq!(ended_with(&mut store, host, process), [], "{process} {host}");
+    }
     store.forget_expulsions().unwrap();
     assert_eq!(store.expulsions().unwrap(), []);
 }
