@@ -1,6 +1,7 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use osteon_proto::endpoint::Endpoint;
@@ -139,6 +140,14 @@ pub(crate) struct CoordinatorArguments {
     /// A client's token that is taken, too, with role admin
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
+    /// Fraction of the batches that a second worker computes too, 0 to 1: different bits expose a
+    /// worker that computes wrongly
+    #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
+          value_parser = fraction)]
+    pub(crate) audit_fraction: f64,
+    /// Forget ended jobs after this long: a number with s, min, h or d [default: never]
+    #[arg(long, value_name = "AGE", value_parser = age)]
+    pub(crate) keep_ended: Option<Duration>,
 }
 
 /// Of `worker`.
@@ -162,7 +171,7 @@ pub(crate) struct WorkerArguments {
 }
 
 /// What is shown to a coordinator, and how it is known.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct CredentialArguments {
     /// Certificates of the authorities that may have signed the coordinator's (PEM); for https
     #[arg(long, value_name = "FILE")]
@@ -179,7 +188,7 @@ pub(crate) struct CredentialArguments {
 }
 
 /// Of every command that speaks to a coordinator.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct ClientArguments {
     /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
     #[arg(long, value_name = "URL")]
@@ -187,6 +196,22 @@ pub(crate) struct ClientArguments {
     /// What is shown to the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
+}
+
+impl ClientArguments {
+    /// These, and where one is not given, that of `other`.
+    pub(crate) fn or(self, other: Self) -> Self {
+        let (own, others) = (self.credentials, other.credentials);
+        Self {
+            coordinator: self.coordinator.or(other.coordinator),
+            credentials: CredentialArguments {
+                tls_ca: own.tls_ca.or(others.tls_ca),
+                tls_cert: own.tls_cert.or(others.tls_cert),
+                tls_key: own.tls_key.or(others.tls_key),
+                token_file: own.token_file.or(others.token_file),
+            },
+        }
+    }
 }
 
 /// Of `submit`.
@@ -203,6 +228,10 @@ pub(crate) struct SubmitArguments {
     /// Submitting again with the same ID gives the same job (at most 256 bytes)
     #[arg(long, value_name = "ID", value_parser = request_id)]
     pub(crate) request_id: Option<String>,
+    /// Rank among your own jobs, 0 to 9: a higher one goes first
+    #[arg(long, value_name = "P", default_value_t = 0,
+          value_parser = clap::value_parser!(u32).range(0..=i64::from(osteon_common::limits::PRIORITY_MAX)))]
+    pub(crate) priority: u32,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -211,9 +240,36 @@ pub(crate) struct SubmitArguments {
 /// Of `jobs`.
 #[derive(Debug, Args)]
 pub(crate) struct JobsArguments {
+    /// What else than to list them.
+    #[command(subcommand)]
+    pub(crate) command: Option<JobsCommand>,
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What can be done with jobs.
+#[derive(Debug, Subcommand)]
+pub(crate) enum JobsCommand {
+    /// Forget ended jobs and print their ids; without options all of them
+    Prune(PruneArguments),
+}
+
+/// Of `jobs prune`.
+#[derive(Debug, Args)]
+pub(crate) struct PruneArguments {
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Only those that ended longer ago: a number with s, min, h or d
+    #[arg(long, value_name = "AGE", value_parser = age)]
+    pub(crate) older_than: Option<Duration>,
+    /// Keep the N that ended last
+    #[arg(long, value_name = "N")]
+    pub(crate) keep_last: Option<u64>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -325,6 +381,9 @@ pub(crate) struct DrawsArguments {
 /// Longest span that a command line may ask for, s: a year.
 const SECONDS_MAX: f64 = 366.0 * 86_400.0;
 
+/// Longest age that a command line may ask for, s: a century.
+const AGE_S_MAX: f64 = 100.0 * SECONDS_MAX;
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
@@ -337,6 +396,30 @@ fn seconds(text: &str) -> Result<f64, String> {
         Ok(number) if number > 0.0 && number <= SECONDS_MAX => Ok(number),
         _ => Err(format!("it must be a number above 0 and at most {SECONDS_MAX} (s)")),
     }
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0 to 1".to_owned()),
+    }
+}
+
+fn age(text: &str) -> Result<Duration, String> {
+    let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let seconds = match unit {
+        "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        "d" => 86_400.0,
+        _ => f64::NAN,
+    };
+    let number: Option<f64> = text[..text.len() - unit.len()].parse().ok();
+    number
+        .map(|number| number * seconds)
+        .filter(|age| *age <= AGE_S_MAX)
+        .and_then(|age| Duration::try_from_secs_f64(age).ok())
+        .ok_or_else(|| "it must be a number with a unit, s, min, h or d: 90min, 30d".to_owned())
 }
 
 fn request_id(text: &str) -> Result<String, String> {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::limits::REALIZATIONS_MAX;
+use osteon_common::limits::{NAME_BYTES_MAX, REALIZATIONS_MAX};
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
 use osteon_common::violations::Violations;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
@@ -92,6 +92,17 @@ impl ClientError {
     }
 }
 
+/// Who this is for the sharing of workers between users: user and host.
+fn user() -> String {
+    let user = ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let mut name = format!("{}@{}", user.unwrap_or_default(), host.trim());
+    while name.len() > NAME_BYTES_MAX {
+        name.pop();
+    }
+    name
+}
+
 fn indented(violations: &Violations) -> String {
     violations.iter().map(|violation| format!("\n  {violation}")).collect()
 }
@@ -124,12 +135,28 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// Reads the credentials and connects to the coordinator.
+    /// Reads the credentials and connects to the coordinator; one that is not there may be about to
+    /// come.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
         let Remote { endpoint, files } = remote;
         let credentials = Credentials::load(files, endpoint)?;
-        let connection = endpoint::connect_with(endpoint, &credentials, answer_limit()).await?;
-        Ok(Self { endpoint: endpoint.clone(), jobs: endpoint::jobs_client(connection) })
+        let begun = Instant::now();
+        loop {
+            let left = answer_limit().saturating_sub(begun.elapsed());
+            let error = match endpoint::connect_with(endpoint, &credentials, left).await {
+                Ok(connection) => {
+                    let jobs = endpoint::jobs_client(connection);
+                    return Ok(Self { endpoint: endpoint.clone(), jobs });
+                }
+                Err(error) => error,
+            };
+            let pause = Duration::from_millis(RETRY_MS);
+            let again = matches!(error, ConnectError::Unreachable { .. });
+            if !again || begun.elapsed() + pause >= answer_limit() {
+                return Err(error.into());
+            }
+            sleep(pause).await;
+        }
     }
 
     /// Submits a job; its id.
@@ -137,10 +164,13 @@ impl Client {
         &mut self,
         specification: &JobSpecification,
         request_id: &str,
+        priority: u32,
     ) -> Result<String, ClientError> {
         let request = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
             request_id: request_id.to_owned(),
+            client: user(),
+            priority,
         };
         let call = self.jobs.submit(request);
         Ok(answered(&self.endpoint, call).await?.job)
@@ -160,6 +190,23 @@ impl Client {
             }
         }
         Ok(jobs)
+    }
+
+    /// The workers that were found to compute wrongly.
+    pub(crate) async fn expelled(&mut self) -> Result<Vec<v1::ExpelledWorker>, ClientError> {
+        let call = self.jobs.list_expelled(v1::ListExpelledRequest {});
+        Ok(answered(&self.endpoint, call).await?.workers)
+    }
+
+    /// Forgets ended jobs; those that are forgotten.
+    pub(crate) async fn prune(
+        &mut self,
+        older_than: Option<Duration>,
+        keep_last: Option<u64>,
+    ) -> Result<Vec<String>, ClientError> {
+        let keep_for_s = older_than.map(|age| age.as_secs_f64());
+        let call = self.jobs.prune(v1::PruneRequest { keep_for_s, keep_last });
+        Ok(answered(&self.endpoint, call).await?.jobs)
     }
 
     /// Cancels a job; how it is then.
@@ -207,7 +254,7 @@ impl Client {
         show: &mut impl FnMut(&JobSnapshot) -> Result<(), E>,
         lost_since: &mut Option<Instant>,
     ) -> Result<Result<JobSnapshot, ClientError>, E> {
-        let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned() });
+        let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
         let mut stream = match answered(&self.endpoint, call).await {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),
@@ -383,5 +430,25 @@ mod tests {
         }
         let refusal = shown(&Status::already_exists("taken"));
         assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
+        let directory = tempfile::tempdir().unwrap();
+        let socket = directory.path().join("socket");
+        let endpoint = Endpoint::Unix(socket.clone());
+        let remote = Remote { endpoint, files: CredentialFiles::default() };
+        let begun = Instant::now();
+        let error = Client::connect(&remote).await.unwrap_err().to_string();
+        assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
+        let waited = begun.elapsed();
+        assert!(waited > answer_limit() * 9 / 10 && waited <= answer_limit(), "{waited:?}");
+
+        let comes = async {
+            sleep(answer_limit() / 2).await;
+            tokio::net::UnixListener::bind(&socket).unwrap()
+        };
+        let (_listener, connected) = tokio::join!(comes, Client::connect(&remote));
+        connected.unwrap();
     }
 }

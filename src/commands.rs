@@ -27,8 +27,13 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Worker { config, files } => worker::serve(config, &files).await,
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
-        Resolved::Submit { job, kind, request_id, coordinator, format } => {
-            jobs::submit(&job, kind, &request_id, &coordinator, format).await
+        Resolved::Submit { job, kind, request_id, priority, coordinator, format } => {
+            let submission =
+                jobs::Submission { job: &job, kind, request_id: &request_id, priority };
+            jobs::submit(submission, &coordinator, format).await
+        }
+        Resolved::Prune { older_than, keep_last, coordinator, format } => {
+            jobs::prune(older_than, keep_last, &coordinator, format).await
         }
         Resolved::Jobs { coordinator, format } => jobs::list(&coordinator, format).await,
         Resolved::Watch { job, coordinator } => jobs::watch(&job, &coordinator).await,

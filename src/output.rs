@@ -8,7 +8,7 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_proto::v1::JobSnapshot;
+use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_solver::{Arrival, Failure};
 use osteon_study::check::Check;
 
@@ -48,8 +48,10 @@ pub(crate) trait Output {
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
     /// The id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
-    /// All jobs.
-    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()>;
+    /// All jobs, and the workers that are expelled.
+    fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()>;
+    /// The jobs that are forgotten.
+    fn pruned(&mut self, jobs: &[String]) -> io::Result<()>;
     /// One job as of now.
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()>;
     /// A text that is the same for people and programs: a case file, a URL.

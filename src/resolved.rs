@@ -13,8 +13,8 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
-    DrawArguments, RunArguments, SimulateArguments, Study, SubmitArguments, TokenArguments,
-    WorkerArguments,
+    DrawArguments, JobsArguments, JobsCommand, RunArguments, SimulateArguments, Study,
+    SubmitArguments, TokenArguments, WorkerArguments,
 };
 use crate::client::Remote;
 use crate::ending::Failure;
@@ -77,6 +77,8 @@ pub(crate) enum Resolved {
         kind: JobKind,
         /// Empty: a new job.
         request_id: String,
+        /// Rank among the user's own jobs.
+        priority: u32,
         /// Where to.
         coordinator: Remote,
         /// How to print.
@@ -84,6 +86,17 @@ pub(crate) enum Resolved {
     },
     /// `jobs`.
     Jobs {
+        /// Of whom.
+        coordinator: Remote,
+        /// How to print.
+        format: Format,
+    },
+    /// `jobs prune`.
+    Prune {
+        /// Only jobs that ended longer ago.
+        older_than: Option<Duration>,
+        /// So many that ended last are kept.
+        keep_last: Option<u64>,
         /// Of whom.
         coordinator: Remote,
         /// How to print.
@@ -180,18 +193,22 @@ impl Resolved {
             }
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
-            Command::Submit(SubmitArguments { job, client, propagate, request_id, json }) => {
-                Self::Submit {
-                    job,
-                    kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
-                    request_id: request_id.unwrap_or_default(),
-                    coordinator: remote(client)?,
-                    format: format(json),
-                }
+            Command::Submit(arguments) => {
+                let coordinator = remote(arguments.client.clone())?;
+                resolve_submit(arguments, coordinator)
             }
-            Command::Jobs(arguments) => Self::Jobs {
-                coordinator: remote(arguments.client)?,
-                format: format(arguments.json),
+            Command::Jobs(JobsArguments { command: None, client, json }) => {
+                Self::Jobs { coordinator: remote(client)?, format: format(json) }
+            }
+            Command::Jobs(JobsArguments {
+                command: Some(JobsCommand::Prune(prune)),
+                client,
+                json,
+            }) => Self::Prune {
+                older_than: prune.older_than,
+                keep_last: prune.keep_last,
+                coordinator: remote(prune.client.or(client))?,
+                format: format(json || prune.json),
             },
             Command::Watch(arguments) => {
                 Self::Watch { job: arguments.job, coordinator: remote(arguments.client)? }
@@ -298,6 +315,18 @@ impl From<CredentialArguments> for CredentialFiles {
     fn from(arguments: CredentialArguments) -> Self {
         let CredentialArguments { tls_ca, tls_cert, tls_key, token_file } = arguments;
         Self { ca: tls_ca, certificate: tls_cert, key: tls_key, token: token_file }
+    }
+}
+
+fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Resolved {
+    let SubmitArguments { job, client: _, propagate, request_id, priority, json } = arguments;
+    Resolved::Submit {
+        job,
+        kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
+        request_id: request_id.unwrap_or_default(),
+        priority,
+        coordinator,
+        format: format(json),
     }
 }
 

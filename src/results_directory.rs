@@ -72,8 +72,8 @@ impl ResultsDirectory {
         Ok(result)
     }
 
-    /// As [`stored`](Self::stored), of runs that have ended by themselves only: what a run shows
-    /// again instead of running.
+    /// As [`stored`](Self::stored), of runs only that would end the same way again: what a run
+    /// shows instead of running.
     ///
     /// # Errors
     /// As [`stored`](Self::stored).
@@ -81,7 +81,7 @@ impl ResultsDirectory {
         path: &Path,
         specification: &JobSpecification,
     ) -> Result<Option<String>, Failure> {
-        Ok(Self::stored(path, specification)?.filter(|json| !verdict::is_cancelled(json)))
+        Ok(Self::stored(path, specification)?.filter(|json| !verdict::may_end_otherwise(json)))
     }
 
     /// Makes the directory, if there is none, and holds it. What was stored there before may

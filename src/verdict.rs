@@ -27,6 +27,20 @@ pub(crate) fn is_cancelled(json: &str) -> bool {
     value["status"].as_str() == Some(Status::Cancelled.name())
 }
 
+/// Whether running it again may end otherwise: somebody ended the run before its time, or it failed
+/// because of the machines that it ran on.
+pub(crate) fn may_end_otherwise(json: &str) -> bool {
+    is_cancelled(json) || machine_failure(json).is_some()
+}
+
+/// Why a run failed, if that lies in the machines that it ran on.
+pub(crate) fn machine_failure(json: &str) -> Option<String> {
+    let value: Value = serde_json::from_str(json).unwrap_or_default();
+    let failed = value["status"].as_str() == Some(Status::Failed.name());
+    let reason = value["reason"].as_str().filter(|_| failed)?;
+    osteon_coordinator::failure::lies_in_machines(reason).then(|| reason.to_owned())
+}
+
 /// Why the result of a propagation is a failure; `None` if it is none.
 pub(crate) fn propagation_failure(
     specification: &JobSpecification,

@@ -70,6 +70,53 @@ fn submission_is_idempotent_by_request_id() {
 }
 
 #[test]
+fn a_store_that_cannot_be_used_is_named_and_left_as_it_is() {
+    let scratch = Scratch::new();
+    let refused = |store: &std::path::Path, expected: &str| {
+        let listen = ["coordinator", "--listen", "127.0.0.1:0", "--store"];
+        let refused = run(&[&listen[..], &[store.to_str().unwrap()]].concat());
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        assert!(refused.stderr.contains(expected), "{expected}: {refused:?}");
+        assert!(refused.stderr.contains("choose another"), "{refused:?}");
+    };
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let holder =
+        format!("is in use by the coordinator with process {} on ", coordinator.process.id());
+    refused(&scratch.path("store"), &holder);
+    assert_eq!(coordinator.client(&["jobs"]).succeeded(), "no jobs\n");
+
+    let garbage = scratch.path("garbage");
+    fs::create_dir(&garbage).unwrap();
+    fs::write(garbage.join("osteon.sqlite"), "no database at all").unwrap();
+    refused(&garbage, "is damaged or no database");
+    assert_eq!(fs::read(garbage.join("osteon.sqlite")).unwrap(), b"no database at all");
+    refused(&garbage.join("osteon.sqlite"), "cannot create");
+    refused(std::path::Path::new("/proc/self"), "cannot write and lock");
+}
+
+#[test]
+fn ended_jobs_are_pruned_and_their_ids_printed() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let ids: Vec<String> = (0..4).map(|_| coordinator.submit(&file)).collect();
+    for id in &ids[..3] {
+        coordinator.client(&["cancel", id]).succeeded();
+    }
+    let prune = |options: &[&str]| coordinator.client(&[&["jobs", "prune"], options].concat());
+    assert_eq!(prune(&["--older-than", "1d"]).succeeded(), "");
+    let kept = prune(&["--keep-last", "2", "--json"]).json();
+    assert_eq!(kept["pruned"], serde_json::json!([ids[0]]));
+    assert_eq!(prune(&[]).succeeded(), format!("{}\n{}\n", ids[1], ids[2]));
+    let left = coordinator.client(&["jobs", "--json"]).json();
+    assert_eq!(left.as_array().unwrap().len(), 1);
+    assert_eq!(left[0]["job"], *ids[3]);
+    let gone = coordinator.client(&["watch", &ids[0]]);
+    assert_eq!(gone.code, Some(2), "{gone:?}");
+    assert!(gone.stderr.contains(&format!("there is no job {}", ids[0])), "{gone:?}");
+}
+
+#[test]
 fn a_cancelled_job_ends_and_says_so() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(1000, 400));

@@ -62,3 +62,5 @@ pub const HEADER_BYTES_MAX: u32 = 16 << 10;
 pub const FETCHES_AT_ONCE_MAX: usize = 8;
 /// A fetch ends when its reader takes nothing for this long, s.
 pub const READER_PATIENCE_S: u64 = 30;
+/// Highest priority of a job among those of its client.
+pub const PRIORITY_MAX: u32 = 9;

@@ -15,6 +15,10 @@ use crate::accept::Peer;
 use crate::access::{self, Certificate, Denied, Need, Policy};
 use crate::tokens::Role;
 
+/// The name that a token is registered for, in the extensions of a call.
+#[derive(Debug, Clone)]
+pub(crate) struct Holder(pub(crate) String);
+
 /// The one method whose message may be large.
 const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
 
@@ -38,7 +42,8 @@ impl AccessLayer {
         Self { policy: Arc::new(policy), submissions }
     }
 
-    fn decide<B>(&self, request: &http::Request<B>) -> Result<(), Status> {
+    /// The holder of the call's token, if tokens are asked for.
+    fn decide<B>(&self, request: &http::Request<B>) -> Result<Option<Holder>, Status> {
         let path = request.uri().path();
         let peer = request.extensions().get::<Peer>();
         let certificate = peer.map_or(Certificate::Absent, |peer| peer.certificate);
@@ -51,7 +56,7 @@ impl AccessLayer {
                 if let (Some(holder), Need::Role(Role::Submit | Role::Admin)) = (holder, need) {
                     tracing::info!(path, holder, "admitted");
                 }
-                Ok(())
+                Ok(holder.map(|name| Holder(name.to_owned())))
             }
             Err(denied) => {
                 tracing::debug!(path, %denied, "a call was refused");
@@ -83,10 +88,14 @@ where
         self.inner.poll_ready(cx)
     }
 
-    fn call(&mut self, request: http::Request<Body>) -> Self::Future {
-        if let Err(status) = self.layer.decide(&request) {
+    fn call(&mut self, mut request: http::Request<Body>) -> Self::Future {
+        match self.layer.decide(&request) {
             // Before a byte of the message is read.
-            return Box::pin(async move { Ok(status.into_http()) });
+            Err(status) => return Box::pin(async move { Ok(status.into_http()) }),
+            Ok(Some(holder)) => {
+                request.extensions_mut().insert(holder);
+            }
+            Ok(None) => {}
         }
         if request.uri().path() != SUBMIT {
             return Box::pin(self.inner.call(request));

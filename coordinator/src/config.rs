@@ -4,6 +4,9 @@ use std::time::Duration;
 
 use osteon_common::limits::{ACTIVE_JOBS_MAX, CALL_S_MAX};
 
+/// Fraction of the batches that a second worker computes too, unless an operator chooses otherwise.
+pub const AUDIT_FRACTION: f64 = 0.01;
+
 /// Settings of a coordinator. None of them changes a bit of any result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
@@ -16,6 +19,10 @@ pub struct Config {
     pub answer_timeout: Duration,
     /// Computing time that a batch should take.
     pub batch_target: Duration,
+    /// Fraction of the batches that a second worker computes too, 0 to 1.
+    pub audit_fraction: f64,
+    /// Ended jobs are forgotten after this long; `None`: when a client wants it.
+    pub keep_ended: Option<Duration>,
     /// How often time is looked at; also the shortest interval between two snapshots.
     pub tick: Duration,
     /// Most jobs that are computed at a time; the others wait in the order of their acceptance.
@@ -38,6 +45,8 @@ impl Default for Config {
             expiry: Duration::from_secs(10),
             answer_timeout: Duration::from_secs(600),
             batch_target: Duration::from_millis(200),
+            audit_fraction: AUDIT_FRACTION,
+            keep_ended: None,
             tick: Duration::from_millis(100),
             active_jobs_max: ACTIVE_JOBS_MAX,
             store_retry: Duration::from_secs(2),

@@ -172,6 +172,19 @@ impl Core {
                         });
                     }
                 }
+                Effect::Read { job, number } => {
+                    if let Err(refused) = self.commands.try_send(Command::Read { job, number }) {
+                        let found = Err(refused.to_string());
+                        followups.push_back(Event::Read { job, number, found });
+                    }
+                }
+                Effect::Prune { token, jobs } => {
+                    let command = Command::Prune { token, jobs: jobs.clone() };
+                    if let Err(refused) = self.commands.try_send(command) {
+                        let outcome = Err(refused.to_string());
+                        followups.push_back(Event::Pruned { token, jobs, outcome });
+                    }
+                }
                 Effect::Answer { token, answer } => {
                     if let Some(reply) = self.waiting.remove(&token) {
                         // The client may have gone.

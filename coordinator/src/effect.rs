@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::event::RecordKey;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::search::Summary;
-use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
 
 /// Something to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +53,20 @@ pub enum Effect {
     },
     /// Make a record durable, then report it.
     Store(Record),
+    /// Read an evaluation of a job, then report it.
+    Read {
+        /// The job.
+        job: JobId,
+        /// Number of the evaluation.
+        number: u64,
+    },
+    /// Forget ended jobs, then report it.
+    Prune {
+        /// The request, if a client wants it.
+        token: Option<Token>,
+        /// The jobs.
+        jobs: Vec<JobId>,
+    },
     /// Answer a request.
     Answer {
         /// Which.
@@ -84,7 +98,12 @@ pub enum Record {
     /// An accepted job.
     Job(JobRecord),
     /// A complete evaluation.
-    Evaluation(EvaluationRecord),
+    Evaluation {
+        /// The evaluation.
+        record: EvaluationRecord,
+        /// Forget those after it: they belong to another path.
+        is_last: bool,
+    },
     /// The end of a job.
     End {
         /// How it ended.
@@ -92,6 +111,8 @@ pub enum Record {
         /// What its path came to.
         summary: Arc<Summary>,
     },
+    /// A worker is expelled.
+    Expulsion(ExpulsionRecord),
 }
 
 impl Record {
@@ -99,8 +120,9 @@ impl Record {
     pub fn key(&self) -> (JobId, RecordKey) {
         match self {
             Self::Job(record) => (record.job, RecordKey::Job),
-            Self::Evaluation(record) => (record.job, RecordKey::Evaluation(record.number)),
+            Self::Evaluation { record, .. } => (record.job, RecordKey::Evaluation(record.number)),
             Self::End { end, .. } => (end.job, RecordKey::End),
+            Self::Expulsion(record) => (record.job, RecordKey::Expulsion(record.number)),
         }
     }
 }
@@ -120,12 +142,11 @@ pub enum Answer {
         more_after: Option<JobId>,
     },
     /// The job has ended; what it left is in the store.
-    Ended {
-        /// The job.
-        record: JobRecord,
-        /// Its end.
-        end: EndRecord,
-    },
+    Ended(EndRecord),
+    /// These ended jobs are forgotten.
+    Pruned(Vec<JobId>),
+    /// The expelled workers, with the time since then.
+    Expelled(Vec<(ExpulsionRecord, Duration)>),
     /// The request is refused.
     Refused(Refusal),
 }
@@ -167,6 +188,12 @@ pub enum Refusal {
     /// The coordinator is stopping.
     #[error("the coordinator is shutting down; try again when it is back")]
     Draining,
+    /// The store did not forget.
+    #[error("the store does not forget ended jobs, none is removed: {error}")]
+    NotPruned {
+        /// What the store said.
+        error: String,
+    },
     /// The store refused the job.
     #[error("the job could not be stored and is not accepted: {error}")]
     Store {
@@ -188,6 +215,15 @@ pub enum CloseReason {
         worker: String,
         /// Fingerprint of the coordinator.
         coordinator: String,
+    },
+    /// It was found to compute wrongly.
+    #[error(
+        "this worker is expelled: it {reason}; check its machine, and start it again when it is \
+         repaired"
+    )]
+    Expelled {
+        /// What was found.
+        reason: String,
     },
     /// An impossible number of threads.
     #[error("this worker announces {threads} threads; 1 to {max} are allowed")]

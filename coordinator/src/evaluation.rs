@@ -8,6 +8,9 @@ use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
+use crate::dispute::{self, Dispute, Vote};
+use crate::worker_name::WorkerName;
+
 /// Consecutive indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Indices {
@@ -24,15 +27,15 @@ impl Indices {
     }
 }
 
-/// Two answers for one index that differ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contradiction {
-    /// The index.
-    pub index: u64,
-    /// The answer that came first.
-    pub earlier: Solved,
-    /// The answer that came second.
-    pub later: Solved,
+/// A batch that is to be computed a second time, by another worker.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Audit {
+    /// Its indices, all filled.
+    pub(crate) indices: Indices,
+    /// Who computed it.
+    pub(crate) by: WorkerName,
+    /// Workers that were lost over it.
+    pub(crate) lost: u32,
 }
 
 /// The realizations of one point.
@@ -40,8 +43,12 @@ pub struct Contradiction {
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
+    /// Number of this attempt at it: what was sent in an earlier one means nothing in this.
+    pub(crate) round: u64,
     /// The point.
     pub point: Point,
+    /// What the store has of it, when it is computed again.
+    pub(crate) before: Option<Arc<[Outcome]>>,
     /// What became of each index.
     pub(crate) slots: Vec<Option<Solved>>,
     /// How many slots are filled.
@@ -53,20 +60,37 @@ pub struct Evaluation {
     pub(crate) suspects: BTreeMap<u64, u32>,
     /// Suspects to hand out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
+    /// Everybody whose answers fill slots.
+    pub(crate) workers: Vec<WorkerName>,
+    /// Place in `workers` of who filled each slot; means nothing while the slot is empty.
+    owners: Vec<u32>,
+    /// Batches to be computed a second time.
+    pub(crate) audits: VecDeque<Audit>,
+    /// How many batches are being computed a second time.
+    pub(crate) audits_out: usize,
+    /// Answers that differ.
+    pub(crate) disputes: Vec<Dispute>,
 }
 
 impl Evaluation {
-    /// An evaluation of which nothing is known.
-    pub fn new(number: u64, point: Point, realizations: u64) -> Self {
+    /// Attempt `round` at an evaluation of which nothing is known.
+    pub fn new(number: u64, round: u64, point: Point, realizations: u64) -> Self {
         let length = usize::try_from(realizations).unwrap_or(usize::MAX);
         Self {
             number,
+            round,
             point,
+            before: None,
             slots: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
             suspects: BTreeMap::new(),
             quarantine: VecDeque::new(),
+            workers: Vec::new(),
+            owners: vec![0; length],
+            audits: VecDeque::new(),
+            audits_out: 0,
+            disputes: Vec::new(),
         }
     }
 
@@ -111,31 +135,78 @@ impl Evaluation {
         *deaths
     }
 
-    /// Fills the slots of `indices`.
-    ///
-    /// # Errors
-    /// When a slot is filled already with other bits; slots before it are filled then.
-    pub fn fill(&mut self, indices: Indices, solved: &[Solved]) -> Result<(), Contradiction> {
-        for (index, &later) in (indices.first..indices.end()).zip(solved) {
-            let slot = usize::try_from(index).ok().and_then(|index| self.slots.get_mut(index));
-            match slot {
-                None => {}
-                Some(Some(earlier)) if same_bits(*earlier, later) => {}
-                Some(Some(earlier)) => {
-                    return Err(Contradiction { index, earlier: *earlier, later });
-                }
-                Some(slot) => {
-                    *slot = Some(later);
-                    self.filled += 1;
-                }
+    /// Fills the empty slots of `indices` with the answer of `by`.
+    pub fn fill(&mut self, indices: Indices, solved: &[Solved], by: &WorkerName) {
+        let known = self.workers.iter().position(|worker| worker == by);
+        let place = known.unwrap_or_else(|| {
+            self.workers.push(by.clone());
+            self.workers.len() - 1
+        });
+        let owner = u32::try_from(place).unwrap_or(u32::MAX);
+        let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
+        let slots = self.slots.iter_mut().zip(&mut self.owners).skip(first);
+        for ((slot, owned), solved) in slots.zip(solved) {
+            if slot.is_none() {
+                *slot = Some(*solved);
+                *owned = owner;
+                self.filled += 1;
             }
         }
-        Ok(())
     }
 
-    /// All outcomes in index order and the estimated errors of the successes, once there are all.
+    /// Compares an answer of `by` with what fills the slots of `indices`: what differs, from the
+    /// first difference on as far as one worker filled the slots. Empty slots agree.
+    pub(crate) fn compare(
+        &self,
+        indices: Indices,
+        solved: &[Solved],
+        by: &WorkerName,
+    ) -> Option<(Indices, [Vote; 2])> {
+        let first = usize::try_from(indices.first).ok()?;
+        let slots = self.slots.get(first..)?;
+        let differs = |(slot, later): (&Option<Solved>, &Solved)| {
+            slot.is_some_and(|earlier| !dispute::same(earlier, *later))
+        };
+        let at = slots.iter().zip(solved).position(differs)?;
+        let owner = self.owners.get(first + at)?;
+        let whose = self.owners.get(first + at..)?.iter().zip(slots.get(at..)?);
+        let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, slot)| *slot);
+        let earlier: Vec<Solved> = run.take(solved.len() - at).collect();
+        let later = solved.get(at..at + earlier.len())?.to_vec();
+        let indices = Indices { first: indices.first + at as u64, count: earlier.len() as u64 };
+        let owner = self.workers.get(usize::try_from(*owner).ok()?)?.clone();
+        let later = Vote { by: by.clone(), solved: later };
+        Some((indices, [Vote { by: owner, solved: earlier }, later]))
+    }
+
+    /// Who filled the slot of an index.
+    pub(crate) fn owner(&self, index: u64) -> Option<WorkerName> {
+        let owner = self.owners.get(usize::try_from(index).ok()?)?;
+        self.workers.get(usize::try_from(*owner).ok()?).cloned()
+    }
+
+    /// Whether every index has an outcome, and nothing about them is to be checked any more.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.filled >= self.slots.len() as u64
+            && self.audits.is_empty()
+            && self.audits_out == 0
+            && self.disputes.is_empty()
+    }
+
+    /// Whether the store has other outcomes of it than `outcomes`, or none.
+    pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
+        let bits = |outcome: &Outcome| {
+            let (code, velocity) = encode(*outcome);
+            (code, velocity.to_bits())
+        };
+        self.before
+            .as_ref()
+            .is_none_or(|before| !before.iter().map(bits).eq(outcomes.iter().map(bits)))
+    }
+
+    /// All outcomes in index order and the estimated errors of the successes, once it is settled.
     pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
-        if self.filled < self.slots.len() as u64 {
+        if !self.is_settled() {
             return None;
         }
         let outcomes: Option<_> = self.slots.iter().map(|slot| slot.map(|it| it.outcome)).collect();
@@ -143,12 +214,4 @@ impl Evaluation {
         let errors = successes.map(|solved| solved.estimated_error).collect();
         Some((outcomes?, quantile::estimated_error(errors)))
     }
-}
-
-fn same_bits(a: Solved, b: Solved) -> bool {
-    let bits = |solved: Solved| {
-        let (code, velocity) = encode(solved.outcome);
-        (code, velocity.to_bits(), solved.estimated_error.to_bits())
-    };
-    bits(a) == bits(b)
 }

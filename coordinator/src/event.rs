@@ -1,12 +1,14 @@
 //! Everything that can happen to a coordinator: one closed list.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Solved;
 
 use crate::effect::CloseReason;
 use crate::ids::{BatchId, JobId, Token, WorkerId};
+use crate::store::EvaluationRecord;
 
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,6 +78,24 @@ pub enum Event {
         /// Why, for people.
         error: String,
     },
+    /// The store was read for a job.
+    Read {
+        /// The job.
+        job: JobId,
+        /// Number of the evaluation.
+        number: u64,
+        /// What the store has, or why it cannot be read, for people.
+        found: Result<Option<EvaluationRecord>, String>,
+    },
+    /// Ended jobs are forgotten, or cannot be.
+    Pruned {
+        /// The request, if a client wanted it.
+        token: Option<Token>,
+        /// The jobs.
+        jobs: Vec<JobId>,
+        /// Why they cannot be forgotten, for people.
+        outcome: Result<(), String>,
+    },
     /// The coordinator is to stop.
     Drain,
 }
@@ -89,6 +109,10 @@ pub enum Request {
         specification: Arc<JobSpecification>,
         /// Identifier of the request; empty if it has none.
         request_id: String,
+        /// Who wants it, as the client says.
+        client: String,
+        /// Rank among the client's jobs.
+        priority: u32,
     },
     /// A snapshot.
     Get(JobId),
@@ -103,6 +127,19 @@ pub enum Request {
     Cancel(JobId),
     /// What an ended job left.
     Fetch(JobId),
+    /// Ended jobs forgotten.
+    Prune(Retention),
+    /// The workers that were found to compute wrongly.
+    Expelled,
+}
+
+/// Which ended jobs are kept: one that meets both conditions is forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Retention {
+    /// Those that ended at most so long ago are kept.
+    pub keep_for: Option<Duration>,
+    /// So many that ended last are kept.
+    pub keep_last: Option<u64>,
 }
 
 /// How a worker introduces itself.
@@ -129,4 +166,6 @@ pub enum RecordKey {
     Evaluation(u64),
     /// Its end.
     End,
+    /// The expulsion with this number, of a worker that was found in it.
+    Expulsion(u64),
 }

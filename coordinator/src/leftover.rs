@@ -1,14 +1,12 @@
 //! What an ended job left, out of the store: without computing its path again, so that neither its
 //! length nor the version that went it matters.
 
-use std::ops::ControlFlow;
-
 use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobResult};
 use thiserror::Error;
 
 use crate::ids::JobId;
-use crate::store::{EndRecord, JobRecord, Store, StoreError};
+use crate::store::{EndRecord, Store, StoreError};
 
 /// What an ended job left.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +25,12 @@ pub enum ReadError {
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The job was forgotten meanwhile.
+    #[error("there is no job {job} any more: it was pruned")]
+    Pruned {
+        /// The job.
+        job: JobId,
+    },
     /// The summary is missing.
     #[error("the store has the end of job {job} but no summary; restore a copy of the store")]
     NoSummary {
@@ -47,23 +51,17 @@ pub enum ReadError {
 ///
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
-pub fn read(
-    store: &mut dyn Store,
-    record: &JobRecord,
-    end: &EndRecord,
-) -> Result<Leftover, ReadError> {
-    let job = record.job;
+pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadError> {
+    let job = end.job;
+    let record = store.job(job)?.ok_or(ReadError::Pruned { job })?;
     let summary = store.summary(job)?.ok_or(ReadError::NoSummary { job })?;
-    let mut outcomes = None;
-    if let Some(number) = summary.best {
-        store.evaluations(job, number, &mut |stored| {
-            outcomes = (stored.number == number).then_some(stored.outcomes);
-            ControlFlow::Break(())
-        })?;
-        if outcomes.is_none() {
-            return Err(ReadError::NoBest { job, number });
+    let outcomes = match summary.best {
+        Some(number) => {
+            let best = store.evaluation(job, number)?;
+            Some(best.ok_or(ReadError::NoBest { job, number })?.outcomes)
         }
-    }
+        None => None,
+    };
     let specification = (*record.specification).clone();
     let result = summary.result(&specification, &end.ending, &end.version, outcomes.as_deref());
     Ok(Leftover { specification, result, history: summary.history })

@@ -8,14 +8,18 @@ use crate::event::Event;
 use crate::state::State;
 
 mod batches;
+mod checks;
 mod dispatch;
+mod expulsion;
 mod jobs;
+mod prune;
 mod requests;
+mod reread;
 mod restore;
 mod ticks;
 mod workers;
 
-pub use restore::{RestoreError, RestoredJob};
+pub use restore::Restored;
 
 #[cfg(test)]
 mod tests;
@@ -35,7 +39,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
             workers::hello(state, worker, hello, now, &mut effects);
         }
         Event::Answered { worker, batch, solved, elapsed_s } => {
-            batches::answered(state, worker, batch, &solved, elapsed_s, now, &mut effects);
+            batches::answered(state, worker, batch, solved, elapsed_s, now, &mut effects);
         }
         Event::Heartbeat { worker } => workers::heard(state, worker, now),
         Event::WorkerDrains { worker } => workers::drains(state, worker, now, &mut effects),
@@ -46,6 +50,12 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         Event::Stored { job, key } => jobs::stored(state, job, key, now, &mut effects),
         Event::StoreFailed { job, key, error } => {
             jobs::store_failed(state, job, key, error, now, &mut effects);
+        }
+        Event::Read { job, number, found } => {
+            reread::read(state, job, number, found, now, &mut effects);
+        }
+        Event::Pruned { token, jobs, outcome } => {
+            prune::pruned(state, token, jobs, outcome, &mut effects);
         }
         Event::Drain => workers::drain_all(state, now, &mut effects),
     }

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 
 use thiserror::Error;
 
+use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{BATCHES_IN_FLIGHT_MAX, Job, SETTLED_MAX, Stage, State};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, SETTLED_MAX, Stage, State};
+use crate::worker_name::WorkerName;
 
 /// What does not fit together.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -42,9 +44,15 @@ pub enum Insane {
     /// A request id does not lead to the job that has it.
     #[error("the request id of job {0} leads elsewhere")]
     RequestId(JobId),
-    /// The count of ended jobs is wrong.
-    #[error("ended jobs are miscounted")]
-    Ended,
+    /// A search was told more than the store has.
+    #[error("the search of job {0} was told more evaluations than are stored")]
+    Stored(JobId),
+    /// The checks of an evaluation and the batches for them do not match.
+    #[error("job {0} miscounts what is being checked")]
+    Checks(JobId),
+    /// An answer of an expelled worker counts, or it is attached.
+    #[error("worker {0} is expelled, and still counts")]
+    Expelled(WorkerName),
     /// A number that is handed out next is not above all in use.
     #[error("a number is about to be given twice")]
     Numbers,
@@ -61,6 +69,7 @@ pub fn sanity_check(state: &State) -> Result<(), Insane> {
     for (&id, job) in &state.jobs {
         if let Stage::Computing(evaluation) = &job.stage {
             check_evaluation(state, id, evaluation)?;
+            check_checks(state, id, evaluation)?;
         }
     }
     let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
@@ -76,30 +85,71 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         let active = state.active.contains(&id);
         let fits = match &job.stage {
             Stage::Waiting => waiting == 1 && !active,
-            Stage::Computing(_) | Stage::Storing(_) => waiting == 0 && active,
-            Stage::Accepting | Stage::Finishing(_) | Stage::Ended(_) => waiting == 0 && !active,
+            Stage::Rereading { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
+                waiting == 0 && active
+            }
+            Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
         };
-        let has_search = job.search.is_some();
-        let needs_search = matches!(job.stage, Stage::Computing(_) | Stage::Storing(_));
-        let ended = matches!(job.stage, Stage::Ended(_));
-        if !fits || (needs_search && !has_search) || (ended && has_search) {
+        if !fits || state.ended.contains_key(&id) {
             return Err(Insane::JobList(id));
+        }
+        if job.search.evaluations() > job.stored {
+            return Err(Insane::Stored(id));
         }
         let request_id = &job.record.request_id;
         if !request_id.is_empty() && state.requests.get(request_id) != Some(&id) {
             return Err(Insane::RequestId(id));
         }
     }
-    let ended = |job: &&Job| matches!(job.stage, Stage::Ended(_));
-    if state.jobs.values().filter(ended).count() != state.ended {
-        return Err(Insane::Ended);
+    for (id, job) in state.active.iter().filter_map(|id| Some((id, state.jobs.get(id)?))) {
+        let client = &job.record.client;
+        let of_client =
+            |id: &&JobId| state.jobs.get(id).is_some_and(|job| job.record.client == *client);
+        if state.active.iter().filter(of_client).count() != state.shares.jobs(client) {
+            return Err(Insane::JobList(*id));
+        }
     }
-    let known = |id: &&JobId| !state.jobs.contains_key(id);
-    let mut listed = state.active.iter().chain(&state.waiting).chain(state.requests.values());
-    match listed.find(known) {
+    let lost = |id: &&JobId| !state.jobs.contains_key(id);
+    if let Some(id) = state.active.iter().chain(&state.waiting).find(lost) {
+        return Err(Insane::JobList(*id));
+    }
+    match state.requests.values().find(|id| lost(id) && !state.ended.contains_key(id)) {
         Some(id) => Err(Insane::JobList(*id)),
         None => Ok(()),
     }
+}
+
+/// Audits and judges are with workers, and nobody who is expelled has a say.
+fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+    let with = |purpose: fn(&Purpose) -> bool| {
+        let of_job = |batch: &&Batch| batch.assignment.job == job && purpose(&batch.purpose);
+        state.batches.values().filter(of_job).count()
+    };
+    let judged = |dispute: &&Dispute| {
+        let judge = dispute.judge.and_then(|judge| state.batches.get(&judge));
+        judge.is_some_and(|batch| {
+            batch.purpose == Purpose::Judge && batch.assignment.indices == dispute.indices
+        })
+    };
+    let waits = |dispute: &&Dispute| dispute.judge.is_none();
+    let disputes = &evaluation.disputes;
+    let judges = disputes.iter().filter(judged).count();
+    if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
+        || with(|purpose| *purpose == Purpose::Judge) != judges
+        || judges + disputes.iter().filter(waits).count() != disputes.len()
+    {
+        return Err(Insane::Checks(job));
+    }
+    for Expelled { record, .. } in &state.expelled {
+        let name = &record.worker;
+        let attached = state.workers.values().any(|worker| worker.name == *name);
+        let disputes = disputes.iter().any(|dispute| dispute.involves(name));
+        let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
+        if attached || disputes || told || evaluation.workers.contains(name) {
+            return Err(Insane::Expelled(name.clone()));
+        }
+    }
+    Ok(())
 }
 
 fn check_workers(state: &State) -> Result<(), Insane> {
@@ -132,12 +182,12 @@ fn check_batches(state: &State) -> Result<(), Insane> {
                     && twin.assignment == batch.assignment
                     && twin.worker != batch.worker
             });
-            if !matches || batch.exclusive {
+            if !matches || batch.exclusive || batch.purpose != Purpose::Fill {
                 return Err(Insane::Twin(id));
             }
         }
         let current = match state.jobs.get(&batch.assignment.job).map(|job| &job.stage) {
-            Some(Stage::Computing(evaluation)) => evaluation.number == batch.assignment.evaluation,
+            Some(Stage::Computing(evaluation)) => evaluation.round == batch.assignment.round,
             _ => false,
         };
         if !current {
@@ -160,7 +210,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()
-        .filter(|batch| batch.assignment.job == job)
+        .filter(|batch| batch.assignment.job == job && batch.purpose == Purpose::Fill)
         .map(|batch| (batch.assignment.indices.first, batch.assignment.indices.count))
         .collect();
     for (first, count) in queued.chain(quarantine).chain(out) {

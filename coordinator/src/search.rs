@@ -119,20 +119,29 @@ impl Search {
         outcomes: Arc<[Outcome]>,
         estimated_error: Option<EstimatedError>,
     ) -> Result<(), ReplayError> {
+        self.expects(point)?;
+        self.tell(outcomes, estimated_error);
+        Ok(())
+    }
+
+    /// Whether the search asks for the outcomes of `point`.
+    ///
+    /// # Errors
+    /// When it asks for others, or none.
+    pub fn expects(&self, point: Point) -> Result<(), ReplayError> {
         let found = point.0;
         let expected = match self.ask() {
             Step::Evaluate(point) => Some(point.0),
             Step::Done(_) => None,
         };
-        if expected.map(|at| at.map(f64::to_bits)) != Some(found.map(f64::to_bits)) {
-            return Err(ReplayError {
-                number: self.evaluations(),
-                found: found.into(),
-                expected: expected.map(Box::new),
-            });
+        if expected.map(|at| at.map(f64::to_bits)) == Some(found.map(f64::to_bits)) {
+            return Ok(());
         }
-        self.tell(outcomes, estimated_error);
-        Ok(())
+        Err(ReplayError {
+            number: self.evaluations(),
+            found: found.into(),
+            expected: expected.map(Box::new),
+        })
     }
 
     /// The next point, or how the job ends. Asking changes nothing.

@@ -2,32 +2,42 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
+use std::time::Duration;
 
-use futures::{Stream, StreamExt as _, stream};
-use osteon_common::limits::{FETCHES_AT_ONCE_MAX, NAME_BYTES_MAX};
+use futures::Stream;
+use osteon_common::limits::{FETCHES_AT_ONCE_MAX, NAME_BYTES_MAX, PRIORITY_MAX};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
-    CancelRequest, CancelResponse, FetchRequest, FetchResponse, GetRequest, GetResponse,
-    HistoryBlock, JobSnapshot, JobState, ListRequest, ListResponse, SubmitRequest, SubmitResponse,
-    WatchRequest, WatchResponse,
+    CancelRequest, CancelResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest,
+    GetResponse, HistoryBlock, JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest,
+    ListResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest,
+    WatchResponse,
 };
 use osteon_proto::{realizations, results, specification, status};
-use tokio::sync::{Semaphore, mpsc, oneshot, watch};
+use tokio::sync::mpsc::error::SendTimeoutError;
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tonic::{Request, Response, Status};
 
+use crate::access_layer::Holder;
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
-use crate::event;
+
+use crate::event::{self, Retention};
 use crate::fetching;
 use crate::ids::JobId;
-use crate::leftover::Leftover;
+use crate::leftover::{Leftover, ReadError};
+use crate::observers;
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
 const PAGE_JOBS_MAX: u32 = 1000;
 /// Rows of the history in one message.
 const HISTORY_BLOCK_ROWS: usize = 4096;
+/// A request that finds no place among those that wait for this long is refused.
+const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
+/// When what was refused for want of room may be tried again.
+const RETRY: Duration = Duration::from_secs(10);
 /// Realizations in one message.
 const REALIZATION_BLOCK: usize = 65_536;
 
@@ -46,9 +56,20 @@ impl JobsService {
         Self { messages, store, fetches: Arc::new(Semaphore::new(FETCHES_AT_ONCE_MAX)) }
     }
 
+    /// Queues a message for the core; refused when it does not keep up.
+    async fn send(&self, message: Message) -> Result<(), Status> {
+        self.messages.send_timeout(message, QUEUE_PATIENCE).await.map_err(|error| match error {
+            SendTimeoutError::Closed(_) => stopped(),
+            SendTimeoutError::Timeout(_) => status::resource_exhausted(
+                "the coordinator has more requests than it can answer; try again",
+                RETRY,
+            ),
+        })
+    }
+
     async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
-        self.messages.send(Message::Ask(request, reply)).await.map_err(|_| stopped())?;
+        self.send(Message::Ask(request, reply)).await?;
         match answer.await.map_err(|_| stopped())? {
             Answer::Refused(refusal) => Err(refused(&refusal)),
             answer => Ok(answer),
@@ -63,14 +84,16 @@ impl JobsService {
     }
 
     async fn leftover(&self, job: JobId) -> Result<Leftover, Status> {
-        let Answer::Ended { record, end } = self.ask(event::Request::Fetch(job)).await? else {
+        let Answer::Ended(end) = self.ask(event::Request::Fetch(job)).await? else {
             return Err(unexpected());
         };
         let (reply, leftover) = oneshot::channel();
-        let read = Command::Read { record, end, reply };
-        self.store.send(read).await.map_err(|_| stopped())?;
-        let leftover = leftover.await.map_err(|_| stopped())?;
-        leftover.map_err(|error| Status::data_loss(error.to_string()))
+        let fetch = Command::Fetch { end, reply };
+        self.store.send(fetch).await.map_err(|_| stopped())?;
+        leftover.await.map_err(|_| stopped())?.map_err(|error| match error {
+            ReadError::Pruned { .. } => Status::not_found(error.to_string()),
+            _ => Status::data_loss(error.to_string()),
+        })
     }
 }
 
@@ -83,11 +106,22 @@ impl Jobs for JobsService {
         &self,
         request: Request<SubmitRequest>,
     ) -> Result<Response<SubmitResponse>, Status> {
-        let SubmitRequest { specification: message, request_id } = request.into_inner();
-        if request_id.len() > NAME_BYTES_MAX {
+        let holder = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
+        let SubmitRequest { specification: message, request_id, client, priority } =
+            request.into_inner();
+        // Who showed a token is who it was made for, whatever else it says.
+        let client = holder.unwrap_or(client);
+        for (field, value) in [("request_id", &request_id), ("client", &client)] {
+            if value.len() > NAME_BYTES_MAX {
+                return Err(Status::invalid_argument(format!(
+                    "{field} has {} bytes; at most {NAME_BYTES_MAX} are allowed",
+                    value.len()
+                )));
+            }
+        }
+        if priority > PRIORITY_MAX {
             return Err(Status::invalid_argument(format!(
-                "request_id has {} bytes; at most {NAME_BYTES_MAX} are allowed",
-                request_id.len()
+                "priority is {priority}; 0 to {PRIORITY_MAX} are allowed"
             )));
         }
         let message =
@@ -95,7 +129,8 @@ impl Jobs for JobsService {
         let specification = specification::from_message(&message)
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
-        match self.ask(event::Request::Submit { specification, request_id }).await? {
+        let submit = event::Request::Submit { specification, request_id, client, priority };
+        match self.ask(submit).await? {
             Answer::Submitted(job) => Ok(Response::new(SubmitResponse { job: job.to_string() })),
             _ => Err(unexpected()),
         }
@@ -131,11 +166,12 @@ impl Jobs for JobsService {
         &self,
         request: Request<WatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let job = job(&request.into_inner().job)?;
+        let WatchRequest { job: text, after } = request.into_inner();
+        let job = job(&text)?;
         let (reply, answer) = oneshot::channel();
-        self.messages.send(Message::Watch(job, reply)).await.map_err(|_| stopped())?;
+        self.send(Message::Watch(job, reply)).await?;
         let snapshots = answer.await.map_err(|_| stopped())?.map_err(|error| refused(&error))?;
-        Ok(Response::new(Box::pin(follow(snapshots))))
+        Ok(Response::new(Box::pin(observers::follow(snapshots, after))))
     }
 
     async fn cancel(
@@ -156,34 +192,43 @@ impl Jobs for JobsService {
         let leftover = self.leftover(job).await?;
         Ok(Response::new(Box::pin(fetching::paced(parts(leftover), place))))
     }
-}
 
-/// The newest snapshot whenever there is a new one, the present one first, until the job has
-/// ended. Who reads slowly misses those in between.
-fn follow(
-    snapshots: watch::Receiver<JobSnapshot>,
-) -> impl Stream<Item = Result<WatchResponse, Status>> {
-    enum Next {
-        First,
-        Changed,
-        Over,
-    }
-    stream::unfold((snapshots, Next::First), |(mut snapshots, next)| async move {
-        match next {
-            Next::Over => return None,
-            Next::First => {}
-            Next::Changed => {
-                if snapshots.changed().await.is_err() {
-                    return Some((Err(stopped()), (snapshots, Next::Over)));
-                }
+    async fn prune(
+        &self,
+        request: Request<PruneRequest>,
+    ) -> Result<Response<PruneResponse>, Status> {
+        let PruneRequest { keep_for_s, keep_last } = request.into_inner();
+        let keep_for = keep_for_s.map(Duration::try_from_secs_f64).transpose().map_err(|_| {
+            Status::invalid_argument(format!(
+                "keep_for_s is {}; it must be a number from 0 to 3.2e9 (s)",
+                keep_for_s.unwrap_or_default()
+            ))
+        })?;
+        match self.ask(event::Request::Prune(Retention { keep_for, keep_last })).await? {
+            Answer::Pruned(jobs) => {
+                let jobs = jobs.iter().map(JobId::to_string).collect();
+                Ok(Response::new(PruneResponse { jobs }))
             }
+            _ => Err(unexpected()),
         }
-        let snapshot = snapshots.borrow_and_update().clone();
-        let ended = snapshot.state() == JobState::Ended;
-        let next = if ended { Next::Over } else { Next::Changed };
-        Some((Ok(WatchResponse { snapshot: Some(snapshot) }), (snapshots, next)))
-    })
-    .fuse()
+    }
+
+    async fn list_expelled(
+        &self,
+        _: Request<ListExpelledRequest>,
+    ) -> Result<Response<ListExpelledResponse>, Status> {
+        let Answer::Expelled(expelled) = self.ask(event::Request::Expelled).await? else {
+            return Err(unexpected());
+        };
+        let workers = expelled.into_iter().map(|(record, elapsed)| ExpelledWorker {
+            host: record.worker.host().to_owned(),
+            process: record.worker.process(),
+            job: record.job.to_string(),
+            reason: record.reason,
+            elapsed_s: elapsed.as_secs_f64(),
+        });
+        Ok(Response::new(ListExpelledResponse { workers: workers.collect() }))
+    }
 }
 
 /// One specification, one result, history blocks, realization blocks; made as they are sent.
@@ -220,9 +265,11 @@ fn refused(refusal: &Refusal) -> Status {
     match refusal {
         Refusal::NoJob { .. } => Status::not_found(message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
-        Refusal::TooManyJobs { .. } => Status::resource_exhausted(message),
+        Refusal::TooManyJobs { .. } => status::resource_exhausted(message, RETRY),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
-        Refusal::Draining | Refusal::Store { .. } => Status::unavailable(message),
+        Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => {
+            Status::unavailable(message)
+        }
     }
 }
 
@@ -232,4 +279,30 @@ fn stopped() -> Status {
 
 fn unexpected() -> Status {
     Status::internal("the coordinator answered another question than was asked")
+}
+
+#[cfg(test)]
+mod tests {
+    use tonic::Code;
+
+    use super::*;
+
+    #[test]
+    fn refusals_have_codes_and_say_when_to_come_back() {
+        let (job, error) = (JobId(1), "full".to_owned());
+        let taken = Refusal::RequestIdTaken { request_id: "a".to_owned(), job };
+        for (refusal, code, retry) in [
+            (Refusal::TooManyJobs { limit: 5 }, Code::ResourceExhausted, Some(RETRY)),
+            (Refusal::NoJob { job }, Code::NotFound, None),
+            (taken, Code::AlreadyExists, None),
+            (Refusal::NotEnded { job }, Code::FailedPrecondition, None),
+            (Refusal::Draining, Code::Unavailable, None),
+            (Refusal::Store { error: error.clone() }, Code::Unavailable, None),
+            (Refusal::NotPruned { error }, Code::Unavailable, None),
+        ] {
+            let status = refused(&refusal);
+            assert_eq!((status.code(), status::retry_after(&status)), (code, retry), "{refusal}");
+            assert_eq!(status.message(), refusal.to_string());
+        }
+    }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use futures::{Stream, StreamExt as _};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
+use osteon_proto::status::resource_exhausted;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::workers_server::Workers;
@@ -25,6 +26,8 @@ use crate::ids::{BatchId, LeaseId, WorkerId};
 
 /// Messages to one worker that may wait: its batches, their revocations, signs of life.
 const OUTBOUND_MAX: usize = 64;
+/// When a worker that finds no place may try again.
+const RETRY: Duration = Duration::from_secs(30);
 /// A new stream must say hello within this time.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -203,7 +206,10 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
         | CloseReason::Malformed(_)
         | CloseReason::WrongCount { .. }
         | CloseReason::SecondHello => Code::InvalidArgument,
-        CloseReason::TooManyWorkers { .. } => Code::ResourceExhausted,
+        CloseReason::Expelled { .. } => Code::PermissionDenied,
+        CloseReason::TooManyWorkers { .. } => {
+            return resource_exhausted(reason.to_string(), RETRY);
+        }
         CloseReason::Expired { .. } | CloseReason::Unanswering { .. } | CloseReason::NotReading => {
             Code::Aborted
         }

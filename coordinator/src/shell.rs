@@ -22,11 +22,11 @@ use crate::config::Config;
 use crate::core_task::{Clock, Core, Message};
 use crate::failing::{Failed, Failing, Guard};
 use crate::listen::Listener;
-use crate::reactor::{RestoreError, RestoredJob};
+use crate::reactor::Restored;
 use crate::service_jobs::JobsService;
 use crate::service_workers::WorkersService;
 use crate::state::State;
-use crate::store::Store;
+use crate::store::{Store, StoreError};
 use crate::store_thread::{self, Command};
 
 /// Events that may wait for the one task.
@@ -44,7 +44,7 @@ type GuardedRouter = Router<Stack<AccessLayer, Identity>>;
 pub enum StartError {
     /// The store cannot be read.
     #[error(transparent)]
-    Restore(#[from] RestoreError),
+    Restore(#[from] StoreError),
     /// The operating system gives no thread.
     #[error("cannot start the store's thread: {source}")]
     Thread {
@@ -87,7 +87,7 @@ pub async fn start(
     mut store: Box<dyn Store>,
     config: Config,
 ) -> Result<Coordinator, StartError> {
-    let load = move || RestoredJob::load(store.as_mut()).map(|restored| (store, restored));
+    let load = move || Restored::load(store.as_mut()).map(|restored| (store, restored));
     let loaded = tokio::task::spawn_blocking(load).await;
     let (store, restored) = loaded.map_err(|source| StartError::Interrupted { source })??;
     let clock = Clock::new();

@@ -2,74 +2,89 @@
 
 use std::time::Duration;
 
-use osteon_common::job::JobKind;
 use osteon_proto::results::status_to_message;
 use osteon_proto::specification::kind_to_message;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
-use crate::state::{Job, Stage, State};
+use crate::state::{EndedJob, Job, Stage, State, max_evaluations};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// How `id` stands at `now`; `None` if no client can know of it.
 pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
+    if let Some(job) = state.ended.get(&id) {
+        return Some(ended(state, job));
+    }
     let job = state.jobs.get(&id)?;
     let specification = &job.record.specification;
     let realizations = specification.monte_carlo.realizations;
     let mut snapshot = JobSnapshot {
         job: id.to_string(),
         kind: kind_to_message(specification.kind).into(),
-        max_evaluations: match specification.kind {
-            JobKind::Identification => specification.search.max_evaluations,
-            JobKind::Propagation => 1,
-        },
+        max_evaluations: max_evaluations(specification),
         realizations,
-        workers: u32::try_from(state.workers.len()).unwrap_or(u32::MAX),
+        workers: workers(state),
         elapsed_s: now.saturating_sub(job.record.accepted).as_secs_f64(),
+        sequence: job.sequence,
         ..JobSnapshot::default()
     };
     match &job.stage {
         Stage::Accepting => return None,
         Stage::Waiting => snapshot.set_state(JobState::Waiting),
+        Stage::Rereading { .. } => snapshot.set_state(JobState::Running),
         Stage::Computing(evaluation) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
         }
-        Stage::Storing(_) | Stage::Finishing(_) => {
+        Stage::Storing { .. } | Stage::Finishing(_) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = realizations;
         }
-        Stage::Ended(_) => snapshot.set_state(JobState::Ended),
     }
-    if let Stage::Ended(end) = &job.stage {
-        snapshot.status = status_to_message(end.ending.status).into();
-        snapshot.reason = end.ending.reason.clone().unwrap_or_default();
-        snapshot.evaluations = end.evaluations;
-        // An evaluation that counts is complete.
-        snapshot.realizations_done = if end.evaluations > 0 { realizations } else { 0 };
-        snapshot.best_cost = end.best_cost;
-        snapshot.best_mean = end.best_moments.map(|moments| moments.mean);
-        snapshot.best_coefficient_of_variation =
-            end.best_moments.map(|moments| moments.coefficient_of_variation);
-        snapshot.elapsed_s = end.ended.saturating_sub(job.record.accepted).as_secs_f64();
-    } else {
-        under_way(state, job, now, &mut snapshot);
-    }
+    under_way(state, job, now, &mut snapshot);
     Some(snapshot)
 }
 
+fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
+    let end = &job.end;
+    let mut snapshot = JobSnapshot {
+        job: end.job.to_string(),
+        kind: kind_to_message(job.kind).into(),
+        status: status_to_message(end.ending.status).into(),
+        reason: end.ending.reason.clone().unwrap_or_default(),
+        evaluations: end.evaluations,
+        max_evaluations: job.max_evaluations,
+        // An evaluation that counts is complete.
+        realizations_done: if end.evaluations > 0 { job.realizations } else { 0 },
+        realizations: job.realizations,
+        best_cost: end.best_cost,
+        best_mean: end.best_moments.map(|moments| moments.mean),
+        best_coefficient_of_variation: end
+            .best_moments
+            .map(|moments| moments.coefficient_of_variation),
+        workers: workers(state),
+        elapsed_s: end.ended.saturating_sub(job.accepted).as_secs_f64(),
+        sequence: job.sequence,
+        ..JobSnapshot::default()
+    };
+    snapshot.set_state(JobState::Ended);
+    snapshot
+}
+
+fn workers(state: &State) -> u32 {
+    u32::try_from(state.workers.len()).unwrap_or(u32::MAX)
+}
+
 fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot) {
-    if let Some(search) = &job.search {
-        let best = search.best();
-        let moments = best.and_then(|row| row.moments);
-        snapshot.evaluations = search.evaluations();
-        snapshot.best_cost = best.and_then(|row| row.cost);
-        snapshot.best_mean = moments.map(|moments| moments.mean);
-        snapshot.best_coefficient_of_variation =
-            moments.map(|moments| moments.coefficient_of_variation);
-    }
+    let best = job.search.best();
+    let moments = best.and_then(|row| row.moments);
+    snapshot.evaluations = job.search.evaluations().max(job.stored);
+    snapshot.best_cost = best.and_then(|row| row.cost);
+    snapshot.best_mean = moments.map(|moments| moments.mean);
+    snapshot.best_coefficient_of_variation =
+        moments.map(|moments| moments.coefficient_of_variation);
     snapshot.realizations_per_second = job.rate.per_second(now);
     snapshot.waiting_for = waiting_for(state, job, now);
 }
@@ -78,8 +93,12 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
 fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(trouble) = &job.trouble {
+        let does = match job.stage {
+            Stage::Rereading { .. } => "give",
+            _ => "take",
+        };
         return format!(
-            "the store does not take a record, it is tried again: {} {}",
+            "the store does not {does} a record, it is tried again: {} {}",
             trouble.error,
             since(trouble.since)
         );
@@ -88,13 +107,24 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         return "the coordinator is shutting down".to_owned();
     }
     match &job.stage {
-        Stage::Waiting => {
-            let before =
-                state.waiting.iter().take_while(|waiting| **waiting != job.record.job).count();
-            format!("the end of {} running and {before} waiting jobs", state.active.len())
-        }
+        Stage::Waiting => format!(
+            "its turn: {} jobs run and {} wait {}",
+            state.active.len(),
+            state.waiting.len(),
+            since(job.progressed)
+        ),
+        Stage::Rereading { .. } => format!(
+            "its stored evaluations, {} of {} are read again",
+            job.search.evaluations(),
+            job.stored
+        ),
         Stage::Computing(_) if state.workers.is_empty() => {
             format!("no worker is attached {}", since(state.no_worker_since))
+        }
+        Stage::Computing(evaluation) if !evaluation.disputes.is_empty() => {
+            let begun = evaluation.disputes.iter().map(|dispute| dispute.since).min();
+            let what = "a third worker, which decides between two whose answers differ";
+            format!("{what} {}", since(begun.unwrap_or(now)))
         }
         Stage::Computing(_) if now.saturating_sub(job.progressed) >= PATIENCE => {
             let oldest = state
@@ -105,17 +135,15 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
             match oldest.and_then(|batch| Some((batch, state.workers.get(&batch.worker)?))) {
                 Some((batch, worker)) => format!(
                     "the answer of {} to {} realizations {}",
-                    worker.name(),
+                    worker.name,
                     batch.assignment.indices.count,
                     since(batch.sent)
                 ),
                 None => format!("a worker that takes batches {}", since(job.progressed)),
             }
         }
-        Stage::Accepting
-        | Stage::Computing(_)
-        | Stage::Storing(_)
-        | Stage::Finishing(_)
-        | Stage::Ended(_) => String::new(),
+        Stage::Accepting | Stage::Computing(_) | Stage::Storing { .. } | Stage::Finishing(_) => {
+            String::new()
+        }
     }
 }

@@ -6,15 +6,20 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use osteon_common::job::{JobKind, JobSpecification};
 use osteon_proto::batch::Work;
+use osteon_proto::specification;
+use prost::Message as _;
 
 use crate::config::Config;
 use crate::evaluation::{Evaluation, Indices};
 use crate::event::Hello;
+use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::rate::Rate;
 use crate::search::Search;
-use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
+use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
@@ -25,42 +30,60 @@ pub(crate) const SETTLED_MAX: usize = 16;
 #[derive(Debug)]
 pub struct State {
     pub(crate) config: Config,
+    /// Jobs that have not ended.
     pub(crate) jobs: BTreeMap<JobId, Job>,
-    /// How many jobs have ended.
-    pub(crate) ended: usize,
+    /// Jobs that have ended; what they left is in the store.
+    pub(crate) ended: BTreeMap<JobId, EndedJob>,
     /// Job of each request id.
     pub(crate) requests: BTreeMap<String, JobId>,
-    /// Jobs that are not begun, oldest first.
+    /// Jobs that are not begun, in the order of their acceptance.
     pub(crate) waiting: VecDeque<JobId>,
     /// Jobs that are computed or whose evaluation is being stored.
     pub(crate) active: BTreeSet<JobId>,
+    /// What the clients of active jobs have had.
+    pub(crate) shares: Shares,
     /// Job that was handed out last.
     pub(crate) last_served: Option<JobId>,
     /// Jobs that changed since they were published.
     pub(crate) changed: BTreeSet<JobId>,
     /// When all active jobs were published last.
     pub(crate) published: Duration,
+    /// When old jobs were looked for last.
+    pub(crate) pruned: Duration,
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
+    /// Workers that compute wrongly, in the order in which they were found.
+    pub(crate) expelled: Vec<Expelled>,
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
+    pub(crate) next_round: u64,
     pub(crate) draining: bool,
 }
 
-/// A job.
+/// A job that has not ended.
 #[derive(Debug)]
 pub(crate) struct Job {
     pub(crate) record: JobRecord,
+    /// Digest of its specification: of two submissions of one request.
+    pub(crate) identity: Identity,
     pub(crate) stage: Stage,
-    /// The search; `None` once the job has ended.
-    pub(crate) search: Option<Search>,
+    pub(crate) search: Search,
+    /// How many evaluations the store has of it; those that the search was not told are read
+    /// before it goes on.
+    pub(crate) stored: u64,
+    /// Everybody whose answers are in evaluations that the search was told.
+    pub(crate) workers: BTreeSet<WorkerName>,
+    /// What it was told is to be read again, when what is being stored is stored.
+    pub(crate) rewind: bool,
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
-    /// When it last got an answer, or began.
+    /// Sequence number of its last snapshot that was published.
+    pub(crate) sequence: u64,
+    /// When it last got an answer, or began, or was accepted.
     pub(crate) progressed: Duration,
     /// Requests that are answered when the present record is durable: submissions at first,
     /// cancellations at the end.
@@ -76,14 +99,52 @@ pub(crate) enum Stage {
     Accepting,
     /// It waits for its turn.
     Waiting,
+    /// A stored evaluation is being read for its search.
+    Rereading {
+        /// The store was asked for it.
+        asked: bool,
+    },
     /// Its evaluation is handed out.
     Computing(Evaluation),
     /// A complete evaluation is being stored.
-    Storing(EvaluationRecord),
+    Storing {
+        /// The evaluation.
+        record: EvaluationRecord,
+        /// Those after it in the store belong to another path.
+        is_last: bool,
+    },
     /// Its end is being stored.
     Finishing(EndRecord),
-    /// Its end is durable.
-    Ended(EndRecord),
+}
+
+/// Digest of a specification.
+pub(crate) type Identity = [u8; 32];
+
+/// A job whose end is durable: what a list shows of it.
+#[derive(Debug)]
+pub(crate) struct EndedJob {
+    pub(crate) request_id: String,
+    pub(crate) identity: Identity,
+    pub(crate) kind: JobKind,
+    pub(crate) max_evaluations: u64,
+    /// Realizations of each evaluation.
+    pub(crate) realizations: u64,
+    /// When it was accepted, since the Unix epoch.
+    pub(crate) accepted: Duration,
+    /// Sequence number of its last snapshot.
+    pub(crate) sequence: u64,
+    pub(crate) end: EndRecord,
+}
+
+/// A worker that computes wrongly: refused for the life of the coordinator.
+#[derive(Debug)]
+pub(crate) struct Expelled {
+    pub(crate) record: ExpulsionRecord,
+    /// When its record is written again; `None` once it is durable. Until then no job reads its
+    /// stored evaluations: after a crash nobody would know which of them are wrong.
+    pub(crate) store_at: Option<Duration>,
+    /// The store refused it, and it is not on its way again.
+    pub(crate) refused: bool,
 }
 
 /// A refusal of the store.
@@ -98,6 +159,7 @@ pub(crate) struct Trouble {
 #[derive(Debug)]
 pub(crate) struct Worker {
     pub(crate) lease: LeaseId,
+    pub(crate) name: WorkerName,
     pub(crate) hello: Hello,
     /// When its last message came.
     pub(crate) heard: Duration,
@@ -119,17 +181,34 @@ pub(crate) struct Worker {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Assignment {
     pub(crate) job: JobId,
-    /// Number of the evaluation.
-    pub(crate) evaluation: u64,
+    /// Attempt at an evaluation.
+    pub(crate) round: u64,
     pub(crate) indices: Indices,
+}
+
+/// What a batch is computed for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To fill slots.
+    Fill,
+    /// To be compared with the answer of another worker.
+    Audit {
+        /// Workers that were lost over it.
+        lost: u32,
+    },
+    /// To decide between answers that differ.
+    Judge,
 }
 
 /// A batch that a worker holds.
 #[derive(Debug)]
 pub(crate) struct Batch {
     pub(crate) assignment: Assignment,
+    pub(crate) purpose: Purpose,
     pub(crate) worker: WorkerId,
     pub(crate) sent: Duration,
+    /// Computing time that its client was charged for it.
+    pub(crate) charged: Duration,
     /// The other batch with the same indices, when there is a copy.
     pub(crate) twin: Option<BatchId>,
     /// A suspect: its worker holds nothing else, and it is never copied.
@@ -142,19 +221,23 @@ impl State {
         Self {
             config,
             jobs: BTreeMap::new(),
-            ended: 0,
+            ended: BTreeMap::new(),
             requests: BTreeMap::new(),
             waiting: VecDeque::new(),
             active: BTreeSet::new(),
+            shares: Shares::default(),
             last_served: None,
             changed: BTreeSet::new(),
             published: now,
+            pruned: Duration::ZERO,
             workers: BTreeMap::new(),
+            expelled: Vec::new(),
             no_worker_since: now,
             batches: BTreeMap::new(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
+            next_round: 1,
             draining: false,
         }
     }
@@ -166,12 +249,15 @@ impl State {
 
     /// How many jobs have not ended.
     pub(crate) fn unfinished(&self) -> usize {
-        self.jobs.len() - self.ended
+        self.jobs.len()
     }
 
-    /// Jobs with a record on its way to the store.
+    /// Records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
-        self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none()).count()
+        let on_its_way = |expelled: &&Expelled| expelled.store_at.is_some() && !expelled.refused;
+        let expelled = self.expelled.iter().filter(on_its_way).count();
+        let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
+        jobs.count() + expelled
     }
 
     /// The work of an assignment, while its evaluation is under way.
@@ -199,9 +285,43 @@ impl State {
         }
     }
 
+    /// The evaluation that a batch is about, while this attempt at it is under way.
+    pub(crate) fn attempt_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
+        self.evaluation_mut(assignment.job).filter(|found| found.round == assignment.round)
+    }
+
+    /// A number for the next attempt at an evaluation.
+    pub(crate) fn round(&mut self) -> u64 {
+        self.next_round += 1;
+        self.next_round - 1
+    }
+
+    /// The expulsion of a worker, if it was expelled.
+    pub(crate) fn expulsion(&self, name: &WorkerName) -> Option<&ExpulsionRecord> {
+        let found = self.expelled.iter().find(|expelled| expelled.record.worker == *name);
+        found.map(|expelled| &expelled.record)
+    }
+
+    /// Whether somebody that meets `of` takes batches.
+    pub(crate) fn takes_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
+        !self.draining && self.workers.values().any(|worker| !worker.draining && of(&worker.name))
+    }
+
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
+        if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
+            match settled.purpose {
+                Purpose::Fill => {}
+                Purpose::Audit { .. } => evaluation.audits_out -= 1,
+                Purpose::Judge => {
+                    let of = evaluation.disputes.iter_mut().find(|it| it.judge == Some(batch));
+                    if let Some(dispute) = of {
+                        dispute.judge = None;
+                    }
+                }
+            }
+        }
         if let Some(worker) = self.workers.get_mut(&settled.worker) {
             worker.in_flight.retain(|held| *held != batch);
             worker.settled.push_back((batch, settled.assignment));
@@ -217,19 +337,19 @@ impl State {
 }
 
 impl Job {
-    /// A job of which nothing is computed here yet.
-    pub(crate) fn new(
-        record: JobRecord,
-        stage: Stage,
-        search: Option<Search>,
-        now: Duration,
-    ) -> Self {
+    /// A job of which nothing is computed here yet, with so many stored evaluations.
+    pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
         Self {
+            identity: identity(&record.specification),
+            search: Search::new(record.specification.clone()),
             record,
             stage,
-            search,
+            stored,
+            workers: BTreeSet::new(),
+            rewind: false,
             cancelled: false,
             rate: Rate::default(),
+            sequence: sequence(0, now),
             progressed: now,
             tokens: Vec::new(),
             trouble: None,
@@ -237,16 +357,46 @@ impl Job {
     }
 }
 
-impl Stage {
-    /// Whether a record of the job is not durable yet.
-    pub(crate) fn is_storing(&self) -> bool {
-        matches!(self, Self::Accepting | Self::Storing(_) | Self::Finishing(_))
+impl EndedJob {
+    /// What is kept of a job that ended, after a snapshot with number `sequence`.
+    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
+        let specification = &record.specification;
+        Self {
+            request_id: record.request_id.clone(),
+            identity: identity(specification),
+            kind: specification.kind,
+            max_evaluations: max_evaluations(specification),
+            realizations: specification.monte_carlo.realizations,
+            accepted: record.accepted,
+            sequence: self::sequence(sequence, end.ended),
+            end,
+        }
     }
 }
 
-impl Worker {
-    /// Who it is, for people.
-    pub(crate) fn name(&self) -> String {
-        format!("{} (process {})", self.hello.host, self.hello.process)
+/// Number of a snapshot at `now` after one with number `last`: it grows, and since it follows the
+/// clock it grows over restarts too.
+pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
+    u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
+}
+
+/// Most evaluations that a job may take.
+pub(crate) fn max_evaluations(specification: &JobSpecification) -> u64 {
+    match specification.kind {
+        JobKind::Identification => specification.search.max_evaluations,
+        JobKind::Propagation => 1,
+    }
+}
+
+/// Digest of a specification: equal for equal ones only.
+pub(crate) fn identity(specification: &JobSpecification) -> Identity {
+    let encoded = specification::to_message(specification).encode_to_vec();
+    *blake3::hash(&encoded).as_bytes()
+}
+
+impl Stage {
+    /// Whether a record of the job is not durable yet.
+    pub(crate) fn is_storing(&self) -> bool {
+        matches!(self, Self::Accepting | Self::Storing { .. } | Self::Finishing(_))
     }
 }

@@ -4,7 +4,7 @@
 //! the record is durable, and putting the same record again is no error, so that a write whose
 //! answer was lost can be repeated.
 
-use std::ops::ControlFlow;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,6 +17,7 @@ use thiserror::Error;
 
 use crate::ids::JobId;
 use crate::search::{Ending, Summary};
+use crate::worker_name::WorkerName;
 
 pub mod memory;
 pub mod sqlite;
@@ -34,6 +35,10 @@ pub struct JobRecord {
     pub accepted: Duration,
     /// Fingerprint of the numerics that its stored evaluations were computed with.
     pub fingerprint: String,
+    /// Who submitted it, as the client says; jobs of one client share what is its.
+    pub client: String,
+    /// Its rank among the jobs of its client: a higher one goes first.
+    pub priority: u32,
 }
 
 /// A complete evaluation.
@@ -49,6 +54,23 @@ pub struct EvaluationRecord {
     pub outcomes: Arc<[Outcome]>,
     /// Estimated errors of the successes, unless there are none, or an older version has stored it.
     pub estimated_error: Option<EstimatedError>,
+    /// Everybody whose answers are in it; empty if an older version has stored it.
+    pub workers: BTreeSet<WorkerName>,
+}
+
+/// A worker that was found to compute wrongly.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExpulsionRecord {
+    /// Number of the expulsion, from 1.
+    pub number: u64,
+    /// The worker.
+    pub worker: WorkerName,
+    /// The job in which it was found.
+    pub job: JobId,
+    /// What was found, in a sentence.
+    pub reason: String,
+    /// When, since the Unix epoch.
+    pub at: Duration,
 }
 
 /// The end of a job, with what a snapshot of it shows.
@@ -98,6 +120,8 @@ pub struct StoredJob {
     pub record: JobRecord,
     /// Its end, if it has ended.
     pub end: Option<EndRecord>,
+    /// How many evaluations the store has of it.
+    pub evaluations: u64,
 }
 
 /// Why the store did not do what it was asked.
@@ -119,12 +143,67 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
+    /// The file that says who has the store open cannot be written.
+    #[error(
+        "cannot write and lock {}: {source}; give the coordinator's user write permission to its \
+         directory, or choose another one, on a disk that knows locks",
+        path.display()
+    )]
+    Lock {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// Another process has it open.
     #[error(
-        "{} is in use by another coordinator; stop that one, or choose another directory",
+        "{} is in use by {holder}; stop that one, or choose another directory",
         path.display()
     )]
     InUse {
+        /// The file.
+        path: PathBuf,
+        /// Who has it, for people.
+        holder: String,
+    },
+    /// There is no room.
+    #[error("no room is left for {}: {source}; make room on its disk", path.display())]
+    Full {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// It cannot be opened or written.
+    #[error(
+        "{} cannot be written: {source}; give the coordinator's user write permission to it and \
+         its directory, or choose another directory",
+        path.display()
+    )]
+    NotWritable {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// SQLite cannot make sense of it.
+    #[error(
+        "{} is damaged or no database: {source}; restore the file from a copy, or choose another \
+         directory",
+        path.display()
+    )]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// Another program's tables are in it.
+    #[error(
+        "{} is a database of another program and is left as it is; choose another directory",
+        path.display()
+    )]
+    Foreign {
         /// The file.
         path: PathBuf,
     },
@@ -155,6 +234,22 @@ pub enum StoreError {
         found: i64,
         /// Newest format known.
         known: i64,
+    },
+    /// An evaluation is missing.
+    #[error(
+        "{} has {found} evaluations of job {job}, but the last has number {last}; restore the file \
+         from a copy, or choose another directory",
+        path.display()
+    )]
+    Gap {
+        /// The file.
+        path: PathBuf,
+        /// The job.
+        job: JobId,
+        /// How many there are.
+        found: u64,
+        /// Number of the last, from 0.
+        last: u64,
     },
     /// A record's checksum or encoding is wrong.
     #[error(
@@ -187,6 +282,9 @@ pub enum DamagedRecord {
     /// What its path came to.
     #[error("the summary")]
     Summary,
+    /// An expulsion of a worker that was found in it.
+    #[error("the expulsion of a worker, found in a realization")]
+    Expulsion,
 }
 
 /// A durable place for jobs.
@@ -194,20 +292,34 @@ pub trait Store: Send {
     /// All jobs, in the order of their identifiers.
     ///
     /// # Errors
-    /// When the store cannot be read.
-    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError>;
+    /// As [`visit_jobs`](Self::visit_jobs).
+    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
+        let mut jobs = Vec::new();
+        self.visit_jobs(&mut |job| jobs.push(job))?;
+        Ok(jobs)
+    }
 
-    /// Shows `visit` the evaluations of a job from number `first` on, in the order of their
-    /// numbers, until it breaks. One is in memory at a time.
+    /// Shows `visit` all jobs, in the order of their identifiers. One is in memory at a time.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or an evaluation is missing before one that is there.
+    fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError>;
+
+    /// One job.
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn evaluations(
+    fn job(&mut self, job: JobId) -> Result<Option<JobRecord>, StoreError>;
+
+    /// One evaluation of a job.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn evaluation(
         &mut self,
         job: JobId,
-        first: u64,
-        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
-    ) -> Result<(), StoreError>;
+        number: u64,
+    ) -> Result<Option<EvaluationRecord>, StoreError>;
 
     /// Forgets the evaluations of a job, which from now on is computed with the numerics of
     /// `fingerprint`: both or neither.
@@ -222,11 +334,16 @@ pub trait Store: Send {
     /// When it is not durable.
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError>;
 
-    /// Makes an evaluation durable.
+    /// Makes an evaluation durable, in the place of the one with the same number; with
+    /// `is_last`, forgets all after it: both or neither.
     ///
     /// # Errors
-    /// When it is not durable.
-    fn put_evaluation(&mut self, record: &EvaluationRecord) -> Result<(), StoreError>;
+    /// When that is not durable.
+    fn put_evaluation(
+        &mut self,
+        record: &EvaluationRecord,
+        is_last: bool,
+    ) -> Result<(), StoreError>;
 
     /// Makes the end of a job and what its path came to durable: both or neither.
     ///
@@ -239,4 +356,35 @@ pub trait Store: Send {
     /// # Errors
     /// When the store cannot be read.
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError>;
+
+    /// Forgets ended jobs and all that belongs to them: all of them or none. The room they took
+    /// is given back as far as the store can.
+    ///
+    /// # Errors
+    /// When that is not durable.
+    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
+
+    /// Makes durable that a worker is expelled.
+    ///
+    /// # Errors
+    /// When that is not durable.
+    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError>;
+
+    /// All expelled workers, in the order of their numbers.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError>;
+
+    /// Ended jobs with evaluations that a worker contributed to.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
+
+    /// Forgets all expelled workers.
+    ///
+    /// # Errors
+    /// When that is not durable.
+    fn forget_expulsions(&mut self) -> Result<(), StoreError>;
 }

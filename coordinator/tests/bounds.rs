@@ -98,7 +98,7 @@ async fn more_submissions_than_are_read_at_a_time_wait_their_turn() {
         let mut client = jobs_client(channel.clone());
         let specification = Some(specification.clone());
         calls.spawn(async move {
-            let request = SubmitRequest { specification, request_id: String::new() };
+            let request = SubmitRequest { specification, ..Default::default() };
             client.submit(request).await.map(drop)
         });
     }
@@ -130,7 +130,7 @@ async fn a_call_whose_message_never_ends_is_given_up() {
         assert!(matches!(status.code(), Code::DeadlineExceeded | Code::Cancelled), "{status}");
     }
     let specification = Some(specification::to_message(&fake::identification(100, 10, 7)));
-    let request = SubmitRequest { specification, request_id: String::new() };
+    let request = SubmitRequest { specification, ..Default::default() };
     jobs_client(channel).submit(request).await.unwrap();
     coordinator.shutdown().await;
 }

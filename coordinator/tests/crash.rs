@@ -15,13 +15,14 @@ use osteon_common::version;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
-use osteon_coordinator::ids::{JobId, Token, WorkerId};
+use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
 use osteon_coordinator::leftover;
-use osteon_coordinator::reactor::{RestoredJob, react};
+use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::search::{Search, Step};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{EvaluationRecord, Store};
+use osteon_proto::batch::Work;
 
 /// When a process dies, counted in writes since the beginning of the job.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,8 +72,9 @@ fn evaluations_of_other_numerics_are_computed_again() {
             point,
             outcomes: outcomes.clone(),
             estimated_error: None,
+            workers: [].into(),
         };
-        store.put_evaluation(&record).unwrap();
+        store.put_evaluation(&record, true).unwrap();
         search.tell(outcomes, None);
     }
     drop(store);
@@ -82,52 +84,106 @@ fn evaluations_of_other_numerics_are_computed_again() {
     assert_eq!(store.jobs().unwrap()[0].record.fingerprint, version::fingerprint());
 }
 
+/// A worker lies now and then, is found out late, and the coordinator is killed at every write
+/// before, while and after all that it has touched is computed again.
+#[test]
+fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
+    let specification = fake::identification(40, 12, 5);
+    let expected = format!("{:?}", fake::plain_run(&specification));
+    let lives = |death: Option<Death>| {
+        let directory = tempfile::tempdir().unwrap();
+        let ended = live_with(directory.path(), &specification, death, Crew::WITH_LIAR);
+        if death.is_some() && !ended {
+            assert!(live_with(directory.path(), &specification, None, Crew::WITH_LIAR));
+        }
+        let mut store = SqliteStore::open(directory.path()).unwrap();
+        let found = !store.expulsions().unwrap().is_empty();
+        drop(store);
+        (ended, found, result(directory.path()) == expected)
+    };
+    assert_eq!(lives(None), (true, true, true), "the lie is not found");
+    let mut found = 0;
+    for write in 1.. {
+        for death in [Death::Before(write), Death::After(write)] {
+            let (ended, expelled, right) = lives(Some(death));
+            assert!(right || !expelled, "{death:?}");
+            found += u32::from(expelled && !ended);
+            if ended {
+                assert!(found > write, "{found} of {} times the lie was found", 2 * write);
+                return;
+            }
+        }
+    }
+}
+
+/// Who computes, and how many batches are computed twice.
+#[derive(Debug, Clone, Copy)]
+struct Crew {
+    workers: u32,
+    audit_fraction: f64,
+    /// This process lies in every seventh batch.
+    liar: Option<u32>,
+}
+
+impl Crew {
+    const ALONE: Self = Self { workers: 1, audit_fraction: 0.0, liar: None };
+    const WITH_LIAR: Self = Self { workers: 3, audit_fraction: 0.05, liar: Some(2) };
+
+    fn answer(self, worker: WorkerId, batch: BatchId, work: &Work) -> Event {
+        let mut solved = fake::solved(work);
+        if self.liar == u32::try_from(worker.0).ok() && batch.0.is_multiple_of(7) {
+            solved[0].outcome = Ok(4321.0);
+        }
+        Event::Answered { worker, batch, solved, elapsed_s: 0.1 }
+    }
+}
+
 /// One life of a coordinator with one worker; whether it got to the end of the job.
 fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>) -> bool {
+    live_with(directory, specification, death, Crew::ALONE)
+}
+
+fn live_with(
+    directory: &Path,
+    specification: &JobSpecification,
+    death: Option<Death>,
+    crew: Crew,
+) -> bool {
     let mut store = SqliteStore::open(directory).unwrap();
-    let restored = RestoredJob::load(&mut store).unwrap();
-    let (mut state, effects) = State::restore(Config::default(), restored, Duration::ZERO);
-    let worker = WorkerId(1);
-    let hello = Hello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 1,
-        host: String::new(),
-        process: 1,
-    };
-    // The client does not know whether its first submission was accepted, and submits again.
-    let submit = Request::Submit {
-        specification: Arc::new(specification.clone()),
-        request_id: "the one".to_owned(),
-    };
+    let restored = Restored::load(&mut store).unwrap();
+    let config = Config { audit_fraction: crew.audit_fraction, ..Config::default() };
+    let (mut state, effects) = State::restore(config, restored, Duration::ZERO);
     let mut effects = VecDeque::from(effects);
-    for event in
-        [Event::Requested { token: Token(1), request: submit }, Event::Hello { worker, hello }]
-    {
+    for event in beginning(specification, crew) {
         effects.extend(react(&mut state, event, Duration::ZERO));
     }
     let mut writes = 0;
     while let Some(effect) = effects.pop_front() {
         let event = match effect {
-            Effect::Send { batch, work, .. } => {
-                let solved = fake::solved(&work);
-                Event::Answered { worker, batch, solved, elapsed_s: 0.1 }
-            }
+            Effect::Send { worker, batch, work } => crew.answer(worker, batch, &work),
             Effect::Store(record) => {
                 writes += 1;
                 if death == Some(Death::Before(writes)) {
                     return false;
                 }
                 match &record {
-                    Record::Job(record) => store.put_job(record).unwrap(),
-                    Record::Evaluation(record) => store.put_evaluation(record).unwrap(),
-                    Record::End { end, summary } => store.finish_job(end, summary).unwrap(),
+                    Record::Job(record) => store.put_job(record),
+                    Record::Evaluation { record, is_last } => {
+                        store.put_evaluation(record, *is_last)
+                    }
+                    Record::End { end, summary } => store.finish_job(end, summary),
+                    Record::Expulsion(record) => store.put_expulsion(record),
                 }
+                .unwrap();
                 if death == Some(Death::After(writes)) {
                     return false;
                 }
                 let (job, key) = record.key();
                 Event::Stored { job, key }
+            }
+            Effect::Read { job, number } => {
+                let found = Ok(store.evaluation(job, number).unwrap());
+                Event::Read { job, number, found }
             }
             _ => continue,
         };
@@ -136,11 +192,33 @@ fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>
     state.is_idle()
 }
 
+/// The client does not know whether its first submission was accepted, and submits again; the
+/// workers attach.
+fn beginning(specification: &JobSpecification, crew: Crew) -> Vec<Event> {
+    let submit = Request::Submit {
+        specification: Arc::new(specification.clone()),
+        request_id: "the one".to_owned(),
+        client: String::new(),
+        priority: 0,
+    };
+    let hello = |process| Hello {
+        version: version::VERSION.to_owned(),
+        fingerprint: version::fingerprint(),
+        threads: 1,
+        host: String::new(),
+        process,
+    };
+    let attach =
+        |process: u32| Event::Hello { worker: WorkerId(process.into()), hello: hello(process) };
+    let submitted = Event::Requested { token: Token(1), request: submit };
+    [submitted].into_iter().chain((1..=crew.workers).map(attach)).collect()
+}
+
 /// What the store says of the only job there is, as text: NaN equals nothing.
 fn result(directory: &Path) -> String {
     let mut store = SqliteStore::open(directory).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!(jobs.len(), 1);
-    let left = leftover::read(&mut store, &jobs[0].record, jobs[0].end.as_ref().unwrap());
+    let left = leftover::read(&mut store, jobs[0].end.as_ref().unwrap());
     format!("{:?}", left.unwrap().result)
 }

@@ -4,7 +4,6 @@
 
 mod fake;
 
-use std::ops::ControlFlow;
 use std::time::Duration;
 
 use osteon_common::version;
@@ -13,8 +12,9 @@ use osteon_coordinator::search::Summary;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
-    EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+    EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
 };
+use osteon_coordinator::worker_name::WorkerName;
 use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
@@ -89,13 +89,14 @@ async fn submit(
     let request = SubmitRequest {
         specification: Some(specification::to_message(job)),
         request_id: request_id.to_owned(),
+        ..SubmitRequest::default()
     };
     Ok(client.submit(request).await?.into_inner().job)
 }
 
 /// Watches a job to its end; the last snapshot.
 async fn watch(client: &mut JobsClient<Channel>, job: &str) -> JobSnapshot {
-    let request = WatchRequest { job: job.to_owned() };
+    let request = WatchRequest { job: job.to_owned(), ..WatchRequest::default() };
     let mut stream = client.watch(request).await.unwrap().into_inner();
     let mut last = None;
     let follow = async {
@@ -270,17 +271,20 @@ struct BrokenStore {
 }
 
 impl Store for BrokenStore {
-    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
-        self.sound.jobs()
+    fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
+        self.sound.visit_jobs(visit)
     }
 
-    fn evaluations(
+    fn job(&mut self, job: JobId) -> Result<Option<JobRecord>, StoreError> {
+        self.sound.job(job)
+    }
+
+    fn evaluation(
         &mut self,
         job: JobId,
-        first: u64,
-        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
-    ) -> Result<(), StoreError> {
-        self.sound.evaluations(job, first, visit)
+        number: u64,
+    ) -> Result<Option<EvaluationRecord>, StoreError> {
+        self.sound.evaluation(job, number)
     }
 
     fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
@@ -291,7 +295,7 @@ impl Store for BrokenStore {
         self.sound.put_job(record)
     }
 
-    fn put_evaluation(&mut self, _: &EvaluationRecord) -> Result<(), StoreError> {
+    fn put_evaluation(&mut self, _: &EvaluationRecord, _: bool) -> Result<(), StoreError> {
         assert!(!self.dies, "a store that this test breaks");
         let source = std::io::Error::other("the disk is full");
         Err(StoreError::Directory { path: "store".into(), source })
@@ -303,6 +307,26 @@ impl Store for BrokenStore {
 
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
         self.sound.summary(job)
+    }
+
+    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        self.sound.forget_jobs(jobs)
+    }
+
+    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
+        self.sound.put_expulsion(record)
+    }
+
+    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
+        self.sound.expulsions()
+    }
+
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        self.sound.ended_with(worker)
+    }
+
+    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
+        self.sound.forget_expulsions()
     }
 }
 

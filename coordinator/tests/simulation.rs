@@ -37,7 +37,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     }
     // A simulation in which nothing goes wrong tests nothing.
     if seeds.end - seeds.start == SCHEDULES {
-        let world::Counts { lost, revoked, closed, late, restarts, refusals, .. } = seen;
+        let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -45,17 +45,31 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("late answers", late),
             ("restarts", restarts),
             ("refusals of the store", refusals),
+            ("batches computed again to compare", checked),
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }
-        let world::Counts { stops, cancelled, exposed, outages, .. } = seen;
+        let world::Counts { stops, cancelled, outages, expelled, pruned, lies, .. } = seen;
         for (name, count) in [
             ("clean stops", stops),
             ("jobs cancelled", cancelled),
-            ("jobs with contradicting answers", exposed),
             ("outages of the store", outages),
+            ("wrong answers", lies),
+            ("workers expelled", expelled),
+            ("jobs forgotten", pruned),
         ] {
             assert!(count > SCHEDULES / 20, "{name}: {count}");
         }
+        let world::Counts { exposed, replaced, confirmed, remembered, repaired, .. } = seen;
+        for (name, count) in [
+            ("jobs failed over contradicting answers", exposed),
+            ("stored evaluations replaced by others", replaced),
+            ("stored evaluations computed again and the same", confirmed),
+            ("restarts with expelled workers", remembered),
+            ("jobs that ended right although somebody lied", repaired),
+        ] {
+            assert!(count > SCHEDULES / 200, "{name}: {count}");
+        }
+        println!("{seen:?}");
     }
 }

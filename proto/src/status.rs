@@ -1,5 +1,7 @@
 //! Violations as a gRPC status with `google.rpc.BadRequest`, and back.
 
+use std::time::Duration;
+
 use osteon_common::violations::Violations;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
@@ -26,6 +28,17 @@ pub fn invalid_argument(violations: &Violations) -> Status {
         _ => format!("the specification breaks {total} rules"),
     };
     Status::with_error_details(Code::InvalidArgument, message, details)
+}
+
+/// `RESOURCE_EXHAUSTED` with a `google.rpc.RetryInfo`: the same request may succeed after `retry`.
+pub fn resource_exhausted(message: impl Into<String>, retry: Duration) -> Status {
+    let details = ErrorDetails::with_retry_info(Some(retry));
+    Status::with_error_details(Code::ResourceExhausted, message, details)
+}
+
+/// How long to wait before a refused request is tried again, if its status says so.
+pub fn retry_after(status: &Status) -> Option<Duration> {
+    status.get_details_retry_info()?.retry_delay
 }
 
 /// The violations that a status carries, if it is one of [`invalid_argument`].
@@ -66,6 +79,14 @@ mod tests {
         let count = listed.iter().count();
         let last = listed.iter().last().unwrap();
         assert_eq!(last.message, format!("and {} more", 1000 - (count - 1)));
+    }
+
+    #[test]
+    fn a_refusal_for_now_says_when_to_come_back() {
+        let status = resource_exhausted("too many jobs", Duration::from_secs(5));
+        assert_eq!((status.code(), status.message()), (Code::ResourceExhausted, "too many jobs"));
+        assert_eq!(retry_after(&status), Some(Duration::from_secs(5)));
+        assert_eq!(retry_after(&Status::resource_exhausted("for ever")), None);
     }
 
     #[test]

@@ -42,6 +42,19 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon study nothing", "unrecognized subcommand");
     check("osteon study failures --realizations 0", "0 is not in 1..=10000000");
     check("osteon study methods --seed -1", "unexpected argument");
+    check("osteon submit a.toml --priority 10", "10 is not in 0..=9");
+    for (age, unit) in
+        [("30", ""), ("x", ""), ("-1", "d"), ("3", "w"), ("1e3", "s"), ("9999999", "d")]
+    {
+        check(
+            &format!("osteon jobs prune --older-than={age}{unit}"),
+            "it must be a number with a unit",
+        );
+    }
+    for fraction in ["-0.1", "1.1", "nan", "half"] {
+        let line = format!("osteon coordinator --listen a:1 --store b --audit-fraction={fraction}");
+        check(&line, "it must be a number from 0 to 1");
+    }
     check("osteon draw a.toml", "--index");
     check("osteon draw a.toml --index -1", "unexpected argument");
     check("osteon draw a.toml --index 1.5", "invalid digit");
@@ -54,4 +67,13 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon report DIR", "unrecognized subcommand");
     check("osteon frobnicate", "unrecognized subcommand");
     check("osteon", "Usage");
+}
+
+#[test]
+fn ages_have_units() {
+    for (text, seconds) in
+        [("45s", 45.0), ("90min", 5400.0), ("1.5h", 5400.0), ("30d", 2_592_000.0), ("0s", 0.0)]
+    {
+        assert_eq!(age(text).unwrap().as_secs_f64(), seconds, "{text}");
+    }
 }

@@ -30,7 +30,12 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     }
     let listener = door.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
     let store = SqliteStore::open(&directory).map_err(Failure::failed)?;
-    let coordinator = osteon_coordinator::start(listener, Box::new(store), Config::default())
+    let config = Config {
+        audit_fraction: arguments.audit_fraction,
+        keep_ended: arguments.keep_ended,
+        ..Config::default()
+    };
+    let coordinator = osteon_coordinator::start(listener, Box::new(store), config)
         .await
         .map_err(Failure::failed)?;
     let address_file = directory.join("address");

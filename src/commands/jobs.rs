@@ -21,25 +21,50 @@ use crate::verdict;
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
 
+/// A job to hand to a coordinator.
+pub(super) struct Submission<'a> {
+    /// The job file.
+    pub(super) job: &'a Path,
+    /// What the job does.
+    pub(super) kind: JobKind,
+    /// Empty: a new job.
+    pub(super) request_id: &'a str,
+    /// Rank among the user's own jobs.
+    pub(super) priority: u32,
+}
+
 /// `submit`: prints the job's id.
 pub(super) async fn submit(
-    job: &Path,
-    kind: JobKind,
-    request_id: &str,
+    submission: Submission<'_>,
     coordinator: &Remote,
     format: Format,
 ) -> Result<Ending, Failure> {
+    let Submission { job, kind, request_id, priority } = submission;
     let specification = job_file::read(job, kind).map_err(Failure::bad_input)?;
     let mut client = Client::connect(coordinator).await?;
-    let id = client.submit(&specification, request_id).await?;
+    let id = client.submit(&specification, request_id, priority).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
-/// `jobs`: prints all jobs.
+/// `jobs`: prints all jobs, and, for people, the workers that are expelled.
 pub(super) async fn list(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
-    let jobs = Client::connect(coordinator).await?.list().await?;
-    output::stdout(format).jobs(&jobs).map_err(stdout_failure)?;
+    let mut client = Client::connect(coordinator).await?;
+    let jobs = client.list().await?;
+    let expelled = client.expelled().await?;
+    output::stdout(format).jobs(&jobs, &expelled).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+/// `jobs prune`: prints the jobs that are forgotten.
+pub(super) async fn prune(
+    older_than: Option<Duration>,
+    keep_last: Option<u64>,
+    coordinator: &Remote,
+    format: Format,
+) -> Result<Ending, Failure> {
+    let jobs = Client::connect(coordinator).await?.prune(older_than, keep_last).await?;
+    output::stdout(format).pruned(&jobs).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 

@@ -15,7 +15,7 @@ use crate::client::{Client, Fetched, Remote};
 use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownResult};
-use crate::progress::Progress;
+use crate::progress::{Progress, say};
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
@@ -26,6 +26,9 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let specification = job_file::read(&run.job, run.kind).map_err(Failure::bad_input)?;
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
+    }
+    if let Some(reason) = failed_before(&run, &specification)? {
+        say(&format!("the last run there failed and is run again: {reason}"));
     }
     let interruption = signals::interruption()?;
     // An address that does not answer leaves no directory behind.
@@ -70,6 +73,15 @@ fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<String
         Some(path) => ResultsDirectory::finished(path, specification),
         None => Ok(None),
     }
+}
+
+/// Why the last run in the same directory failed, if another may do better.
+fn failed_before(run: &Run, specification: &JobSpecification) -> Result<Option<String>, Failure> {
+    let stored = match &run.out {
+        Some(path) => ResultsDirectory::stored(path, specification)?,
+        None => None,
+    };
+    Ok(stored.and_then(|json| verdict::machine_failure(&json)))
 }
 
 /// Writes what an ended job left, if there is a directory for it; the text of the result.
@@ -161,7 +173,7 @@ async fn drive(
         Some(directory) => directory.request_id()?,
         None => String::new(),
     };
-    let job = client.submit(specification, &request_id).await?;
+    let job = client.submit(specification, &request_id, 0).await?;
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }

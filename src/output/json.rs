@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use osteon_common::{results_json, version};
-use osteon_proto::v1::JobSnapshot;
+use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
 use serde_json::{Value, json};
@@ -63,8 +63,12 @@ impl Output for JsonOutput<'_> {
         self.value(&json!({ "job": job }))
     }
 
-    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()> {
+    fn jobs(&mut self, jobs: &[JobSnapshot], _: &[ExpelledWorker]) -> io::Result<()> {
         self.value(&Value::Array(jobs.iter().map(snapshot_value).collect()))
+    }
+
+    fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
+        self.value(&json!({ "pruned": jobs }))
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {

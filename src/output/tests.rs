@@ -255,10 +255,10 @@ fn jobs() -> Vec<JobSnapshot> {
 
 #[test]
 fn jobs_are_a_table_or_a_list() {
-    insta::assert_snapshot!(printed(Format::Text, |output| output.jobs(&jobs()).unwrap()));
-    insta::assert_snapshot!(printed(Format::Json, |output| output.jobs(&jobs()).unwrap()));
-    assert_eq!(printed(Format::Text, |output| output.jobs(&[]).unwrap()), "no jobs\n");
-    assert_eq!(printed(Format::Json, |output| output.jobs(&[]).unwrap()), "[]\n");
+    insta::assert_snapshot!(printed(Format::Text, |output| output.jobs(&jobs(), &[]).unwrap()));
+    insta::assert_snapshot!(printed(Format::Json, |output| output.jobs(&jobs(), &[]).unwrap()));
+    assert_eq!(printed(Format::Text, |output| output.jobs(&[], &[]).unwrap()), "no jobs\n");
+    assert_eq!(printed(Format::Json, |output| output.jobs(&[], &[]).unwrap()), "[]\n");
 }
 
 #[test]
@@ -276,4 +276,24 @@ fn an_id_is_printed_alone() {
     assert_eq!(printed(Format::Text, |output| output.submitted("7").unwrap()), "7\n");
     let json = printed(Format::Json, |output| output.submitted("7").unwrap());
     assert_eq!(json, "{\n  \"job\": \"7\"\n}\n");
+}
+
+#[test]
+fn expelled_workers_are_shown_and_forgotten_jobs_listed() {
+    let expelled = osteon_proto::v1::ExpelledWorker {
+        host: "node3".to_owned(),
+        process: 42,
+        job: "7".to_owned(),
+        reason: "answered realization 5 of job 7 wrongly".to_owned(),
+        elapsed_s: 90.0,
+    };
+    let expelled = [expelled];
+    let shown = printed(Format::Text, |output| output.jobs(&[], &expelled).unwrap());
+    let line = "node3 (process 42) answered realization 5 of job 7 wrongly\n";
+    assert!(shown.starts_with("no jobs\nexpelled ") && shown.ends_with(line), "{shown}");
+    let pruned = ["3".to_owned(), "5".to_owned()];
+    assert_eq!(printed(Format::Text, |output| output.pruned(&pruned).unwrap()), "3\n5\n");
+    let json = printed(Format::Json, |output| output.pruned(&pruned).unwrap());
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(value, serde_json::json!({ "pruned": ["3", "5"] }));
 }

@@ -7,7 +7,7 @@ mod solver;
 use std::io::{self, Write};
 
 use osteon_common::results_json;
-use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
+use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
 use super::{Output, ShownResult, ShownSimulation};
 use crate::client;
@@ -37,9 +37,10 @@ impl Output for TextOutput<'_> {
         self.verbatim(&format!("{job}\n"))
     }
 
-    fn jobs(&mut self, jobs: &[JobSnapshot]) -> io::Result<()> {
+    fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()> {
         if jobs.is_empty() {
-            return self.verbatim("no jobs\n");
+            self.verbatim("no jobs\n")?;
+            return self.verbatim(&expelled_lines(expelled));
         }
         let header = ["ID", "KIND", "STATE", "TIME", "WORKERS", "PROGRESS"];
         let mut rows = vec![header.map(str::to_owned)];
@@ -53,7 +54,12 @@ impl Output for TextOutput<'_> {
                 progress(job),
             ]);
         }
-        self.verbatim(&aligned(&rows))
+        self.verbatim(&aligned(&rows))?;
+        self.verbatim(&expelled_lines(expelled))
+    }
+
+    fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
+        self.verbatim(&jobs.iter().map(|job| format!("{job}\n")).collect::<String>())
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
@@ -66,6 +72,15 @@ impl Output for TextOutput<'_> {
         self.writer.write_all(text.as_bytes())?;
         self.writer.flush()
     }
+}
+
+/// A line for each worker that was found to compute wrongly.
+fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
+    let line = |worker: &ExpelledWorker| {
+        let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
+        format!("expelled {} ago: {host} (process {process}) {reason}\n", span(*elapsed_s))
+    };
+    expelled.iter().map(line).collect()
 }
 
 /// `identification` or `propagation`.

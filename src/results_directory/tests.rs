@@ -87,3 +87,17 @@ fn a_lock_whose_file_was_removed_locks_nothing() {
     let present = File::create(&path).unwrap();
     assert!(is_at(&present, &path) && !is_at(&removed, &path));
 }
+
+#[test]
+fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("out");
+    let directory = ResultsDirectory::open(&path).unwrap();
+    let request = directory.request_id().unwrap();
+    let mut failed = fetched(Status::Failed);
+    failed.result.reason = Some("integrity error: realization 3 is …".to_owned());
+    directory.write_results(JobKind::Identification, &failed).unwrap();
+    assert_eq!(ResultsDirectory::finished(&path, &specification()).unwrap(), None);
+    assert!(!directory.store().exists());
+    assert_ne!(directory.request_id().unwrap(), request);
+}

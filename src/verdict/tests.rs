@@ -64,3 +64,20 @@ fn only_a_search_that_somebody_ended_is_cancelled() {
     check(r#"{"failures": {}, "velocity": {"mean": 3900.0}}"#, false);
     check("no JSON", false);
 }
+
+#[test]
+fn what_lay_in_the_machines_may_end_otherwise() {
+    for (status, reason, expected) in [
+        ("failed", "integrity error: realization 3 is …", true),
+        ("failed", "realization 3 was alone on three workers that vanished; …", true),
+        ("failed", "no feasible point among the 9 evaluated; …", false),
+        ("cancelled", "", true),
+        ("converged", "", false),
+        ("max_evaluations", "the simplex collapsed, …", false),
+    ] {
+        let json = format!("{{\"status\": \"{status}\", \"reason\": \"{reason}\"}}");
+        assert_eq!(may_end_otherwise(&json), expected, "{json}");
+        let failure = (status == "failed" && expected).then(|| reason.to_owned());
+        assert_eq!(machine_failure(&json), failure, "{json}");
+    }
+}

@@ -10,8 +10,8 @@ use osteon_common::results::EstimatedError;
 
 use super::*;
 use crate::search::{Ending, Search, Step};
-use crate::store::EvaluationRecord;
 use crate::store::memory::MemoryStore;
+use crate::store::{EvaluationRecord, JobRecord};
 
 const JOB: JobId = JobId(1);
 
@@ -40,8 +40,14 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
                 let estimated_error =
                     Some(EstimatedError { median: spread, largest: 2.0 * spread });
                 search.tell(outcomes.clone(), estimated_error);
-                let record =
-                    EvaluationRecord { job: JOB, number, point, outcomes, estimated_error };
+                let record = EvaluationRecord {
+                    job: JOB,
+                    number,
+                    point,
+                    outcomes,
+                    estimated_error,
+                    workers: [].into(),
+                };
                 records.push(record);
             }
         }
@@ -52,6 +58,8 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         specification,
         accepted: Duration::ZERO,
         fingerprint: String::new(),
+        client: String::new(),
+        priority: 0,
     };
     let end = EndRecord::new(JOB, ending, Duration::ZERO, 8, search.best());
     let best = search.best().unwrap().number as usize;
@@ -64,9 +72,9 @@ fn the_summary_and_the_best_evaluation_are_enough() {
     let (record, search, end, best) = ended();
     let mut store = MemoryStore::new();
     store.put_job(&record).unwrap();
-    store.put_evaluation(&best).unwrap();
+    store.put_evaluation(&best, false).unwrap();
     store.finish_job(&end, &search.summary()).unwrap();
-    let left = read(&mut store, &record, &end).unwrap();
+    let left = read(&mut store, &end).unwrap();
     assert_eq!(left.result, search.result(&end.ending, &end.version));
     assert_eq!(left.history, search.history());
 }
@@ -75,13 +83,15 @@ fn the_summary_and_the_best_evaluation_are_enough() {
 fn what_is_missing_is_named() {
     let (record, search, end, best) = ended();
     let mut store = MemoryStore::new();
+    let error = read(&mut store, &end).unwrap_err();
+    assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
     store.put_job(&record).unwrap();
-    let error = read(&mut store, &record, &end).unwrap_err();
+    let error = read(&mut store, &end).unwrap_err();
     assert!(matches!(error, ReadError::NoSummary { job: JOB }), "{error}");
     store.finish_job(&end, &search.summary()).unwrap();
     let later = EvaluationRecord { number: best.number + 1, ..best };
-    store.put_evaluation(&later).unwrap();
-    let error = read(&mut store, &record, &end).unwrap_err();
+    store.put_evaluation(&later, false).unwrap();
+    let error = read(&mut store, &end).unwrap_err();
     assert!(matches!(error, ReadError::NoBest { job: JOB, .. }), "{error}");
 }
 
@@ -94,6 +104,6 @@ fn a_path_without_an_evaluation_leaves_a_result() {
     store.put_job(&record).unwrap();
     let search = Search::new(record.specification.clone());
     store.finish_job(&end, &crate::search::Summary::empty()).unwrap();
-    let left = read(&mut store, &record, &end).unwrap();
+    let left = read(&mut store, &end).unwrap();
     assert_eq!(left.result, search.result(&end.ending, &end.version));
 }

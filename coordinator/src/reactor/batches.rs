@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use osteon_common::outcome::Solved;
 
-use super::{Effects, jobs, workers};
+use super::{Effects, checks, jobs, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::failure::Failure;
+use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{Assignment, Batch, State};
+use crate::state::{Assignment, Batch, Purpose, State};
+use crate::worker_name::WorkerName;
 
 /// Workers that must be lost while alone with a realization before it fails its job.
 pub(crate) const LOST_ALONE_MAX: u32 = 3;
@@ -23,7 +25,7 @@ pub(super) fn answered(
     state: &mut State,
     worker: WorkerId,
     batch: BatchId,
-    solved: &[Solved],
+    solved: Vec<Solved>,
     elapsed_s: f64,
     now: Duration,
     effects: &mut Effects,
@@ -33,26 +35,40 @@ pub(super) fn answered(
     };
     attached.heard = now;
     attached.answered = now;
+    let name = attached.name.clone();
     let held = state.batches.get(&batch).filter(|held| held.worker == worker);
     let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
     let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
         return;
     };
+    let purpose = held.map(|held| held.purpose);
     let (found, expected) = (solved.len(), assignment.indices.count);
     if found as u64 != expected {
         let reason = CloseReason::WrongCount { batch, found, expected };
         workers::close(state, worker, reason, now, effects);
         return;
     }
-    if held.is_some()
-        && let Some(held) = state.settle(batch)
-    {
-        measure(state, &held, elapsed_s, now);
-        if let Some(twin) = held.twin {
-            revoke(state, twin, now, effects);
+    match purpose {
+        Some(Purpose::Fill) => {
+            if let Some(held) = state.settle(batch) {
+                measure(state, &held, elapsed_s, now);
+                if let Some(twin) = held.twin {
+                    revoke(state, twin, now, effects);
+                }
+            }
+            fill(state, &assignment, &solved, &name, now);
+            checks::audit(state, &assignment, &name);
         }
+        Some(Purpose::Audit { .. }) => {
+            state.settle(batch);
+            checks::compare(state, &assignment, &solved, &name, now, effects);
+        }
+        Some(Purpose::Judge) => {
+            checks::judged(state, batch, &assignment, solved, &name, now, effects);
+        }
+        None => checks::compare(state, &assignment, &solved, &name, now, effects),
     }
-    fill(state, &assignment, solved, now, effects);
+    jobs::store_if_complete(state, assignment.job, effects);
     workers::dismiss_if_drained(state, worker, now, effects);
 }
 
@@ -83,10 +99,21 @@ pub(super) fn orphaned(
     now: Duration,
     effects: &mut Effects,
 ) {
-    let Some(Batch { assignment, twin, .. }) = state.settle(batch) else {
+    let assignment = state.batches.get(&batch).map(|batch| (batch.purpose, batch.assignment));
+    if let Some((Purpose::Judge, assignment)) = assignment
+        && !leaving
+    {
+        checks::judge_lost(state, &assignment, batch);
+    }
+    let Some(settled) = state.settle(batch) else {
         return;
     };
-    let Some(evaluation) = state.evaluation_mut(assignment.job) else {
+    if settled.purpose != Purpose::Fill {
+        checks::orphaned(state, &settled, leaving);
+        return;
+    }
+    let Batch { assignment, twin, .. } = settled;
+    let Some(evaluation) = state.attempt_mut(&assignment) else {
         return;
     };
     if twin.is_some() {
@@ -105,29 +132,20 @@ fn fill(
     state: &mut State,
     assignment: &Assignment,
     solved: &[Solved],
+    by: &WorkerName,
     now: Duration,
-    effects: &mut Effects,
 ) {
-    let Assignment { job, evaluation: number, indices } = *assignment;
-    let Some(evaluation) = state.evaluation_mut(job).filter(|found| found.number == number) else {
+    let Some(evaluation) = state.attempt_mut(assignment) else {
         return;
     };
     let before = evaluation.filled();
-    let filled = evaluation.fill(indices, solved);
+    evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
-    let point = evaluation.point;
-    if let Some(job) = state.jobs.get_mut(&job) {
+    if let Some(job) = state.jobs.get_mut(&assignment.job) {
         job.rate.add(news, now);
         job.progressed = now;
     }
-    state.changed.insert(job);
-    match filled {
-        Ok(()) => jobs::store_if_complete(state, job, effects),
-        Err(contradiction) => {
-            let failure = Failure::Contradiction { contradiction, point };
-            jobs::fail(state, job, &failure, now, effects);
-        }
-    }
+    state.changed.insert(assignment.job);
 }
 
 /// Learns from an answer how fast its worker is at its job.
@@ -135,8 +153,14 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let believed = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
     let rate = batch.assignment.indices.count as f64 / if believed { elapsed_s } else { waited_s };
-    if let Some(worker) = state.workers.get_mut(&batch.worker) {
-        let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
-        *known += RATE_WEIGHT * (rate - *known);
+    let Some(worker) = state.workers.get_mut(&batch.worker) else {
+        return;
+    };
+    let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
+    *known += RATE_WEIGHT * (rate - *known);
+    let seconds = batch.assignment.indices.count as f64 / rate;
+    let took = fairness::thread_time(seconds, worker.hello.threads);
+    if let Some(job) = state.jobs.get(&batch.assignment.job) {
+        state.shares.correct(&job.record.client, batch.charged, took);
     }
 }

@@ -1,22 +1,25 @@
 //! Who computes what next.
 //!
-//! Workers are served in the order of how little they hold, jobs in turn, batch by batch. A batch
+//! Workers are served in the order of how little they hold, clients in the order of how little
+//! computing time they have had, jobs of one client by priority and in turn, batch by batch. A batch
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
 //! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
 //! longest. While a realization waits to be computed alone, one worker is not refilled.
 
-use std::ops::Bound;
+use std::cmp::Reverse;
 use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::Effects;
+use super::{Effects, checks};
 use crate::effect::Effect;
 use crate::evaluation::Indices;
+use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Stage, State, Worker};
+use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Job, Purpose, Stage, State, Worker};
+use crate::store::JobRecord;
 
 /// Realizations for each thread in a worker's first batch of a job: enough to measure its rate,
 /// little enough to be soon answered.
@@ -30,29 +33,40 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     if state.draining {
         return;
     }
-    while let Some(worker) = next_worker(state) {
-        if !(hand_suspect(state, worker, now, effects) || hand_batch(state, worker, now, effects)) {
-            break;
-        }
-    }
+    while hand_one(state, now, effects) {}
     copy_slowest(state, now, effects);
 }
 
-/// The worker with credit that holds least; of equal ones the first.
-fn next_worker(state: &State) -> Option<WorkerId> {
+/// Gives the first worker that may have something what it may have; whether there is one.
+fn hand_one(state: &mut State, now: Duration, effects: &mut Effects) -> bool {
+    let mut free = free_workers(state);
+    if !checks::any_wait(state) {
+        // What one of them may not have, no other may.
+        free.truncate(1);
+    }
+    free.into_iter().any(|worker| {
+        hand_suspect(state, worker, now, effects)
+            || checks::hand_check(state, worker, now, effects)
+            || hand_batch(state, worker, now, effects)
+    })
+}
+
+/// The workers with credit, those that hold least first; of equal ones the first.
+fn free_workers(state: &State) -> Vec<WorkerId> {
     let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
     let free = state
         .workers
         .iter()
         .filter(|(_, worker)| !worker.draining && !worker.in_flight.iter().any(exclusive))
         .map(|(id, worker)| (worker.in_flight.len(), *id));
-    let mut least = free.clone().min()?;
+    let mut free: Vec<(usize, WorkerId)> = free.collect();
+    free.sort_unstable();
     // Suspects go to a worker that holds nothing: the next to be so is not refilled until then.
-    if least.0 > 0 && suspects_wait(state) {
-        least = free.filter(|worker| *worker != least).min()?;
+    if free.first().is_some_and(|least| least.0 > 0) && suspects_wait(state) {
+        free.remove(0);
     }
-    let (held, worker) = least;
-    (held < BATCHES_IN_FLIGHT_MAX).then_some(worker)
+    let free = free.into_iter().filter(|(held, _)| *held < BATCHES_IN_FLIGHT_MAX);
+    free.map(|(_, worker)| worker).collect()
 }
 
 /// Whether a realization that was alone on a lost worker is to be handed out.
@@ -73,11 +87,14 @@ fn hand_suspect(state: &mut State, worker: WorkerId, now: Duration, effects: &mu
         let Some(evaluation) = state.evaluation_mut(job) else {
             continue;
         };
-        let number = evaluation.number;
+        let round = evaluation.round;
         if let Some(index) = evaluation.quarantine.pop_front() {
             let indices = Indices { first: index, count: 1 };
-            let assignment = Assignment { job, evaluation: number, indices };
-            send(state, worker, assignment, None, true, now, effects);
+            let assignment = Assignment { job, round, indices };
+            let batch = send(state, worker, assignment, Purpose::Fill, now, effects);
+            if let Some(batch) = batch.and_then(|batch| state.batches.get_mut(&batch)) {
+                batch.exclusive = true;
+            }
             return true;
         }
     }
@@ -99,27 +116,54 @@ fn hand_batch(state: &mut State, worker: WorkerId, now: Duration, effects: &mut 
     let Some(evaluation) = state.evaluation_mut(job) else {
         return false;
     };
-    let number = evaluation.number;
+    let round = evaluation.round;
     let Some(indices) = evaluation.take(size) else {
         return false;
     };
     state.last_served = Some(job);
-    let assignment = Assignment { job, evaluation: number, indices };
-    send(state, worker, assignment, None, false, now, effects);
+    let assignment = Assignment { job, round, indices };
+    let batch = send(state, worker, assignment, Purpose::Fill, now, effects);
+    if let Some(batch) = batch {
+        charge(state, batch);
+    }
     true
 }
 
-/// The first active job with work after the one that was served last, in a circle.
+/// Of the active jobs with work: of the client that has had least computing time those with the
+/// highest priority, and of these the first after the one that was served last, in a circle.
 fn next_job(state: &State) -> Option<JobId> {
-    let has_work = |id: &&JobId| match state.jobs.get(id).map(|job| &job.stage) {
-        Some(Stage::Computing(evaluation)) => !evaluation.queue.is_empty(),
-        _ => false,
+    let with_work = state.active.iter().filter_map(|id| {
+        let job = state.jobs.get(id)?;
+        match &job.stage {
+            Stage::Computing(evaluation) if !evaluation.queue.is_empty() => Some((*id, job)),
+            _ => None,
+        }
+    });
+    let rank = |(id, job): (JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        let had = state.shares.used(client);
+        let served = state.last_served.is_some_and(|last| id <= last);
+        (had, client.clone(), Reverse(*priority), served, id)
     };
-    let after = match state.last_served {
-        Some(job) => (Bound::Excluded(job), Bound::Unbounded),
-        None => (Bound::Unbounded, Bound::Unbounded),
+    with_work.map(rank).min().map(|(.., id)| id)
+}
+
+/// Charges the client of a batch for the time that it will take, as far as that is known.
+fn charge(state: &mut State, id: BatchId) {
+    let target = state.config.batch_target.as_secs_f64();
+    let Some(batch) = state.batches.get_mut(&id) else {
+        return;
     };
-    state.active.range(after).find(has_work).or_else(|| state.active.iter().find(has_work)).copied()
+    let Some(worker) = state.workers.get(&batch.worker) else {
+        return;
+    };
+    let Some(job) = state.jobs.get(&batch.assignment.job) else {
+        return;
+    };
+    let count = batch.assignment.indices.count as f64;
+    let seconds = worker.rates.get(&batch.assignment.job).map_or(target, |rate| count / rate);
+    batch.charged = fairness::thread_time(seconds, worker.hello.threads);
+    state.shares.charge(&job.record.client, batch.charged);
 }
 
 /// Realizations of `job`, of which `queued` are left, that `attached` should get at once: what it
@@ -166,7 +210,12 @@ fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
         let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
             continue;
         };
-        send(state, worker, assignment, Some(slowest), false, now, effects);
+        let copy = send(state, worker, assignment, Purpose::Fill, now, effects);
+        for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
+            if let Some(batch) = one.and_then(|one| state.batches.get_mut(&one)) {
+                batch.twin = other;
+            }
+        }
     }
 }
 
@@ -174,6 +223,7 @@ fn slowest_elsewhere(state: &State, worker: WorkerId, now: Duration) -> Option<B
     let patience = state.config.batch_target / 2;
     let worth_a_copy = |batch: &Batch| {
         batch.worker != worker
+            && batch.purpose == Purpose::Fill
             && batch.twin.is_none()
             && !batch.exclusive
             && now.saturating_sub(batch.sent) >= patience
@@ -182,26 +232,31 @@ fn slowest_elsewhere(state: &State, worker: WorkerId, now: Duration) -> Option<B
     candidates.min_by_key(|(id, batch)| (batch.sent, **id)).map(|(id, _)| *id)
 }
 
-fn send(
+/// Sends a batch to a worker; its number, if its evaluation is under way.
+pub(super) fn send(
     state: &mut State,
     worker: WorkerId,
     assignment: Assignment,
-    twin: Option<BatchId>,
-    exclusive: bool,
+    purpose: Purpose,
     now: Duration,
     effects: &mut Effects,
-) {
-    let Some(work) = state.work(&assignment) else {
-        return;
-    };
+) -> Option<BatchId> {
+    let work = state.work(&assignment)?;
     let id = BatchId(state.next_batch);
     state.next_batch += 1;
-    state.batches.insert(id, Batch { assignment, worker, sent: now, twin, exclusive });
-    if let Some(twin) = twin.and_then(|twin| state.batches.get_mut(&twin)) {
-        twin.twin = Some(id);
-    }
+    let batch = Batch {
+        assignment,
+        purpose,
+        worker,
+        sent: now,
+        charged: Duration::ZERO,
+        twin: None,
+        exclusive: false,
+    };
+    state.batches.insert(id, batch);
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }
     effects.push(Effect::Send { worker, batch: id, work });
+    Some(id)
 }

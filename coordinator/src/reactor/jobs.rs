@@ -1,20 +1,21 @@
 //! A job's way from acceptance to its end.
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::Status;
 
-use super::{Effects, batches};
+use super::{Effects, batches, expulsion, reread};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Ending, Search, Step, Summary};
+use crate::search::{Ending, Step};
 use crate::snapshot;
-use crate::state::{Job, Stage, State, Trouble};
-use crate::store::{EndRecord, EvaluationRecord};
+use crate::state::{EndedJob, Job, Stage, State, Trouble};
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 
 /// A record is durable: the job goes on.
 pub(super) fn stored(
@@ -24,6 +25,10 @@ pub(super) fn stored(
     now: Duration,
     effects: &mut Effects,
 ) {
+    if let RecordKey::Expulsion(number) = key {
+        expulsion::stored(state, number, effects);
+        return;
+    }
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
@@ -35,14 +40,24 @@ pub(super) fn stored(
             for token in std::mem::take(&mut job.tokens) {
                 effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
             }
-            begin_waiting(state, now, effects);
-        }
-        (RecordKey::Evaluation(number), Stage::Storing(record)) if record.number == number => {
-            if let Some(search) = &mut job.search {
-                search.tell(record.outcomes.clone(), record.estimated_error);
+            let client = job.record.client.clone();
+            if has_room(state, &client) {
+                begin_waiting(state, now, effects);
             }
+        }
+        (RecordKey::Evaluation(number), Stage::Storing { record, is_last })
+            if record.number == number =>
+        {
+            let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
+            job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+            job.workers.append(&mut record.workers);
             job.trouble = None;
-            advance(state, id, now, effects);
+            job.search.tell(outcomes, estimated_error);
+            if job.rewind {
+                reread::rewind(state, id, now, effects);
+            } else {
+                advance(state, id, now, effects);
+            }
         }
         (RecordKey::End, Stage::Finishing(_)) => ended(state, id, now, effects),
         // A report of a write that was repeated meanwhile.
@@ -61,6 +76,10 @@ pub(super) fn store_failed(
     now: Duration,
     effects: &mut Effects,
 ) {
+    if let RecordKey::Expulsion(number) = key {
+        expulsion::store_failed(state, number, error, now, effects);
+        return;
+    }
     let retry_at = now + state.config.store_retry;
     let Some(job) = state.jobs.get_mut(&id).filter(|job| job.awaits() == Some(key)) else {
         return;
@@ -77,37 +96,62 @@ pub(super) fn store_failed(
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
     job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
     state.changed.insert(id);
+    despair_if_late(state, since, error, now, effects);
+}
+
+/// Says that the store takes or gives nothing any more, once it has refused for too long.
+pub(super) fn despair_if_late(
+    state: &State,
+    since: Duration,
+    error: String,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let waited = now.saturating_sub(since);
     if state.config.store_patience.is_some_and(|patience| waited >= patience) {
         effects.push(Effect::Despair { error, waited });
     }
 }
 
-/// Writes the present record of a job again.
+/// Writes the present record of a job again, or asks again for the one it reads.
 pub(super) fn store_again(job: &mut Job, effects: &mut Effects) {
-    let record = match &job.stage {
-        Stage::Storing(record) => Record::Evaluation(record.clone()),
-        Stage::Finishing(end) => Record::End { end: end.clone(), summary: job.summary() },
-        Stage::Accepting | Stage::Waiting | Stage::Computing(_) | Stage::Ended(_) => return,
-    };
-    effects.push(Effect::Store(record));
+    effects.push(match &job.stage {
+        Stage::Storing { record, is_last } => {
+            let record = record.clone();
+            Effect::Store(Record::Evaluation { record, is_last: *is_last })
+        }
+        Stage::Finishing(end) => {
+            let summary = Arc::new(job.search.summary());
+            Effect::Store(Record::End { end: end.clone(), summary })
+        }
+        Stage::Rereading { asked: true } => {
+            Effect::Read { job: job.record.job, number: job.search.evaluations() }
+        }
+        Stage::Accepting
+        | Stage::Waiting
+        | Stage::Rereading { asked: false }
+        | Stage::Computing(_) => return,
+    });
 }
 
-/// Stores the evaluation of a job once it is complete.
+/// Stores the evaluation of a job once it is complete and checked.
 pub(super) fn store_if_complete(state: &mut State, id: JobId, effects: &mut Effects) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let Stage::Computing(evaluation) = &job.stage else {
+    let Stage::Computing(evaluation) = &mut job.stage else {
         return;
     };
     let Some((outcomes, estimated_error)) = evaluation.complete() else {
         return;
     };
     let (number, point) = (evaluation.number, evaluation.point);
-    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error };
-    effects.push(Effect::Store(Record::Evaluation(record.clone())));
-    job.stage = Stage::Storing(record);
+    // Only what was there and is the same leaves the path behind it as it was.
+    let is_last = evaluation.changes(&outcomes);
+    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
+    effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    job.stage = Stage::Storing { record, is_last };
 }
 
 /// Ends a job because of `failure`.
@@ -128,41 +172,79 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
         return;
     };
     job.cancelled = true;
-    if matches!(job.stage, Stage::Waiting | Stage::Computing(_)) {
-        finish(state, id, cancelled(), now, effects);
+    match job.stage {
+        Stage::Waiting if job.stored > 0 => {
+            // What it leaves is in the store: nothing of it is computed, it waits for nobody.
+            begin(state, id, now, effects);
+        }
+        Stage::Waiting | Stage::Computing(_) => finish(state, id, cancelled(), now, effects),
+        Stage::Accepting
+        | Stage::Rereading { .. }
+        | Stage::Storing { .. }
+        | Stage::Finishing(_) => {}
     }
 }
 
-/// Begins waiting jobs, oldest first, while there is room.
+/// Begins waiting jobs while there is room: of the clients with the fewest active jobs, the
+/// highest priority first, of equal ones the oldest. A client without any active job finds room
+/// beyond the usual, so that no other client keeps it waiting.
 pub(super) fn begin_waiting(state: &mut State, now: Duration, effects: &mut Effects) {
-    while state.active.len() < state.config.active_jobs_max && !state.draining {
-        let Some(id) = state.waiting.pop_front() else {
+    while !state.waiting.is_empty() && !state.draining {
+        let Some((id, client)) = next_waiting(state) else {
             return;
         };
-        let Some(job) = state.jobs.get_mut(&id) else {
-            continue;
-        };
+        if !has_room(state, &client) {
+            return;
+        }
+        begin(state, id, now, effects);
+    }
+}
+
+/// Whether a job of `client` may begin.
+fn has_room(state: &State, client: &str) -> bool {
+    let most = state.config.active_jobs_max;
+    let active = state.active.len();
+    active < most || (active < 2 * most && state.shares.jobs(client) == 0)
+}
+
+/// The job that begins next, with its client.
+fn next_waiting(state: &State) -> Option<(JobId, String)> {
+    let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
+    let rank = |(id, job): &(JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        (state.shares.jobs(client), Reverse(*priority), *id)
+    };
+    waiting.min_by_key(rank).map(|(id, job)| (id, job.record.client.clone()))
+}
+
+/// Begins a waiting job.
+fn begin(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    state.waiting.retain(|waiting| *waiting != id);
+    if let Some(job) = state.jobs.get_mut(&id) {
         job.progressed = now;
+        state.shares.begin(&job.record.client);
         state.active.insert(id);
         advance(state, id, now, effects);
     }
 }
 
-/// Goes where the search wants to go.
-fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+/// Goes where the search wants to go, after it was told what the store has.
+pub(super) fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    let round = state.round();
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let Some(search) = &job.search else {
+    state.changed.insert(id);
+    if job.search.evaluations() < job.stored {
+        reread::read_next(state, id, effects);
         return;
-    };
-    let ending = match search.ask() {
+    }
+    let ending = match job.search.ask() {
         Step::Evaluate(_) if job.cancelled => cancelled(),
         Step::Evaluate(point) => {
             let realizations = job.record.specification.monte_carlo.realizations;
-            let evaluation = Evaluation::new(search.evaluations(), point, realizations);
+            let evaluation = Evaluation::new(job.search.evaluations(), round, point, realizations);
             job.stage = Stage::Computing(evaluation);
-            state.changed.insert(id);
             return;
         }
         Step::Done(ending) => ending,
@@ -171,12 +253,19 @@ fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 }
 
 /// Stores the end of a job; the world hears of it when it is durable.
-fn finish(state: &mut State, id: JobId, ending: Ending, now: Duration, effects: &mut Effects) {
+pub(super) fn finish(
+    state: &mut State,
+    id: JobId,
+    ending: Ending,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let record = job.end(ending, now);
-    let summary = job.summary();
+    let (search, best) = (&job.search, job.search.best());
+    let record = EndRecord::new(id, ending, now, search.evaluations(), best);
+    let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
     leave(state, id, now, effects);
@@ -184,11 +273,13 @@ fn finish(state: &mut State, id: JobId, ending: Ending, now: Duration, effects: 
 
 /// Takes a job out of everything that concerns jobs under way.
 fn leave(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    state.active.remove(&id);
+    if state.active.remove(&id)
+        && let Some(job) = state.jobs.get(&id)
+    {
+        state.shares.end(&job.record.client);
+    }
     state.waiting.retain(|waiting| *waiting != id);
     state.changed.insert(id);
-    // Those that wait are one nearer to their turn.
-    state.changed.extend(&state.waiting);
     batches::revoke_all(state, id, now, effects);
     for worker in state.workers.values_mut() {
         worker.rates.remove(&id);
@@ -198,23 +289,21 @@ fn leave(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 
 /// The end of a job is durable.
 fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    let Some(job) = state.jobs.get_mut(&id) else {
+    let Some(Job { record, stage: Stage::Finishing(end), tokens, sequence, .. }) =
+        state.jobs.remove(&id)
+    else {
         return;
     };
-    if let Stage::Finishing(record) = &job.stage {
-        job.stage = Stage::Ended(record.clone());
-        state.ended += 1;
-        job.search = None;
-        job.trouble = None;
-    }
-    for token in std::mem::take(&mut job.tokens) {
+    state.ended.insert(id, EndedJob::new(&record, end, sequence));
+    for token in tokens {
         if let Some(snapshot) = snapshot::of(state, id, now) {
             effects.push(Effect::Answer { token, answer: Answer::Snapshot(snapshot) });
         }
     }
 }
 
-fn cancelled() -> Ending {
+/// The end of a job whose client does not want it any more.
+pub(super) fn cancelled() -> Ending {
     Ending { status: Status::Cancelled, reason: None }
 }
 
@@ -223,21 +312,9 @@ impl Job {
     fn awaits(&self) -> Option<RecordKey> {
         match &self.stage {
             Stage::Accepting => Some(RecordKey::Job),
-            Stage::Storing(record) => Some(RecordKey::Evaluation(record.number)),
+            Stage::Storing { record, .. } => Some(RecordKey::Evaluation(record.number)),
             Stage::Finishing(_) => Some(RecordKey::End),
-            Stage::Waiting | Stage::Computing(_) | Stage::Ended(_) => None,
+            Stage::Waiting | Stage::Rereading { .. } | Stage::Computing(_) => None,
         }
-    }
-
-    /// What its path has come to.
-    fn summary(&self) -> Arc<Summary> {
-        Arc::new(self.search.as_ref().map_or_else(Summary::empty, Search::summary))
-    }
-
-    /// The record of the job's end.
-    fn end(&self, ending: Ending, now: Duration) -> EndRecord {
-        let search = self.search.as_ref();
-        let best = search.and_then(Search::best);
-        EndRecord::new(self.record.job, ending, now, search.map_or(0, Search::evaluations), best)
     }
 }

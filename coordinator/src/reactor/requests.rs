@@ -8,14 +8,16 @@ use osteon_common::job::JobSpecification;
 use osteon_common::limits::JOBS_MAX;
 use osteon_common::version;
 
-use super::{Effects, jobs};
+use super::{Effects, jobs, prune};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::Request;
 use crate::ids::{JobId, Token};
-use crate::search::Search;
 use crate::snapshot;
-use crate::state::{Job, Stage, State};
+use crate::state::{Job, Stage, State, identity};
 use crate::store::JobRecord;
+
+/// Most expelled workers that are shown.
+const EXPELLED_SHOWN_MAX: usize = 1000;
 
 pub(super) fn requested(
     state: &mut State,
@@ -25,8 +27,9 @@ pub(super) fn requested(
     effects: &mut Effects,
 ) {
     let answer = match request {
-        Request::Submit { specification, request_id } => {
-            match submit(state, token, specification, request_id, now, effects) {
+        Request::Submit { specification, request_id, client, priority } => {
+            let submission = Submission { specification, request_id, client, priority };
+            match submit(state, token, submission, now, effects) {
                 Ok(answer) => answer,
                 Err(refusal) => Some(Answer::Refused(refusal)),
             }
@@ -35,21 +38,34 @@ pub(super) fn requested(
         Request::List { after, limit } => Some(list(state, after, limit, now)),
         Request::Cancel(job) => cancel(state, token, job, now, effects),
         Request::Fetch(job) => Some(fetch(state, job)),
+        Request::Expelled => Some(expelled(state, now)),
+        Request::Prune(retention) => {
+            prune::requested(state, token, retention, now, effects);
+            None
+        }
     };
     if let Some(answer) = answer {
         effects.push(Effect::Answer { token, answer });
     }
 }
 
+/// A job that a client wants computed.
+struct Submission {
+    specification: Arc<JobSpecification>,
+    request_id: String,
+    client: String,
+    priority: u32,
+}
+
 /// Accepts a job; the answer comes when it is durable.
 fn submit(
     state: &mut State,
     token: Token,
-    specification: Arc<JobSpecification>,
-    request_id: String,
+    submission: Submission,
     now: Duration,
     effects: &mut Effects,
 ) -> Result<Option<Answer>, Refusal> {
+    let Submission { specification, request_id, client, priority } = submission;
     if state.draining {
         return Err(Refusal::Draining);
     }
@@ -64,11 +80,12 @@ fn submit(
     if !request_id.is_empty() {
         state.requests.insert(request_id.clone(), id);
     }
-    let search = Search::new(specification.clone());
     let fingerprint = version::fingerprint();
-    let record = JobRecord { job: id, request_id, specification, accepted: now, fingerprint };
+    let accepted = now;
+    let record =
+        JobRecord { job: id, request_id, specification, accepted, fingerprint, client, priority };
     effects.push(Effect::Store(Record::Job(record.clone())));
-    let mut job = Job::new(record, Stage::Accepting, Some(search), now);
+    let mut job = Job::new(record, Stage::Accepting, 0, now);
     job.tokens.push(token);
     state.jobs.insert(id, job);
     Ok(None)
@@ -81,10 +98,12 @@ fn resubmit(
     specification: &JobSpecification,
     request_id: String,
 ) -> Result<Option<Answer>, Refusal> {
+    let ended = state.ended.get(&id).map(|ended| ended.identity);
+    let known = ended.or_else(|| Some(state.jobs.get(&id)?.identity));
+    if known != Some(identity(specification)) {
+        return Err(Refusal::RequestIdTaken { request_id, job: id });
+    }
     match state.jobs.get_mut(&id) {
-        Some(job) if *job.record.specification != *specification => {
-            Err(Refusal::RequestIdTaken { request_id, job: id })
-        }
         Some(job) if matches!(job.stage, Stage::Accepting) => {
             job.tokens.push(token);
             Ok(None)
@@ -99,10 +118,11 @@ fn get(state: &State, job: JobId, now: Duration) -> Answer {
 
 fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Answer {
     let from = after.map_or(Bound::Unbounded, Bound::Excluded);
-    let mut listed = state
-        .jobs
-        .range((from, Bound::Unbounded))
-        .filter_map(|(id, _)| Some((*id, snapshot::of(state, *id, now)?)));
+    let range = (from, Bound::Unbounded);
+    let mut ids: Vec<JobId> = state.ended.range(range).map(|(id, _)| *id).take(limit + 1).collect();
+    ids.extend(state.jobs.range(range).map(|(id, _)| *id));
+    ids.sort_unstable();
+    let mut listed = ids.into_iter().filter_map(|id| Some((id, snapshot::of(state, id, now)?)));
     let page: Vec<_> = listed.by_ref().take(limit).collect();
     let more_after = listed.next().and_then(|_| page.last().map(|(id, _)| *id));
     Answer::Page { snapshots: page.into_iter().map(|(_, snapshot)| snapshot).collect(), more_after }
@@ -117,25 +137,31 @@ fn cancel(
     effects: &mut Effects,
 ) -> Option<Answer> {
     match state.jobs.get_mut(&id) {
-        None => Some(Answer::Refused(Refusal::NoJob { job: id })),
-        Some(job) => match &job.stage {
-            Stage::Accepting => Some(Answer::Refused(Refusal::NoJob { job: id })),
-            Stage::Ended(_) => Some(get(state, id, now)),
-            Stage::Waiting | Stage::Computing(_) | Stage::Storing(_) | Stage::Finishing(_) => {
-                job.tokens.push(token);
-                jobs::cancel(state, id, now, effects);
-                None
-            }
-        },
+        Some(job) if !matches!(job.stage, Stage::Accepting) => {
+            job.tokens.push(token);
+            jobs::cancel(state, id, now, effects);
+            None
+        }
+        _ => Some(get(state, id, now)),
     }
 }
 
 fn fetch(state: &State, id: JobId) -> Answer {
-    match state.jobs.get(&id).map(|job| (&job.record, &job.stage)) {
-        None | Some((_, Stage::Accepting)) => Answer::Refused(Refusal::NoJob { job: id }),
-        Some((record, Stage::Ended(end))) => {
-            Answer::Ended { record: record.clone(), end: end.clone() }
-        }
+    if let Some(ended) = state.ended.get(&id) {
+        return Answer::Ended(ended.end.clone());
+    }
+    match state.jobs.get(&id).map(|job| &job.stage) {
+        None | Some(Stage::Accepting) => Answer::Refused(Refusal::NoJob { job: id }),
         Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
     }
+}
+
+fn expelled(state: &State, now: Duration) -> Answer {
+    let newest = state.expelled.len().saturating_sub(EXPELLED_SHOWN_MAX);
+    let shown = state
+        .expelled
+        .iter()
+        .skip(newest)
+        .map(|expelled| (expelled.record.clone(), now.saturating_sub(expelled.record.at)));
+    Answer::Expelled(shown.collect())
 }

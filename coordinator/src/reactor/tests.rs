@@ -16,9 +16,13 @@ use crate::event::{Hello, RecordKey, Request};
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::sanity::sanity_check;
 
+mod checks;
 mod dispatch;
+mod fairness;
 mod jobs;
 mod lost;
+mod prune;
+mod reread;
 mod workers;
 
 /// A coordinator with a clock that the test moves.
@@ -107,6 +111,8 @@ fn submit(token: u64, request_id: &str, specification: JobSpecification) -> Even
     let request = Request::Submit {
         specification: Arc::new(specification),
         request_id: request_id.to_owned(),
+        client: String::new(),
+        priority: 0,
     };
     Event::Requested { token: Token(token), request }
 }
@@ -120,12 +126,17 @@ fn stored(job: u64, key: RecordKey) -> Event {
 }
 
 fn hello(worker: u64, threads: u32) -> Event {
+    hello_of(worker, 42, threads)
+}
+
+/// A worker that runs in `process`.
+fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
     let hello = Hello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
         threads,
         host: "node".to_owned(),
-        process: 42,
+        process,
     };
     Event::Hello { worker: WorkerId(worker), hello }
 }
@@ -159,8 +170,15 @@ fn described(effect: &Effect) -> String {
         Effect::Heartbeat { worker } => format!("beat {worker}"),
         Effect::Close { worker, reason } => format!("close {worker}: {reason}"),
         Effect::Store(Record::Job(record)) => format!("store job {}", record.job),
-        Effect::Store(Record::Evaluation(record)) => {
+        Effect::Store(Record::Evaluation { record, .. }) => {
             format!("store job {} evaluation {}", record.job, record.number)
+        }
+        Effect::Store(Record::Expulsion(record)) => {
+            format!("store expulsion {}: {} {}", record.number, record.worker, record.reason)
+        }
+        Effect::Read { job, number } => format!("read job {job} evaluation {number}"),
+        Effect::Prune { jobs, .. } => {
+            format!("prune {}", jobs.iter().map(JobId::to_string).collect::<Vec<_>>().join(" "))
         }
         Effect::Store(Record::End { end, .. }) => {
             let reason = end.ending.reason.as_deref().unwrap_or_default();
@@ -183,7 +201,9 @@ fn answered(answer: &Answer) -> String {
             let jobs: Vec<&str> = snapshots.iter().map(|snapshot| snapshot.job.as_str()).collect();
             format!("{jobs:?}, more after {more_after:?}")
         }
-        Answer::Ended { record, .. } => format!("ended {}", record.job),
+        Answer::Ended(end) => format!("ended {}", end.job),
+        Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
+        Answer::Expelled(expelled) => format!("expelled {}", expelled.len()),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }

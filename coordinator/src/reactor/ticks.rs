@@ -2,20 +2,23 @@
 
 use std::time::Duration;
 
-use super::{Effects, jobs, workers};
+use super::{Effects, checks, expulsion, jobs, prune, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
-use crate::state::{State, Worker};
+use crate::state::{State, Worker, sequence};
 
-/// Active jobs are published this often even if nothing about them changed but time.
+/// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     expire(state, now, effects);
     beat(state, now, effects);
+    checks::give_up(state, now, effects);
     if !state.draining {
         store_again(state, now, effects);
+        expulsion::store_again(state, now, effects);
+        prune::tick(state, now, effects);
     }
     publish(state, now, effects);
 }
@@ -70,9 +73,13 @@ fn publish(state: &mut State, now: Duration, effects: &mut Effects) {
     if now.saturating_sub(state.published) >= PUBLISH_EVERY {
         state.published = now;
         state.changed.extend(&state.active);
+        state.changed.extend(&state.waiting);
     }
     let changed: Vec<JobId> = std::mem::take(&mut state.changed).into_iter().collect();
     for job in changed {
+        if let Some(job) = state.jobs.get_mut(&job) {
+            job.sequence = sequence(job.sequence, now);
+        }
         if let Some(snapshot) = snapshot::of(state, job, now) {
             effects.push(Effect::Publish { job, snapshot });
         }

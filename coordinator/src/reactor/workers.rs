@@ -11,6 +11,7 @@ use crate::effect::{CloseReason, Effect};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
 use crate::state::{State, Worker};
+use crate::worker_name::WorkerName;
 
 pub(super) fn hello(
     state: &mut State,
@@ -33,6 +34,7 @@ pub(super) fn hello(
         worker,
         Worker {
             lease,
+            name: WorkerName::new(&hello.host, hello.process),
             hello,
             heard: now,
             answered: now,
@@ -93,6 +95,8 @@ pub(super) fn lost(state: &mut State, worker: WorkerId, now: Duration, effects: 
     if state.workers.is_empty() {
         state.no_worker_since = now;
     }
+    tracing::info!(%worker, name = %gone.name, batches = gone.in_flight.len(),
+        "a worker is gone; what it held goes to others");
     let alone = gone.in_flight.len() == 1;
     for batch in gone.in_flight {
         batches::orphaned(state, batch, alone, gone.draining, now, effects);
@@ -117,6 +121,7 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     let longest =
         [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
     let bytes = longest.unwrap_or(0);
+    let expulsion = state.expulsion(&WorkerName::new(&hello.host, hello.process));
     if state.draining {
         Err(CloseReason::Draining)
     } else if bytes > NAME_BYTES_MAX {
@@ -124,6 +129,8 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     } else if hello.fingerprint != coordinator {
         let worker = hello.fingerprint.clone();
         Err(CloseReason::FingerprintDiffers { worker, coordinator })
+    } else if let Some(expulsion) = expulsion {
+        Err(CloseReason::Expelled { reason: expulsion.reason.clone() })
     } else if hello.threads == 0 || hello.threads > WORKER_THREADS_MAX {
         Err(CloseReason::Threads { threads: hello.threads, max: WORKER_THREADS_MAX })
     } else if state.workers.len() >= WORKERS_MAX {

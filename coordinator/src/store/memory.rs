@@ -1,12 +1,14 @@
 //! A store that lasts as long as its handles: for runs that keep nothing, and for tests.
 
-use std::collections::BTreeMap;
-use std::ops::ControlFlow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
+use super::{
+    EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
+};
 use crate::ids::JobId;
 use crate::search::Summary;
+use crate::worker_name::WorkerName;
 
 /// A store in memory. Clones share their content, as two openings of one file would.
 #[derive(Debug, Clone, Default)]
@@ -17,6 +19,7 @@ struct Content {
     jobs: BTreeMap<JobId, StoredJob>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
     summaries: BTreeMap<JobId, Summary>,
+    expulsions: BTreeMap<u64, ExpulsionRecord>,
 }
 
 impl MemoryStore {
@@ -32,23 +35,25 @@ impl MemoryStore {
 }
 
 impl Store for MemoryStore {
-    fn jobs(&mut self) -> Result<Vec<StoredJob>, StoreError> {
-        Ok(self.content().jobs.values().cloned().collect())
-    }
-
-    fn evaluations(
-        &mut self,
-        job: JobId,
-        first: u64,
-        visit: &mut dyn FnMut(EvaluationRecord) -> ControlFlow<()>,
-    ) -> Result<(), StoreError> {
+    fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         let content = self.content();
-        for (_, record) in content.evaluations.range((job, first)..=(job, u64::MAX)) {
-            if visit(record.clone()).is_break() {
-                break;
-            }
+        for (&id, job) in &content.jobs {
+            let evaluations = content.evaluations.range((id, 0)..=(id, u64::MAX)).count() as u64;
+            visit(StoredJob { evaluations, ..job.clone() });
         }
         Ok(())
+    }
+
+    fn job(&mut self, job: JobId) -> Result<Option<JobRecord>, StoreError> {
+        Ok(self.content().jobs.get(&job).map(|job| job.record.clone()))
+    }
+
+    fn evaluation(
+        &mut self,
+        job: JobId,
+        number: u64,
+    ) -> Result<Option<EvaluationRecord>, StoreError> {
+        Ok(self.content().evaluations.get(&(job, number)).cloned())
     }
 
     fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
@@ -61,13 +66,22 @@ impl Store for MemoryStore {
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
-        let stored = StoredJob { record: record.clone(), end: None };
+        let stored = StoredJob { record: record.clone(), end: None, evaluations: 0 };
         self.content().jobs.entry(record.job).or_insert(stored);
         Ok(())
     }
 
-    fn put_evaluation(&mut self, record: &EvaluationRecord) -> Result<(), StoreError> {
-        self.content().evaluations.insert((record.job, record.number), record.clone());
+    fn put_evaluation(
+        &mut self,
+        record: &EvaluationRecord,
+        is_last: bool,
+    ) -> Result<(), StoreError> {
+        let mut content = self.content();
+        let EvaluationRecord { job, number: last, .. } = *record;
+        content.evaluations.insert((job, last), record.clone());
+        if is_last {
+            content.evaluations.retain(|(of, number), _| *of != job || *number <= last);
+        }
         Ok(())
     }
 
@@ -82,5 +96,35 @@ impl Store for MemoryStore {
 
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
         Ok(self.content().summaries.get(&job).cloned())
+    }
+
+    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        let mut content = self.content();
+        content.jobs.retain(|job, _| !jobs.contains(job));
+        content.summaries.retain(|job, _| !jobs.contains(job));
+        content.evaluations.retain(|(job, _), _| !jobs.contains(job));
+        Ok(())
+    }
+
+    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
+        self.content().expulsions.insert(record.number, record.clone());
+        Ok(())
+    }
+
+    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
+        Ok(self.content().expulsions.values().cloned().collect())
+    }
+
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        let content = self.content();
+        let of_worker = content.evaluations.values().filter(|it| it.workers.contains(worker));
+        let jobs: BTreeSet<JobId> = of_worker.map(|evaluation| evaluation.job).collect();
+        let ended = |job: &JobId| content.jobs.get(job).is_some_and(|job| job.end.is_some());
+        Ok(jobs.into_iter().filter(ended).collect())
+    }
+
+    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
+        self.content().expulsions.clear();
+        Ok(())
     }
 }

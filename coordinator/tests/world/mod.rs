@@ -1,6 +1,6 @@
 //! The world around a simulated coordinator.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,16 +11,18 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::reactor::{RestoredJob, react};
+use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::sanity::sanity_check;
 use osteon_coordinator::state::{BATCHES_IN_FLIGHT_MAX, State};
 use osteon_coordinator::store::memory::MemoryStore;
-use osteon_coordinator::store::{Store, StoredJob};
+use osteon_coordinator::store::{EndRecord, Store};
 use osteon_proto::batch::Work;
 
 use crate::fake;
 
 mod check;
+mod disk;
+mod liars;
 
 const TICK: Duration = Duration::from_millis(100);
 /// No schedule takes longer than this, in its own time.
@@ -45,6 +47,22 @@ pub(crate) struct Counts {
     pub(crate) exposed: u64,
     /// Times without any write.
     pub(crate) outages: u64,
+    /// Batches of which somebody has answered every realization before.
+    pub(crate) checked: u64,
+    /// Wrong answers.
+    pub(crate) lies: u64,
+    /// Workers expelled.
+    pub(crate) expelled: u64,
+    /// Stored evaluations that were replaced by others.
+    pub(crate) replaced: u64,
+    /// Stored evaluations that were computed again and found the same.
+    pub(crate) confirmed: u64,
+    /// Restarts with expelled workers in the store.
+    pub(crate) remembered: u64,
+    /// Jobs that ended right although somebody had lied in them.
+    pub(crate) repaired: u64,
+    /// Jobs forgotten.
+    pub(crate) pruned: u64,
 }
 
 impl Counts {
@@ -59,6 +77,14 @@ impl Counts {
         self.cancelled += other.cancelled;
         self.exposed += other.exposed;
         self.outages += other.outages;
+        self.checked += other.checked;
+        self.lies += other.lies;
+        self.expelled += other.expelled;
+        self.replaced += other.replaced;
+        self.confirmed += other.confirmed;
+        self.remembered += other.remembered;
+        self.repaired += other.repaired;
+        self.pruned += other.pruned;
     }
 }
 
@@ -77,6 +103,12 @@ enum Happening {
     Break(WorkerId),
     /// A record reaches the disk, or does not.
     Write(Record),
+    /// An evaluation is read.
+    Read(JobId, u64),
+    /// Ended jobs are forgotten.
+    Forget(Option<Token>, Vec<JobId>),
+    /// Somebody wants ended jobs forgotten.
+    Prune,
     /// A report of the store arrives.
     Report(Event),
     /// The coordinator is killed and starts again.
@@ -95,10 +127,13 @@ struct Client {
     cancels: bool,
     /// It has not heard yet that its job has ended.
     wants_end: bool,
+    /// Its job has ended, was looked at, and is forgotten.
+    pruned: bool,
 }
 
 #[derive(Default)]
 struct Worker {
+    process: u32,
     /// It computes nothing and says nothing, but its stream stands.
     stalled: bool,
     heard: Duration,
@@ -117,10 +152,19 @@ pub(crate) struct World {
     cancellations: BTreeMap<Token, usize>,
     /// When the store takes nothing.
     outage: Range<Duration>,
-    /// Workers lie now and then.
-    liars: bool,
-    /// One has.
-    lied: bool,
+    /// Processes that lie now and then, some of them on second thoughts only.
+    liars: BTreeSet<u32>,
+    /// Who has lied about realizations of which seed.
+    lies: BTreeSet<(u32, u64)>,
+    /// Who is expelled.
+    expelled: BTreeSet<u32>,
+    /// Seed, point and indices of batches that were answered in this life of the coordinator.
+    answered_batches: BTreeSet<(u64, u64, u64, u32)>,
+    /// Jobs that end while somebody who lied in them is not found out.
+    deceived: BTreeSet<JobId>,
+    /// The last decision on the end of each job.
+    ends: BTreeMap<JobId, EndRecord>,
+    processes: u32,
     workers: BTreeMap<WorkerId, Worker>,
     lost_alone: BTreeMap<(u64, u64), u32>,
     number: u64,
@@ -154,6 +198,7 @@ impl World {
             active_jobs_max: 1 + draw(2) as usize,
             batch_target: Duration::from_millis(10 + draw(200)),
             store_retry: Duration::from_millis(300),
+            audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
             ..Config::default()
         };
         let clients = clients(seed, &mut draw);
@@ -165,7 +210,8 @@ impl World {
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
-        let liars = draw(8) == 0;
+        let liars = liars::some(&mut draw);
+        let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,
             now: Duration::ZERO,
@@ -179,7 +225,12 @@ impl World {
             counts: Counts { outages: u64::from(!outage.is_empty()), ..Counts::default() },
             outage,
             liars,
-            lied: false,
+            lies: BTreeSet::new(),
+            expelled: BTreeSet::new(),
+            answered_batches: BTreeSet::new(),
+            deceived: BTreeSet::new(),
+            ends: BTreeMap::new(),
+            processes: 0,
             workers: BTreeMap::new(),
             lost_alone: BTreeMap::new(),
             number: 1,
@@ -199,6 +250,9 @@ impl World {
         }
         if let Some(at) = drain {
             world.after(at, Happening::Drain);
+        }
+        if let Some(at) = prune {
+            world.after(at, Happening::Prune);
         }
         world
     }
@@ -224,12 +278,13 @@ impl World {
     }
 
     fn done(&self) -> bool {
-        let stored = self.store.clone().jobs().unwrap();
-        let ended = |client: &Client| {
-            let of_client = |job: &&StoredJob| Some(job.record.job) == client.job;
-            stored.iter().find(of_client).is_some_and(|job| job.end.is_some())
-        };
-        self.clients.iter().all(ended) && self.state.is_idle()
+        let heard = |client: &Client| client.pruned || client.job.is_some();
+        if !self.state.is_idle() || !self.clients.iter().all(heard) {
+            return false;
+        }
+        let jobs = self.store.clone().jobs().unwrap();
+        let on_its_way = |happening: &Happening| matches!(happening, Happening::Forget(..));
+        jobs.iter().all(|job| job.end.is_some()) && !self.agenda.values().any(on_its_way)
     }
 
     fn happen(&mut self, happening: Happening) {
@@ -260,6 +315,9 @@ impl World {
             Happening::Drain => self.react(Event::Drain),
             Happening::Lie(worker, batch, work) => self.lie(worker, batch, &work),
             Happening::Cancel(client) => self.cancel(client),
+            Happening::Read(job, number) => self.read(job, number),
+            Happening::Forget(token, jobs) => self.forget(token, jobs),
+            Happening::Prune => self.prune(),
         }
     }
 
@@ -288,7 +346,7 @@ impl World {
         let known = &self.workers[&worker];
         let holds: Vec<_> = known.holds.iter().map(|(batch, work)| (*batch, *work)).collect();
         for (batch, work) in holds {
-            let answer = answer(worker, batch, &work);
+            let answer = self.answer(worker, batch, &work);
             self.within(50, Happening::Message(worker, answer));
         }
     }
@@ -301,6 +359,8 @@ impl World {
             let request = Request::Submit {
                 specification: specification.clone(),
                 request_id: request_id.clone(),
+                client: format!("client {}", client % 2),
+                priority: client as u32,
             };
             // Until it hears of acceptance, a client asks again.
             self.react(Event::Requested { token, request });
@@ -315,9 +375,10 @@ impl World {
             fingerprint: version::fingerprint(),
             threads: 1 + self.draw(4) as u32,
             host: "simulated".to_owned(),
-            process: 1,
+            process: self.process(),
         };
-        self.workers.insert(worker, Worker { heard: self.now, ..Worker::default() });
+        let process = hello.process;
+        self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
     }
 
@@ -327,14 +388,14 @@ impl World {
             let held = known.holds.get(batch).copied();
             let malformed = held.is_some_and(|work| solved.len() != work.count as usize);
             if malformed && !self.may_die(worker) {
-                let answer = answer(worker, *batch, &held.unwrap());
+                let answer = self.answer(worker, *batch, &held.unwrap());
                 self.message(worker, answer);
                 return;
             }
             self.counts.late += u64::from(held.is_none());
             let known = self.workers.get_mut(&worker).unwrap();
-            if !malformed {
-                known.holds.remove(batch);
+            if !malformed && let Some(work) = known.holds.remove(batch) {
+                self.answered_batches.insert(key(&work));
             }
         }
         self.workers.get_mut(&worker).unwrap().heard = self.now;
@@ -361,18 +422,6 @@ impl World {
         self.within(500, Happening::Arrive);
     }
 
-    fn write(&mut self, record: &Record) {
-        let (job, key) = record.key();
-        let event = if self.draw(30) == 0 || self.outage.contains(&self.now) {
-            self.counts.refusals += 1;
-            Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
-        } else {
-            put(&mut self.store, record);
-            Event::Stored { job, key }
-        };
-        self.within(5, Happening::Report(event));
-    }
-
     /// The coordinator has stopped by itself, and starts again.
     fn stopped(&mut self) {
         self.counts.stops += 1;
@@ -396,16 +445,6 @@ impl World {
         self.within(2000, Happening::Cancel(client));
     }
 
-    fn lie(&mut self, worker: WorkerId, batch: BatchId, work: &Work) {
-        let speaks = |worker: &Worker| !worker.stalled && !worker.holds.contains_key(&batch);
-        if self.workers.get(&worker).is_some_and(speaks) {
-            let mut solved = fake::solved(work);
-            solved[0].outcome = Ok(1.0);
-            self.lied = true;
-            self.message(worker, Event::Answered { worker, batch, solved, elapsed_s: 0.01 });
-        }
-    }
-
     /// Kills the coordinator: what was on its way to the disk may or may not have reached it.
     fn restart(&mut self) {
         let agenda = std::mem::take(&mut self.agenda);
@@ -413,12 +452,18 @@ impl World {
             match happening {
                 Happening::Write(record) => {
                     if self.draw(2) == 0 {
-                        put(&mut self.store, &record);
+                        self.put(&record);
+                    }
+                }
+                Happening::Forget(_, jobs) => {
+                    if self.draw(2) == 0 {
+                        self.forget_now(&jobs);
                     }
                 }
                 Happening::Message(..)
                 | Happening::Lie(..)
                 | Happening::Break(_)
+                | Happening::Read(..)
                 | Happening::Report(_) => {}
                 stays => {
                     self.agenda.insert(at, stays);
@@ -429,9 +474,13 @@ impl World {
             self.within(500, Happening::Arrive);
         }
         self.workers.clear();
+        self.answered_batches.clear();
         self.submissions.clear();
         self.cancellations.clear();
-        let restored = RestoredJob::load(&mut self.store).unwrap();
+        let expelled = self.store.expulsions().unwrap();
+        self.counts.remembered += u64::from(!expelled.is_empty());
+        self.expelled = expelled.iter().map(|record| record.worker.process()).collect();
+        let restored = Restored::load(&mut self.store).unwrap();
         let (state, effects) = State::restore(self.config, restored, self.now);
         self.state = state;
         sanity_check(&self.state).unwrap();
@@ -439,10 +488,10 @@ impl World {
     }
 
     fn react(&mut self, event: Event) {
-        let shown = format!("{event:?}");
+        let before = event.clone();
         let effects = react(&mut self.state, event, self.now);
         if let Err(insane) = sanity_check(&self.state) {
-            panic!("{insane} after {shown}\n{:#?}", self.state);
+            panic!("{insane} after {before:?}\n{:#?}", self.state);
         }
         self.apply(effects);
     }
@@ -463,7 +512,12 @@ impl World {
                     self.counts.closed += 1;
                     self.bury(worker);
                 }
-                Effect::Store(record) => self.within(20, Happening::Write(record)),
+                Effect::Store(record) => {
+                    self.look_at(&record);
+                    self.within(20, Happening::Write(record));
+                }
+                Effect::Read { job, number } => self.within(10, Happening::Read(job, number)),
+                Effect::Prune { token, jobs } => self.within(20, Happening::Forget(token, jobs)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
                 Effect::Publish { .. } => {}
                 Effect::Despair { .. } => panic!("nobody lacks patience"),
@@ -474,10 +528,11 @@ impl World {
 
     /// A worker gets a batch; the dice say what becomes of it.
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
+        self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let known = self.workers.get_mut(&worker).unwrap();
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
-        let right = answer(worker, batch, &work);
+        let right = self.answer(worker, batch, &work);
         match self.draw(100) {
             0..3 => self.within(100, Happening::Break(worker)),
             3..5 => self.workers.get_mut(&worker).unwrap().stalled = true,
@@ -488,14 +543,14 @@ impl World {
             }
             13 => {
                 let wrong = Work { count: work.count + 1, ..work };
-                let event = answer(worker, batch, &wrong);
+                let event = self.answer(worker, batch, &wrong);
                 self.within(100, Happening::Message(worker, event));
             }
             14 => {
                 self.within(50, Happening::Message(worker, Event::WorkerDrains { worker }));
                 self.within(100, Happening::Message(worker, right));
             }
-            15..17 if self.liars => {
+            15..17 if self.has_second_thoughts(worker) => {
                 self.within(100, Happening::Message(worker, right));
                 self.within(300, Happening::Lie(worker, batch, work));
             }
@@ -504,13 +559,19 @@ impl World {
     }
 }
 
+/// What a batch is about.
+fn key(work: &Work) -> (u64, u64, u64, u32) {
+    let point = work.point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()));
+    (work.seed, point, work.first, work.count)
+}
+
 /// One to three clients with small jobs.
 fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
     (0..1 + draw(3))
         .map(|number| {
             let specification = match draw(4) {
-                0 => fake::propagation(1 + draw(60), seed),
-                _ => fake::identification(1 + draw(40), 2 + draw(12), seed),
+                0 => fake::propagation(1 + draw(60), 4 * seed + number),
+                _ => fake::identification(1 + draw(40), 2 + draw(12), 4 * seed + number),
             };
             let request_id = format!("request {number}");
             let cancels = draw(6) == 0;
@@ -520,20 +581,8 @@ fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
                 job: None,
                 cancels,
                 wants_end: cancels,
+                pruned: false,
             }
         })
         .collect()
-}
-
-fn answer(worker: WorkerId, batch: BatchId, work: &Work) -> Event {
-    Event::Answered { worker, batch, solved: fake::solved(work), elapsed_s: 0.01 }
-}
-
-fn put(store: &mut MemoryStore, record: &Record) {
-    match record {
-        Record::Job(record) => store.put_job(record),
-        Record::Evaluation(record) => store.put_evaluation(record),
-        Record::End { end, summary } => store.finish_job(end, summary),
-    }
-    .unwrap();
 }

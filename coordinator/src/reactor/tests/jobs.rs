@@ -148,10 +148,10 @@ fn jobs_beyond_the_active_ones_wait_their_turn() {
     let waiting =
         |rig: &Rig, job| crate::snapshot::of(&rig.state, JobId(job), rig.now).unwrap().waiting_for;
     assert_eq!(waiting(&rig, 1), "no worker is attached (since 0 s)");
-    assert_eq!(waiting(&rig, 4), "the end of 2 running and 1 waiting jobs");
+    assert_eq!(waiting(&rig, 4), "its turn: 2 jobs run and 2 wait (since 0 s)");
     rig.check(request(1, Request::Get(JobId(3))), &["answer 1: Waiting Unspecified"]);
     rig.check(request(1, Request::Cancel(JobId(3))), &["store job 3 end: cancelled "]);
-    assert_eq!(waiting(&rig, 4), "the end of 2 running and 0 waiting jobs");
+    assert_eq!(waiting(&rig, 4), "its turn: 2 jobs run and 1 wait (since 0 s)");
     rig.check(request(1, Request::Cancel(JobId(1))), &["store job 1 end: cancelled "]);
     rig.check(request(1, Request::Get(JobId(4))), &["answer 1: Running Unspecified"]);
 }

@@ -4,7 +4,7 @@ use osteon_proto::{results, v1};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, params};
 
-use super::checksum;
+use super::columns::checksum;
 use crate::ids::JobId;
 use crate::search::Summary;
 

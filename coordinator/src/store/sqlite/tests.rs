@@ -1,9 +1,15 @@
 //! The file: what is put is there after a reopening, what is damaged or foreign is refused.
 
+use std::fs;
+
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{FailureCounts, FailureKind};
+use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
+use osteon_common::parameters::Point;
+use osteon_common::results::EstimatedError;
 
+use super::columns::checksum;
+use super::opening::{FILE, FORMAT, Journal, open_file};
 use super::*;
 
 fn job(id: u64) -> JobRecord {
@@ -25,6 +31,8 @@ fn job(id: u64) -> JobRecord {
         specification: Arc::new(specification),
         accepted: Duration::from_nanos(1_763_000_000_123_456_789),
         fingerprint: "osteon 1.2.3 numerics 4".to_owned(),
+        client: if id == 2 { "somebody@there".to_owned() } else { String::new() },
+        priority: if id == 3 { 9 } else { 0 },
     }
 }
 
@@ -37,6 +45,9 @@ fn evaluation(job: u64, number: u64) -> EvaluationRecord {
         // The second one as an older version would have put it.
         estimated_error: (number != 1)
             .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
+        workers: (0..number)
+            .map(|process| WorkerName::new("a node", u32::try_from(process).unwrap()))
+            .collect(),
     }
 }
 
@@ -52,12 +63,12 @@ fn end(job: u64) -> EndRecord {
     }
 }
 
+/// The evaluations of a job below number 10.
 fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord>, StoreError> {
     let mut all = Vec::new();
-    store.evaluations(JobId(job), 0, &mut |record| {
-        all.push(record);
-        ControlFlow::Continue(())
-    })?;
+    for number in 0..10 {
+        all.extend(store.evaluation(JobId(job), number)?);
+    }
     Ok(all)
 }
 
@@ -81,21 +92,162 @@ fn what_is_put_is_there_after_a_reopening() {
         // Twice: a write whose report was lost is repeated.
         store.put_job(&job(1)).unwrap();
         store.put_job(&job(2)).unwrap();
-        store.put_evaluation(&evaluation(2, 0)).unwrap();
-        store.put_evaluation(&evaluation(1, 1)).unwrap();
-        store.put_evaluation(&evaluation(1, 0)).unwrap();
+        store.put_expulsion(&expulsion(1)).unwrap();
+        store.put_evaluation(&evaluation(2, 0), false).unwrap();
+        store.put_evaluation(&evaluation(1, 1), false).unwrap();
+        store.put_evaluation(&evaluation(1, 0), false).unwrap();
         store.finish_job(&end(1), &summary(1)).unwrap();
     }
     drop(store);
     let mut store = SqliteStore::open(&directory.path().join("made/on/the/way")).unwrap();
-    let expected =
-        [StoredJob { record: job(1), end: Some(end(1)) }, StoredJob { record: job(2), end: None }];
+    let expected = [
+        StoredJob { record: job(1), end: Some(end(1)), evaluations: 0 },
+        StoredJob { record: job(2), end: None, evaluations: 1 },
+    ];
     assert_eq!(store.jobs().unwrap(), expected);
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0), evaluation(1, 1)]);
     assert_eq!(evaluations(&mut store, 2).unwrap(), [evaluation(2, 0)]);
     assert_eq!(evaluations(&mut store, 3).unwrap(), []);
     assert_eq!(store.summary(JobId(1)).unwrap(), Some(summary(1)));
     assert_eq!(store.summary(JobId(2)).unwrap(), None);
+    assert_eq!(store.job(JobId(2)).unwrap(), Some(job(2)));
+    assert_eq!(store.job(JobId(3)).unwrap(), None);
+    assert_eq!(store.expulsions().unwrap(), [expulsion(1)]);
+    // Process 0 has computed evaluation 1 of job 1, which has ended, and nobody else has.
+    let ended_with = |store: &mut SqliteStore, host, process| {
+        store.ended_with(&WorkerName::new(host, process)).unwrap()
+    };
+    assert_eq!(ended_with(&mut store, "a node", 0), [JobId(1)]);
+    for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
+        assert_eq!(ended_with(&mut store, host, process), [], "{process} {host}");
+    }
+    store.forget_expulsions().unwrap();
+    assert_eq!(store.expulsions().unwrap(), []);
+}
+
+fn expulsion(number: u64) -> ExpulsionRecord {
+    ExpulsionRecord {
+        number,
+        worker: WorkerName::new("a node", 7),
+        job: JobId(2),
+        reason: "answered wrongly".to_owned(),
+        at: Duration::from_secs(1_763_000_050),
+    }
+}
+
+#[test]
+fn the_last_evaluation_of_a_path_forgets_those_of_another() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for id in [1, 2] {
+        store.put_job(&job(id)).unwrap();
+        for number in 0..4 {
+            store.put_evaluation(&evaluation(id, number), false).unwrap();
+        }
+    }
+    store.put_evaluation(&evaluation(1, 1), true).unwrap();
+    assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0), evaluation(1, 1)]);
+    assert_eq!(evaluations(&mut store, 2).unwrap().len(), 4);
+}
+
+#[test]
+fn a_gap_in_a_path_is_found_at_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    for number in [0, 2] {
+        store.put_evaluation(&evaluation(1, number), false).unwrap();
+    }
+    let error = store.jobs().unwrap_err().to_string();
+    assert!(error.contains("has 2 evaluations of job 1, but the last has number 2"), "{error}");
+}
+
+#[test]
+fn forgotten_jobs_are_gone_and_their_room_is_given_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    let size = || fs::metadata(directory.path().join(FILE)).unwrap().len();
+    let large: Arc<[Outcome]> = vec![Ok(3900.0); 100_000].into();
+    for id in [1, 2] {
+        store.put_job(&job(id)).unwrap();
+        for number in 0..3 {
+            let record = EvaluationRecord { outcomes: large.clone(), ..evaluation(id, number) };
+            store.put_evaluation(&record, false).unwrap();
+        }
+        store.finish_job(&end(id), &summary(id)).unwrap();
+    }
+    store.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).unwrap();
+    let before = size();
+    store.forget_jobs(&[JobId(1), JobId(9)]).unwrap();
+    assert!(size() < before * 6 / 10, "{} of {before} bytes are left", size());
+    let ids: Vec<JobId> = store.jobs().unwrap().iter().map(|job| job.record.job).collect();
+    assert_eq!(ids, [JobId(2)]);
+    assert_eq!(store.summary(JobId(1)).unwrap(), None);
+    assert_eq!(evaluations(&mut store, 1).unwrap(), []);
+    assert_eq!(evaluations(&mut store, 2).unwrap().len(), 3);
+}
+
+#[test]
+fn a_full_disk_is_named_and_nothing_is_half_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    store.put_evaluation(&evaluation(1, 0), false).unwrap();
+    let pages: i64 = store.connection.pragma_query_value(None, "page_count", |r| r.get(0)).unwrap();
+    store.connection.pragma_update(None, "max_page_count", pages + 2).unwrap();
+    let outcomes: Arc<[Outcome]> = vec![Ok(3900.0); 100_000].into();
+    let large = EvaluationRecord { outcomes, ..evaluation(1, 0) };
+    let error = store.put_evaluation(&large, true).unwrap_err();
+    assert!(matches!(error, StoreError::Full { .. }), "{error}");
+    assert!(error.to_string().contains("no room is left for"), "{error}");
+    assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
+    store.connection.pragma_update(None, "max_page_count", 1_000_000).unwrap();
+    store.put_evaluation(&large, true).unwrap();
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(evaluations(&mut store, 1).unwrap(), [large]);
+}
+
+#[test]
+fn a_directory_that_cannot_be_written_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("file");
+    fs::write(&file, "").unwrap();
+    let error = SqliteStore::open(&file.join("store")).unwrap_err();
+    assert!(matches!(error, StoreError::Directory { .. }), "{error}");
+    // Whoever runs this may be allowed to write everywhere, but not here.
+    let error = SqliteStore::open(Path::new("/proc/self")).unwrap_err();
+    assert!(matches!(error, StoreError::Lock { .. }), "{error}");
+    assert!(error.to_string().contains("give the coordinator's user write permission"), "{error}");
+}
+
+#[test]
+fn a_database_of_another_program_is_left_as_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join(FILE);
+    Connection::open(&path).unwrap().execute_batch("CREATE TABLE notes (text TEXT)").unwrap();
+    let before = fs::read(&path).unwrap();
+    let error = SqliteStore::open(directory.path()).unwrap_err();
+    assert!(matches!(error, StoreError::Foreign { .. }), "{error}");
+    assert_eq!(fs::read(&path).unwrap(), before);
+}
+
+#[test]
+fn with_a_rollback_journal_everything_is_the_same() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    let path = store.path.clone();
+    drop(store);
+    // A file that was made with a write-ahead log, and moved.
+    let connection = open_file(&path, Journal::Rollback).unwrap();
+    let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
+    assert_eq!(mode, "delete");
+    let lock = tempfile::tempfile().unwrap();
+    let mut store = SqliteStore { connection, path, lock };
+    store.put_evaluation(&evaluation(1, 0), true).unwrap();
+    assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
+    assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
 }
 
 #[test]
@@ -104,13 +256,15 @@ fn a_second_coordinator_is_refused() {
     let _first = SqliteStore::open(directory.path()).unwrap();
     let error = SqliteStore::open(directory.path()).unwrap_err();
     assert!(matches!(error, StoreError::InUse { .. }), "{error}");
+    let holder = format!("the coordinator with process {} on ", std::process::id());
+    assert!(error.to_string().contains(&holder), "{error}");
 }
 
 #[test]
 fn another_format_is_refused() {
     for (version, expected) in [
-        (1, "has format 1 of an older version of osteon, this program writes format 3; finish"),
-        (4, "has format 4, this program writes format 3; use a newer version of osteon"),
+        (1, "has format 1 of an older version of osteon, this program writes format 4; finish"),
+        (5, "has format 5, this program writes format 4; use a newer version of osteon"),
     ] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
@@ -121,55 +275,110 @@ fn another_format_is_refused() {
     }
 }
 
-/// The table of evaluations as format 2 had it.
-const EVALUATION_OF_FORMAT_2: &str = "
-    DROP TABLE evaluation;
+/// The tables as format 3 had them.
+const FORMAT_3: &str = "
+    CREATE TABLE format (version INTEGER NOT NULL);
+    INSERT INTO format VALUES (3);
+    CREATE TABLE job (
+        id INTEGER PRIMARY KEY,
+        request_id TEXT NOT NULL,
+        accepted_ns INTEGER NOT NULL,
+        specification BLOB NOT NULL,
+        fingerprint TEXT NOT NULL,
+        checksum BLOB NOT NULL
+    );
     CREATE TABLE evaluation (
         job INTEGER NOT NULL REFERENCES job(id),
         number INTEGER NOT NULL,
         point BLOB NOT NULL,
         outcomes BLOB NOT NULL,
         checksum BLOB NOT NULL,
+        estimated_error BLOB,
         PRIMARY KEY (job, number)
     );
+    CREATE TABLE ending (
+        job INTEGER PRIMARY KEY REFERENCES job(id),
+        status TEXT NOT NULL,
+        reason TEXT,
+        version TEXT NOT NULL,
+        ended_ns INTEGER NOT NULL,
+        evaluations INTEGER NOT NULL,
+        best_cost REAL,
+        best_mean REAL,
+        best_coefficient_of_variation REAL,
+        checksum BLOB NOT NULL
+    );
+    CREATE TABLE summary (
+        job INTEGER PRIMARY KEY REFERENCES job(id),
+        digest TEXT NOT NULL,
+        best INTEGER,
+        history BLOB NOT NULL,
+        checksum BLOB NOT NULL
+    );
+";
+/// What format 2 did not have of it.
+const BACK_TO_FORMAT_2: &str = "
+    ALTER TABLE evaluation DROP COLUMN estimated_error;
     UPDATE format SET version = 2;
 ";
 
 #[test]
-fn a_file_of_format_2_is_brought_up_to_date() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    store.put_job(&job(1)).unwrap();
-    store.connection.execute_batch(EVALUATION_OF_FORMAT_2).unwrap();
-    let old = evaluation(1, 1);
-    let point: Vec<u8> = old.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let outcomes = pack_outcomes(&old.outcomes);
-    let fields: [&[u8]; 4] = [&1_u64.to_le_bytes(), &1_u64.to_le_bytes(), &point, &outcomes];
-    let sql = "INSERT INTO evaluation VALUES (1, 1, ?1, ?2, ?3)";
-    store.connection.execute(sql, params![point, outcomes, checksum(&fields)]).unwrap();
-    drop(store);
-    for _ in 0..2 {
-        let mut store = SqliteStore::open(directory.path()).unwrap();
-        store.put_evaluation(&evaluation(1, 2)).unwrap();
-        assert_eq!(evaluations(&mut store, 1).unwrap(), [old.clone(), evaluation(1, 2)]);
+fn files_of_older_formats_are_brought_up_to_date() {
+    for oldest in [2, 3] {
+        let directory = tempfile::tempdir().unwrap();
+        let file = Connection::open(directory.path().join(FILE)).unwrap();
+        file.execute_batch(FORMAT_3).unwrap();
+        if oldest == 2 {
+            file.execute_batch(BACK_TO_FORMAT_2).unwrap();
+        }
+        let record = put_as_of_old(&file, oldest);
+        drop(file);
+        for _ in 0..2 {
+            let mut store = SqliteStore::open(directory.path()).unwrap();
+            let expected = StoredJob { record: job(1), end: Some(end(1)), evaluations: 0 };
+            assert_eq!(store.jobs().unwrap(), [expected]);
+            store.put_job(&job(2)).unwrap();
+            store.put_evaluation(&evaluation(1, 2), false).unwrap();
+            assert_eq!(evaluations(&mut store, 1).unwrap(), [record.clone(), evaluation(1, 2)]);
+            let sql = "SELECT version FROM format";
+            let found: i64 = store.connection.query_row(sql, [], |row| row.get(0)).unwrap();
+            assert_eq!(found, FORMAT);
+            store.forget_jobs(&[JobId(2)]).unwrap();
+        }
     }
 }
 
-#[test]
-fn evaluations_are_shown_until_the_visitor_breaks() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    store.put_job(&job(1)).unwrap();
-    for number in 0..4 {
-        store.put_evaluation(&evaluation(1, number)).unwrap();
+/// Job 1, its evaluation 1 and its end as format 2 or 3 wrote them.
+fn put_as_of_old(file: &Connection, format: i64) -> EvaluationRecord {
+    let JobRecord { request_id, specification, accepted, fingerprint, .. } = job(1);
+    let encoded = specification::to_message(&specification).encode_to_vec();
+    let accepted = nanoseconds(accepted);
+    let number = 1_u64.to_le_bytes();
+    let fields: [&[u8]; 5] =
+        [&number, request_id.as_bytes(), &accepted.to_le_bytes(), &encoded, fingerprint.as_bytes()];
+    let sql = "INSERT INTO job VALUES (1, ?1, ?2, ?3, ?4, ?5)";
+    let values = params![request_id, accepted, encoded, fingerprint, checksum(&fields)];
+    file.execute(sql, values).unwrap();
+
+    let kept = if format == 2 { evaluation(1, 1) } else { evaluation(1, 0) };
+    let record = EvaluationRecord { number: 1, workers: [].into(), ..kept };
+    let point: Vec<u8> = record.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let outcomes = pack_outcomes(&record.outcomes);
+    let errors = record.estimated_error.map(pack_errors);
+    let mut fields: Vec<&[u8]> = vec![&number, &number, &point, &outcomes];
+    fields.extend(errors.as_deref());
+    let checksum = checksum(&fields);
+    let sql = "INSERT INTO evaluation (job, number, point, outcomes, checksum)
+               VALUES (1, 1, ?1, ?2, ?3)";
+    file.execute(sql, params![point, outcomes, checksum]).unwrap();
+    if let Some(errors) = errors {
+        file.execute("UPDATE evaluation SET estimated_error = ?1", [errors]).unwrap();
     }
-    let mut shown = Vec::new();
-    let mut visit = |record: EvaluationRecord| {
-        shown.push(record.number);
-        if shown.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    store.evaluations(JobId(1), 1, &mut visit).unwrap();
-    assert_eq!(shown, [1, 2]);
+    let EndRecord { version, ended, .. } = end(1);
+    let sql = "INSERT INTO ending VALUES (1, 'failed', 'why', ?1, ?2, 2, NULL, 3900.1, 0.1, ?3)";
+    let values = params![version, nanoseconds(ended), end_checksum(&end(1))];
+    file.execute(sql, values).unwrap();
+    record
 }
 
 #[test]
@@ -178,14 +387,14 @@ fn a_job_that_begins_again_has_no_evaluation_and_new_numerics() {
     let mut store = SqliteStore::open(directory.path()).unwrap();
     for id in [1, 2] {
         store.put_job(&job(id)).unwrap();
-        store.put_evaluation(&evaluation(id, 0)).unwrap();
+        store.put_evaluation(&evaluation(id, 0), false).unwrap();
     }
     store.begin_again(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
     let again = JobRecord { fingerprint: "osteon 2.0.0 numerics 5".to_owned(), ..job(1) };
-    let stored = |record| StoredJob { record, end: None };
-    assert_eq!(store.jobs().unwrap(), [again, job(2)].map(stored));
+    let stored = |(record, evaluations)| StoredJob { record, end: None, evaluations };
+    assert_eq!(store.jobs().unwrap(), [(again, 0), (job(2), 1)].map(stored));
     assert_eq!(evaluations(&mut store, 1).unwrap(), []);
     assert_eq!(evaluations(&mut store, 2).unwrap(), [evaluation(2, 0)]);
 }
@@ -203,6 +412,11 @@ fn every_damaged_record_is_named() {
         ("UPDATE evaluation SET number = 8", DamagedRecord::Evaluation(8)),
         ("UPDATE evaluation SET estimated_error = zeroblob(16)", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET estimated_error = NULL", DamagedRecord::Evaluation(7)),
+        ("UPDATE job SET client = 'other'", DamagedRecord::Specification),
+        ("UPDATE job SET priority = 1", DamagedRecord::Specification),
+        ("UPDATE evaluation SET workers = '1 a'", DamagedRecord::Evaluation(7)),
+        ("UPDATE evaluation SET workers = NULL", DamagedRecord::Evaluation(7)),
+        ("UPDATE expulsion SET host = 'other'", DamagedRecord::Expulsion),
         ("UPDATE ending SET status = 'done'", DamagedRecord::End),
         ("UPDATE ending SET status = 'converged'", DamagedRecord::End),
         ("UPDATE ending SET reason = NULL", DamagedRecord::End),
@@ -223,11 +437,13 @@ fn every_damaged_record_is_named() {
         let directory = tempfile::tempdir().unwrap();
         let mut store = SqliteStore::open(directory.path()).unwrap();
         store.put_job(&job(1)).unwrap();
-        store.put_evaluation(&evaluation(1, 7)).unwrap();
+        store.put_evaluation(&evaluation(1, 7), false).unwrap();
         store.finish_job(&end(1), &summary(1)).unwrap();
+        store.put_expulsion(&expulsion(1)).unwrap();
         store.connection.execute(sql, []).unwrap();
         let jobs = store.jobs().map(|_| ());
         let read = jobs.and_then(|()| evaluations(&mut store, 1).map(|_| ()));
+        let read = read.and_then(|()| store.expulsions().map(|_| ()));
         let error = read.and_then(|()| store.summary(JobId(1)).map(|_| ())).unwrap_err();
         assert!(
             matches!(&error, StoreError::Damaged { record: found, .. } if *found == record),
@@ -241,7 +457,7 @@ fn a_file_that_is_no_store_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join(FILE), "not a database, whatever its name says").unwrap();
     let error = SqliteStore::open(directory.path()).unwrap_err();
-    assert!(matches!(error, StoreError::Sqlite { .. }), "{error}");
+    assert!(matches!(error, StoreError::Corrupt { .. }), "{error}");
     assert!(error.to_string().contains(FILE), "{error}");
 }
 

@@ -1,0 +1,106 @@
+//! Who gets the next batch: clients share the workers evenly, whatever the number of their jobs.
+//!
+//! What counts is computing time of threads. Who has had least of it is served next; a client
+//! that comes begins with what the least of the others has had, so that it neither waits nor
+//! catches up on the past.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// No batch is charged more than this, whatever a worker says.
+const CHARGE_MAX: Duration = Duration::from_secs(86_400);
+
+/// Computing time that each client with a job under way has had.
+#[derive(Debug, Default)]
+pub(crate) struct Shares(BTreeMap<String, Share>);
+
+#[derive(Debug, Default)]
+struct Share {
+    /// How many of its jobs are under way.
+    jobs: usize,
+    used: Duration,
+}
+
+impl Shares {
+    /// A job of `client` begins.
+    pub(crate) fn begin(&mut self, client: &str) {
+        if let Some(share) = self.0.get_mut(client) {
+            share.jobs += 1;
+            return;
+        }
+        let used = self.0.values().map(|share| share.used).min().unwrap_or_default();
+        self.0.insert(client.to_owned(), Share { jobs: 1, used });
+    }
+
+    /// A job of `client` is not under way any more.
+    pub(crate) fn end(&mut self, client: &str) {
+        if let Some(share) = self.0.get_mut(client) {
+            share.jobs = share.jobs.saturating_sub(1);
+            if share.jobs == 0 {
+                self.0.remove(client);
+            }
+        }
+    }
+
+    /// How many jobs of `client` are under way.
+    pub(crate) fn jobs(&self, client: &str) -> usize {
+        self.0.get(client).map_or(0, |share| share.jobs)
+    }
+
+    /// What `client` has had.
+    pub(crate) fn used(&self, client: &str) -> Duration {
+        self.0.get(client).map_or(Duration::ZERO, |share| share.used)
+    }
+
+    /// Charges `client` for what it was given.
+    pub(crate) fn charge(&mut self, client: &str, time: Duration) {
+        if let Some(share) = self.0.get_mut(client) {
+            share.used += time;
+        }
+    }
+
+    /// Corrects a charge when it is known how long it took.
+    pub(crate) fn correct(&mut self, client: &str, charged: Duration, took: Duration) {
+        if let Some(share) = self.0.get_mut(client) {
+            share.used = (share.used + took).saturating_sub(charged);
+        }
+    }
+}
+
+/// Time of `threads` for `seconds`, within reason.
+pub(crate) fn thread_time(seconds: f64, threads: u32) -> Duration {
+    let time = Duration::try_from_secs_f64(seconds * f64::from(threads));
+    time.unwrap_or(CHARGE_MAX).min(CHARGE_MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_comes_later_neither_waits_nor_catches_up() {
+        let mut shares = Shares::default();
+        let s = Duration::from_secs;
+        shares.begin("a");
+        shares.charge("a", s(100));
+        shares.begin("b");
+        assert_eq!(shares.used("b"), s(100));
+        shares.charge("b", s(10));
+        shares.correct("b", s(10), s(4));
+        assert_eq!(shares.used("b"), s(104));
+        shares.begin("b");
+        shares.end("b");
+        assert_eq!((shares.jobs("b"), shares.used("b")), (1, s(104)));
+        shares.end("b");
+        shares.begin("b");
+        assert_eq!(shares.used("b"), s(100));
+    }
+
+    #[test]
+    fn times_that_cannot_be_are_bounded() {
+        assert_eq!(thread_time(0.5, 4), Duration::from_secs(2));
+        for seconds in [f64::NAN, f64::INFINITY, 1e300, -1.0] {
+            assert_eq!(thread_time(seconds, 4), CHARGE_MAX);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Ended jobs that are forgotten: when a client wants it, and when they are old.
+
+use std::time::Duration;
+
+use crate::effect::{Answer, Effect, Refusal};
+use crate::event::Retention;
+use crate::ids::{JobId, Token};
+use crate::state::State;
+
+use super::Effects;
+
+/// How often it is looked for old jobs.
+const LOOK_EVERY: Duration = Duration::from_secs(60);
+
+/// Forgets the jobs that `retention` does not keep; the answer comes when that is durable.
+pub(super) fn requested(
+    state: &State,
+    token: Token,
+    retention: Retention,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let jobs = chosen(state, retention, now);
+    if jobs.is_empty() {
+        effects.push(Effect::Answer { token, answer: Answer::Pruned(jobs) });
+    } else {
+        effects.push(Effect::Prune { token: Some(token), jobs });
+    }
+}
+
+/// Forgets the jobs that have been ended for longer than the operator wants to keep them.
+pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
+    if state.config.keep_ended.is_none() || now.saturating_sub(state.pruned) < LOOK_EVERY {
+        return;
+    }
+    state.pruned = now;
+    let retention = Retention { keep_for: state.config.keep_ended, keep_last: None };
+    let jobs = chosen(state, retention, now);
+    if !jobs.is_empty() {
+        effects.push(Effect::Prune { token: None, jobs });
+    }
+}
+
+/// The jobs are forgotten, or the store did not do it.
+pub(super) fn pruned(
+    state: &mut State,
+    token: Option<Token>,
+    jobs: Vec<JobId>,
+    outcome: Result<(), String>,
+    effects: &mut Effects,
+) {
+    let answer = match outcome {
+        Ok(()) => {
+            for job in &jobs {
+                if let Some(ended) = state.ended.remove(job)
+                    && state.requests.get(&ended.request_id) == Some(job)
+                {
+                    state.requests.remove(&ended.request_id);
+                }
+            }
+            Answer::Pruned(jobs)
+        }
+        Err(error) => Answer::Refused(Refusal::NotPruned { error }),
+    };
+    if let Some(token) = token {
+        effects.push(Effect::Answer { token, answer });
+    }
+}
+
+/// The ended jobs that are not kept, in the order of their identifiers.
+fn chosen(state: &State, retention: Retention, now: Duration) -> Vec<JobId> {
+    let Retention { keep_for, keep_last } = retention;
+    let mut ended: Vec<(Duration, JobId)> =
+        state.ended.iter().map(|(id, job)| (job.end.ended, *id)).collect();
+    ended.sort_unstable();
+    let keep_last = usize::try_from(keep_last.unwrap_or(0)).unwrap_or(usize::MAX);
+    ended.truncate(ended.len().saturating_sub(keep_last));
+    let young = |at: Duration| keep_for.is_some_and(|age| now.saturating_sub(at) <= age);
+    ended.retain(|(at, _)| !young(*at));
+    let mut jobs: Vec<JobId> = ended.into_iter().map(|(_, id)| id).collect();
+    jobs.sort_unstable();
+    jobs
+}

@@ -1,0 +1,93 @@
+//! Clients share the workers; priorities are among the jobs of one.
+
+use super::*;
+
+impl Rig {
+    /// Submits and stores a job of a client.
+    fn accept_of(&mut self, client: &str, priority: u32, realizations: u64) -> JobId {
+        let Event::Requested { token, request } = submit(0, "", propagation(realizations)) else {
+            panic!("no request");
+        };
+        let Request::Submit { specification, request_id, .. } = request else {
+            panic!("no submission");
+        };
+        let client = client.to_owned();
+        let request = Request::Submit { specification, request_id, client, priority };
+        let job = JobId(self.state.next_job);
+        self.event(Event::Requested { token, request });
+        self.event(stored(job.0, RecordKey::Job));
+        job
+    }
+
+    /// Has worker 1, of one thread, answer its oldest batch, each realization in 10 ms times
+    /// `slowness`; whose batch it was.
+    fn answer_one(&mut self, slowness: impl Fn(JobId) -> f64) -> (JobId, u64) {
+        let id = self.state.workers[&WorkerId(1)].in_flight[0];
+        let assignment = self.state.batches[&id].assignment;
+        let (first, count) = (assignment.indices.first, assignment.indices.count);
+        let elapsed_s = 0.01 * slowness(assignment.job) * count as f64;
+        self.now += Duration::from_secs_f64(elapsed_s);
+        // Not checked each time: the state is large here.
+        react(&mut self.state, answer_in(elapsed_s, 1, id.0, first, count), self.now);
+        (assignment.job, count)
+    }
+}
+
+#[test]
+fn a_client_with_one_job_gets_as_much_as_one_with_many() {
+    let mut rig = Rig::new();
+    rig.state.config.active_jobs_max = 8;
+    for _ in 0..200 {
+        rig.accept_of("many", 0, 20_000);
+    }
+    rig.event(hello(1, 1));
+    for _ in 0..50 {
+        rig.answer_one(|_| 1.0);
+    }
+    // It comes late, finds every place taken, and its realizations take ten times as long.
+    let one = rig.accept_of("one", 0, 20_000);
+    let slowness = |job| if job == one { 10.0 } else { 1.0 };
+    let mut time = [0.0; 2];
+    for _ in 0..1000 {
+        let (job, count) = rig.answer_one(slowness);
+        time[usize::from(job == one)] += slowness(job) * count as f64;
+    }
+    let share = time[1] / (time[0] + time[1]);
+    assert!((0.45..0.55).contains(&share), "{share}");
+}
+
+#[test]
+fn of_one_client_the_highest_priority_goes_first_and_harms_no_other() {
+    let mut rig = Rig::new();
+    rig.state.config.active_jobs_max = 8;
+    let low = rig.accept_of("one", 1, 10_000);
+    let high = rig.accept_of("one", 2, 300);
+    let other = rig.accept_of("other", 0, 10_000);
+    rig.event(hello(1, 1));
+    let mut served: Vec<JobId> = (0..60).map(|_| rig.answer_one(|_| 1.0).0).collect();
+    let done = served.iter().rposition(|job| *job == high).unwrap();
+    assert!(!served[..done].contains(&low), "{served:?}");
+    assert!(served[done..].contains(&low), "{served:?}");
+    served.retain(|job| *job == other);
+    assert!((20..40).contains(&served.len()), "{}", served.len());
+}
+
+#[test]
+fn waiting_jobs_begin_in_the_order_of_priority_and_need() {
+    let mut rig = Rig::new();
+    let begun = |rig: &Rig| rig.state.active.iter().map(|id| id.0).collect::<Vec<_>>();
+    for priority in [0, 0, 0, 5, 0] {
+        rig.accept_of("one", priority, 10);
+    }
+    assert_eq!(begun(&rig), [1, 2]);
+    // Beyond the usual there is room for clients that have nothing.
+    rig.accept_of("second", 0, 10);
+    rig.accept_of("third", 0, 10);
+    rig.accept_of("fourth", 9, 10);
+    assert_eq!(begun(&rig), [1, 2, 6, 7]);
+    let ends = [(6, vec![1, 2, 7, 8]), (7, vec![1, 2, 8]), (1, vec![2, 8]), (2, vec![4, 8])];
+    for (ends, expected) in ends {
+        rig.event(request(0, Request::Cancel(JobId(ends))));
+        assert_eq!(begun(&rig), expected, "after the end of {ends}");
+    }
+}

@@ -1,0 +1,168 @@
+//! Stored evaluations told again: after an expulsion, and after a restart.
+
+use std::collections::BTreeSet;
+
+use super::*;
+use crate::reactor::Restored;
+use crate::store::memory::MemoryStore;
+use crate::store::{EvaluationRecord, Store as _};
+use crate::worker_name::WorkerName;
+
+/// A search with `evaluations` of one realization in the store, each answered by one of these
+/// processes in turn, and then one under way.
+fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    let mut store = MemoryStore::new();
+    rig.event(submit(0, "", identification(1)));
+    store.put_job(&rig.state.jobs[&JobId(1)].record).unwrap();
+    rig.event(stored(1, RecordKey::Job));
+    let turns = (0..evaluations).zip(processes.iter().cycle());
+    for (worker, (number, process)) in (100..).zip(turns) {
+        rig.event(hello_of(worker, *process, 1));
+        let effects = react(&mut rig.state, answer_in(0.1, worker, number + 1, number, 1), rig.now);
+        let [Effect::Store(Record::Evaluation { record, is_last: true })] = &effects[..] else {
+            panic!("{effects:?}");
+        };
+        store.put_evaluation(record, true).unwrap();
+        rig.event(end_of_stream(worker));
+        rig.event(stored(1, RecordKey::Evaluation(number)));
+    }
+    (rig, store)
+}
+
+/// Answers what a job reads.
+fn read(rig: &mut Rig, store: &MemoryStore, number: u64) -> Vec<String> {
+    let found = Ok(store.clone().evaluation(JobId(1), number).unwrap());
+    rig.event(Event::Read { job: JobId(1), number, found })
+}
+
+/// A batch of a job that somebody holds.
+fn batch_of(rig: &Rig, job: JobId) -> u64 {
+    let held = rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == job);
+    held.map(|(id, _)| id.0).unwrap()
+}
+
+/// Has a worker in `process` contradict itself.
+fn expose(rig: &mut Rig, process: u32) -> Vec<String> {
+    rig.accept(propagation(2));
+    rig.event(hello_of(50, process, 1));
+    let job = JobId(rig.state.next_job - 1);
+    let batch = batch_of(rig, job);
+    rig.event(answer(50, batch, 0, 1));
+    rig.event(answer(50, batch, 1, 1))
+}
+
+#[test]
+fn a_restarted_job_reads_one_evaluation_after_another() {
+    let (_, mut store) = rig(&[1], 3);
+    let restored = Restored::load(&mut store).unwrap();
+    let (state, effects) = State::restore(Config::default(), restored, Duration::ZERO);
+    let mut rig = Rig { state, now: Duration::ZERO };
+    assert_eq!(effects, [Effect::Read { job: JobId(1), number: 0 }]);
+    rig.check(hello(1, 1), &["welcome 1, lease 1"]);
+    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    assert_eq!(snapshot.evaluations, 3);
+    assert_eq!(snapshot.waiting_for, "its stored evaluations, 0 of 3 are read again");
+    assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
+    // An answer that comes twice means nothing.
+    assert_eq!(read(&mut rig, &store, 0), [""; 0]);
+    assert_eq!(read(&mut rig, &store, 1), ["read job 1 evaluation 2"]);
+    assert_eq!(read(&mut rig, &store, 2), ["send 1: batch 1 = 0+1"]);
+}
+
+#[test]
+fn a_store_that_cannot_be_read_is_asked_again() {
+    let (_, mut store) = rig(&[1], 1);
+    let restored = Restored::load(&mut store).unwrap();
+    let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
+    let mut rig = Rig { state, now: Duration::ZERO };
+    let found = Err("the cable is out".to_owned());
+    rig.check(Event::Read { job: JobId(1), number: 0, found }, &[]);
+    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let waits = "the store does not give a record, it is tried again: the cable is out (since 0 s)";
+    assert_eq!(snapshot.waiting_for, waits);
+    rig.check_after(Duration::from_secs(2), &["read job 1 evaluation 0"]);
+    assert_eq!(read(&mut rig, &store, 0), [""; 0]);
+    rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1"]);
+}
+
+#[test]
+fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
+    let (_, mut store) = rig(&[1], 2);
+    let restored = Restored::load(&mut store).unwrap();
+    let config = Config { active_jobs_max: 0, ..Config::default() };
+    let (state, effects) = State::restore(config, restored, Duration::ZERO);
+    assert_eq!(effects, []);
+    let mut rig = Rig { state, now: Duration::ZERO };
+    rig.check(request(7, Request::Cancel(JobId(1))), &["read job 1 evaluation 0"]);
+    assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
+    assert_eq!(read(&mut rig, &store, 1), ["store job 1 end: cancelled "]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    assert_eq!(snapshot.evaluations, 2);
+}
+
+#[test]
+fn the_evaluations_of_an_expelled_worker_are_computed_again() {
+    let (mut rig, store) = rig(&[1, 2], 3);
+    let effects = expose(&mut rig, 2);
+    assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
+    // Nothing is read before the expulsion is durable.
+    assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
+    rig.check_after(Duration::from_secs(2), &[&effects[0]]);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
+    assert_eq!(read(&mut rig, &store, 1), [""; 0]);
+    rig.event(hello_of(60, 3, 1));
+    // The same again: what is stored after it is right, and read.
+    let again = answer(60, batch_of(&rig, JobId(1)), 1, 1);
+    let effects = react(&mut rig.state, again, rig.now);
+    let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
+        panic!("{effects:?}");
+    };
+    let name = WorkerName::new("node", 3);
+    assert_eq!(record.workers, BTreeSet::from([name]));
+    rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
+    read(&mut rig, &store, 2);
+    assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 3);
+}
+
+#[test]
+fn an_evaluation_that_changes_is_the_last_of_its_path() {
+    let (mut rig, mut store) = rig(&[2], 3);
+    expose(&mut rig, 2);
+    rig.event(stored(2, RecordKey::Expulsion(1)));
+    assert_eq!(read(&mut rig, &store, 0), [""; 0]);
+    rig.event(hello_of(60, 3, 1));
+    let different = answer(60, batch_of(&rig, JobId(1)), 77, 1);
+    let effects = react(&mut rig.state, different, rig.now);
+    let Effect::Store(Record::Evaluation { record, is_last: true }) = &effects[0] else {
+        panic!("{effects:?}");
+    };
+    let EvaluationRecord { number: 0, .. } = record else { panic!("{record:?}") };
+    store.put_evaluation(record, true).unwrap();
+    assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
+    // What comes next is computed, not read.
+    let effects = rig.event(stored(1, RecordKey::Evaluation(0)));
+    assert!(effects.iter().all(|effect| effect.starts_with("send")), "{effects:?}");
+}
+
+#[test]
+fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
+    let (mut rig, _) = rig(&[2], 1);
+    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    let expelled = expose(&mut rig, 2).swap_remove(0);
+    let failed = || Event::StoreFailed {
+        job: JobId(2),
+        key: RecordKey::Expulsion(1),
+        error: "the disk is full".to_owned(),
+    };
+    for _ in 0..2 {
+        rig.check(failed(), &[]);
+        rig.check_after(Duration::from_secs(2), &[&expelled]);
+    }
+    rig.check(failed(), &["despair after 4s: the disk is full"]);
+    rig.check_after(Duration::from_secs(2), &[&expelled]);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+}

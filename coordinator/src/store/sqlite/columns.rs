@@ -1,0 +1,176 @@
+//! Records as columns, their checksums, and back.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::outcome::{Outcome, decode, encode};
+use osteon_common::parameters::Point;
+use osteon_common::results::EstimatedError;
+use rusqlite::Row;
+
+use crate::ids::JobId;
+use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord};
+use crate::worker_name::WorkerName;
+
+/// Bytes of an outcome in a blob: its code, its velocity as little-endian f64.
+const OUTCOME_BYTES: usize = 9;
+
+/// The evaluation of a row, and its number; `None` if it is damaged.
+pub(super) fn evaluation(
+    job: JobId,
+    row: &Row<'_>,
+) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
+    let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
+    let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
+    let errors = row.get_ref(4)?.as_blob_or_null()?;
+    let workers = row.get_ref(5)?.as_str_or_null()?;
+    let intact = checksum == evaluation_checksum(job, number, point, outcomes, errors, workers);
+    let unpacked = || {
+        let (point, outcomes) = unpack(point).zip(unpack_outcomes(outcomes))?;
+        let estimated_error = match errors {
+            Some(packed) => Some(unpack_errors(packed)?),
+            None => None,
+        };
+        let workers = unpack_workers(workers.unwrap_or_default())?;
+        Some(EvaluationRecord { job, number, point, outcomes, estimated_error, workers })
+    };
+    Ok((number, intact.then(unpacked).flatten()))
+}
+
+/// Nanoseconds as the file holds them: SQLite knows signed integers only.
+pub(super) fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).map_or(i64::MAX as u64, |ns| ns.min(i64::MAX as u64))
+}
+
+/// The columns of a job that its checksum is over.
+pub(super) struct JobColumns<'a> {
+    pub(super) job: JobId,
+    pub(super) request_id: &'a str,
+    pub(super) accepted_ns: u64,
+    pub(super) specification: &'a [u8],
+    pub(super) fingerprint: &'a str,
+    pub(super) client: &'a str,
+    pub(super) priority: u32,
+}
+
+/// Older formats had no client and no priority: without either there is no field.
+pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
+    let (job, accepted) = (columns.job.0.to_le_bytes(), columns.accepted_ns.to_le_bytes());
+    let priority = columns.priority.to_le_bytes();
+    let mut fields: Vec<&[u8]> = vec![
+        &job,
+        columns.request_id.as_bytes(),
+        &accepted,
+        columns.specification,
+        columns.fingerprint.as_bytes(),
+    ];
+    if !columns.client.is_empty() || columns.priority > 0 {
+        fields.extend([columns.client.as_bytes(), &priority]);
+    }
+    checksum(&fields)
+}
+
+pub(super) fn expulsion_checksum(record: &ExpulsionRecord) -> Vec<u8> {
+    let ExpulsionRecord { number, worker, job, reason, at } = record;
+    let numbers = [*number, job.0, nanoseconds(*at), worker.process().into()];
+    let numbers = numbers.map(u64::to_le_bytes);
+    let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
+    fields.extend([worker.host().as_bytes(), reason.as_bytes()]);
+    checksum(&fields)
+}
+
+/// What is absent has no field.
+pub(super) fn evaluation_checksum(
+    job: JobId,
+    number: u64,
+    point: &[u8],
+    outcomes: &[u8],
+    errors: Option<&[u8]>,
+    workers: Option<&str>,
+) -> Vec<u8> {
+    let (job, number) = (job.0.to_le_bytes(), number.to_le_bytes());
+    let mut fields: Vec<&[u8]> = vec![&job, &number, point, outcomes];
+    match workers {
+        Some(workers) => fields.extend([errors.unwrap_or_default(), workers.as_bytes()]),
+        None => fields.extend(errors),
+    }
+    checksum(&fields)
+}
+
+pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
+    let EndRecord { job, ending, version, ended, evaluations, best_cost, best_moments } = end;
+    let optional = |value: Option<f64>| value.map(|value| value.to_le_bytes().to_vec());
+    let (mean, variation) = (
+        best_moments.map(|moments| moments.mean),
+        best_moments.map(|moments| moments.coefficient_of_variation),
+    );
+    let reason = ending.reason.as_ref().map(|reason| reason.as_bytes().to_vec());
+    let numbers = [job.0, nanoseconds(*ended), *evaluations].map(u64::to_le_bytes);
+    let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
+    fields.extend([ending.status.name().as_bytes(), version.as_bytes()]);
+    // What is absent has no field, and a field of one byte says that it is present.
+    let optional = [reason, optional(*best_cost), optional(mean), optional(variation)];
+    for value in &optional {
+        fields.push(if value.is_some() { &[1] } else { &[0] });
+        fields.extend(value.as_deref());
+    }
+    checksum(&fields)
+}
+
+/// BLAKE3 over fields, each after its length.
+pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
+    let mut hasher = blake3::Hasher::new();
+    for field in fields {
+        hasher.update(&(field.len() as u64).to_le_bytes()).update(field);
+    }
+    hasher.finalize().as_bytes().to_vec()
+}
+
+pub(super) fn pack_outcomes(outcomes: &[Outcome]) -> Vec<u8> {
+    let mut packed = Vec::with_capacity(outcomes.len() * OUTCOME_BYTES);
+    for &outcome in outcomes {
+        let (code, velocity) = encode(outcome);
+        packed.push(code);
+        packed.extend(velocity.to_le_bytes());
+    }
+    packed
+}
+
+fn unpack_outcomes(packed: &[u8]) -> Option<Arc<[Outcome]>> {
+    let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
+    let outcome =
+        |[code, velocity @ ..]: &[u8; OUTCOME_BYTES]| decode(*code, f64::from_le_bytes(*velocity));
+    rest.is_empty().then(|| records.iter().map(outcome).collect()).flatten()
+}
+
+pub(super) fn pack_errors(errors: EstimatedError) -> Vec<u8> {
+    [errors.median, errors.largest].into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
+fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
+    let (values, rest) = packed.as_chunks::<8>();
+    let &[median, largest] = values else { return None };
+    let (median, largest) = (f64::from_le_bytes(median), f64::from_le_bytes(largest));
+    rest.is_empty().then_some(EstimatedError { median, largest })
+}
+
+fn unpack(point: &[u8]) -> Option<Point> {
+    let (values, rest) = point.as_chunks::<8>();
+    let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    rest.is_empty().then(|| values.try_into().ok().map(Point)).flatten()
+}
+
+/// A line for each worker: its process, a space, its host.
+pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
+    let line = |worker: &WorkerName| format!("{} {}", worker.process(), worker.host());
+    workers.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
+    let worker = |line: &str| {
+        let (process, host) = line.split_once(' ')?;
+        Some(WorkerName::new(host, process.parse().ok()?))
+    };
+    packed.split('\n').filter(|line| !line.is_empty()).map(worker).collect()
+}

@@ -1,0 +1,232 @@
+//! Opening the file: whose it is, on which kind of disk it lies, of which format it is. Nothing of
+//! a file that is refused is changed.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, ErrorCode, TransactionBehavior};
+
+use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, SCHEMA};
+use crate::store::StoreError;
+
+/// Format that this program writes.
+pub(super) const FORMAT: i64 = 4;
+/// Oldest format that this program brings up to date.
+const FORMAT_OLDEST: i64 = 2;
+/// Name of the file in the store's directory.
+pub(super) const FILE: &str = "osteon.sqlite";
+/// Name of the file that says who has the store open.
+const LOCK: &str = "osteon.lock";
+/// How long to wait for a coordinator that is just ending.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest text of a lock that is shown, bytes.
+const HOLDER_BYTES_MAX: u64 = 256;
+
+/// How changes are made safe against a crash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Journal {
+    /// A log beside the file: fast, on disks of this machine.
+    WriteAhead,
+    /// A copy of what is overwritten: on disks that are shared over a network.
+    Rollback,
+}
+
+/// Opens the file in `directory`, making both if need be; the lock is held as long as the file.
+pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), StoreError> {
+    fs::create_dir_all(directory)
+        .map_err(|source| StoreError::Directory { path: directory.to_owned(), source })?;
+    let path = directory.join(FILE);
+    let lock = lock(directory, &path)?;
+    let network = network_file_system(directory);
+    let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
+    if let Some(kind) = network {
+        tracing::warn!(directory = %directory.display(), kind,
+            "the store lies on a network file system, where locks cannot always be relied on: \
+             make sure that no coordinator of another machine uses it; a local disk is safer and \
+             faster");
+    }
+    let connection = open_file(&path, journal)?;
+    Ok((connection, lock, path))
+}
+
+/// Opens the file, brings it up to date and sets its modes.
+pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, StoreError> {
+    let refused = |source| refusal(path, source);
+    let mut connection = Connection::open(path).map_err(refused)?;
+    connection.busy_timeout(BUSY_TIMEOUT).map_err(refused)?;
+    // Before all else: then the write-ahead log needs no memory shared with others.
+    connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
+    check_format(&connection, path)?;
+    prepare(&mut connection, journal).map_err(refused)?;
+    Ok(connection)
+}
+
+/// Refuses what this program did not write, or cannot bring up to date.
+fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> {
+    let refused = |source| refusal(path, source);
+    let sql = "SELECT count(*), coalesce(sum(name = 'format'), 0) FROM sqlite_schema
+               WHERE type = 'table'";
+    let read = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
+    let (tables, known): (i64, bool) = connection.query_row(sql, [], read).map_err(refused)?;
+    if !known {
+        return if tables == 0 {
+            Ok(())
+        } else {
+            Err(StoreError::Foreign { path: path.to_owned() })
+        };
+    }
+    let found: i64 = connection
+        .query_row("SELECT version FROM format", [], |row| row.get(0))
+        .map_err(refused)?;
+    let path = path.to_owned();
+    if found < FORMAT_OLDEST {
+        Err(StoreError::Older { path, found, known: FORMAT })
+    } else if found > FORMAT {
+        Err(StoreError::Newer { path, found, known: FORMAT })
+    } else {
+        Ok(())
+    }
+}
+
+/// Sets the modes, makes the tables of a new file, and brings those of an old one up to date.
+fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()> {
+    // Counts for a new file only: removed records give their room back.
+    connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
+    let journal = match journal {
+        Journal::WriteAhead => "WAL",
+        Journal::Rollback => "DELETE",
+    };
+    connection.pragma_update(None, "journal_mode", journal)?;
+    connection.pragma_update(None, "synchronous", "FULL")?;
+    connection.pragma_update(None, "foreign_keys", true)?;
+    let transaction = connection.transaction_with_behavior(TransactionBehavior::Exclusive)?;
+    let known: bool = transaction.query_row(
+        "SELECT count(*) > 0 FROM sqlite_schema WHERE type = 'table' AND name = 'format'",
+        [],
+        |row| row.get(0),
+    )?;
+    if !known {
+        transaction.execute_batch("CREATE TABLE format (version INTEGER NOT NULL)")?;
+        transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
+        transaction.execute_batch(SCHEMA)?;
+    }
+    for (format, change) in [(2, FROM_FORMAT_2), (3, FROM_FORMAT_3)] {
+        let found: i64 =
+            transaction.query_row("SELECT version FROM format", [], |row| row.get(0))?;
+        if found == format {
+            transaction.execute_batch(change)?;
+        }
+    }
+    transaction.commit()
+}
+
+/// Takes the store for this process and writes there who that is.
+fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
+    let path = directory.join(LOCK);
+    let failed = |source| StoreError::Lock { path: path.clone(), source };
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    let mut file = options.open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            // Who it is helps, and is not needed.
+            let _ = (&file).take(HOLDER_BYTES_MAX).read_to_string(&mut holder);
+            let holder = match holder.trim() {
+                "" => "another coordinator".to_owned(),
+                known => known.to_owned(),
+            };
+            return Err(StoreError::InUse { path: store.to_owned(), holder });
+        }
+        Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {
+            tracing::warn!(path = %path.display(), "this file system knows no locks of whole files");
+        }
+        Err(TryLockError::Error(error)) => return Err(failed(error)),
+    }
+    file.set_len(0).map_err(failed)?;
+    writeln!(file, "{}", holder()).map_err(failed)?;
+    Ok(file)
+}
+
+/// This process, for people.
+fn holder() -> String {
+    let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let host = if host.trim().is_empty() { "this host" } else { host.trim() };
+    format!("the coordinator with process {} on {host}", std::process::id())
+}
+
+/// The kind of network file system that `directory` lies on, if it does.
+#[cfg(target_os = "linux")]
+fn network_file_system(directory: &Path) -> Option<&'static str> {
+    let found = rustix::fs::statfs(directory).ok()?;
+    network_kind(u32::try_from(found.f_type & 0xffff_ffff).ok()?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn network_file_system(_: &Path) -> Option<&'static str> {
+    None
+}
+
+/// Name of the network file system with this magic number (statfs(2) and the kernel's
+/// `magic.h`; those of the vendors as they publish them).
+fn network_kind(magic: u32) -> Option<&'static str> {
+    Some(match magic {
+        0x6969 => "NFS",
+        0x0BD0_0BD0 => "Lustre",
+        0x517B | 0xFF53_4D42 | 0xFE53_4D42 => "SMB",
+        0x1983_0326 => "BeeGFS",
+        0x4750_4653 => "GPFS",
+        0x00C3_6400 => "Ceph",
+        0x5346_414F | 0x6B41_4653 => "AFS",
+        0x7375_7245 => "Coda",
+        0x0102_1997 => "9P",
+        0x7461_636F => "OCFS2",
+        0x0116_1970 => "GFS2",
+        0xAAD7_AAEA => "PanFS",
+        0x2003_0528 => "OrangeFS",
+        0x6573_5546 => "FUSE",
+        _ => return None,
+    })
+}
+
+/// What SQLite's refusal means for whoever runs the coordinator.
+pub(super) fn refusal(path: &Path, source: rusqlite::Error) -> StoreError {
+    let path = path.to_owned();
+    match source.sqlite_error_code() {
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
+            StoreError::InUse { path, holder: "another process".to_owned() }
+        }
+        Some(ErrorCode::DiskFull) => StoreError::Full { path, source },
+        Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => {
+            StoreError::NotWritable { path, source }
+        }
+        Some(ErrorCode::NotADatabase | ErrorCode::DatabaseCorrupt) => {
+            StoreError::Corrupt { path, source }
+        }
+        _ => StoreError::Sqlite { path, source },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn network_file_systems_are_known_by_their_numbers() {
+        for (magic, expected) in [
+            (0x6969, Some("NFS")),
+            (0x0BD0_0BD0, Some("Lustre")),
+            (0xEF53, None),      // ext4
+            (0x5846_5342, None), // XFS
+            (0x0102_1994, None), // tmpfs
+            (0x9123_683E, None), // Btrfs
+            (0x794C_7630, None), // overlayfs
+        ] {
+            assert_eq!(network_kind(magic), expected, "{magic:x}");
+        }
+        assert_eq!(network_file_system(Path::new("/proc")), None);
+    }
+}

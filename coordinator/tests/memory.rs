@@ -1,0 +1,94 @@
+//! Ended jobs take little memory: what they left is in the store.
+
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod fake;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::job::Data;
+use osteon_common::version;
+use osteon_coordinator::config::Config;
+use osteon_coordinator::effect::{Effect, Record};
+use osteon_coordinator::event::{Event, Hello, Request};
+use osteon_coordinator::ids::{Token, WorkerId};
+use osteon_coordinator::reactor::react;
+use osteon_coordinator::state::State;
+use osteon_coordinator::store::Store as _;
+use osteon_coordinator::store::sqlite::SqliteStore;
+
+/// Memory of this process, bytes.
+fn resident() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap();
+    text.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096
+}
+
+/// Computes a job to its end.
+fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
+    let requested = Event::Requested { token: Token(1), request };
+    let mut effects = VecDeque::from(react(state, requested, Duration::ZERO));
+    while let Some(effect) = effects.pop_front() {
+        let event = match effect {
+            Effect::Send { worker, batch, work } => {
+                Event::Answered { worker, batch, solved: fake::solved(&work), elapsed_s: 0.01 }
+            }
+            Effect::Store(record) => {
+                match &record {
+                    Record::Job(record) => store.put_job(record),
+                    Record::Evaluation { record, is_last } => {
+                        store.put_evaluation(record, *is_last)
+                    }
+                    Record::End { end, summary } => store.finish_job(end, summary),
+                    Record::Expulsion(_) => panic!("there is one worker, and it is honest"),
+                }
+                .unwrap();
+                let (job, key) = record.key();
+                Event::Stored { job, key }
+            }
+            _ => continue,
+        };
+        effects.extend(react(state, event, Duration::ZERO));
+    }
+}
+
+#[test]
+fn ended_jobs_take_little_memory() {
+    const REALIZATIONS: u64 = 100_000;
+    const JOBS: u64 = 20;
+    /// A twentieth of the outcomes of one evaluation.
+    const BYTES_MAX: u64 = 80_000;
+
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    let mut state = State::new(Config::default(), Duration::ZERO);
+    let hello = Hello {
+        version: version::VERSION.to_owned(),
+        fingerprint: version::fingerprint(),
+        threads: 1,
+        host: String::new(),
+        process: 1,
+    };
+    react(&mut state, Event::Hello { worker: WorkerId(1), hello }, Duration::ZERO);
+    let mut one_more = |seed| {
+        let mut specification = fake::identification(REALIZATIONS, 2, seed);
+        specification.data = Some(Data::Velocities([3900.0, 3901.0].repeat(50_000)));
+        let request = Request::Submit {
+            specification: Arc::new(specification),
+            request_id: String::new(),
+            client: String::new(),
+            priority: 0,
+        };
+        run(&mut state, &mut store, request);
+        assert!(state.is_idle());
+    };
+    // The first ones find the room that the others use again.
+    (0..5).for_each(&mut one_more);
+    let before = resident();
+    (0..JOBS).for_each(&mut one_more);
+    let each = resident().saturating_sub(before) / JOBS;
+    assert!(each < BYTES_MAX, "{each} bytes of each ended job are left");
+}

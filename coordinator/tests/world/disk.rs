@@ -1,0 +1,125 @@
+//! The store: writes that come late, fail, or are lost with the coordinator.
+
+use osteon_coordinator::effect::Record;
+use osteon_coordinator::event::{Event, Request, Retention};
+use osteon_coordinator::ids::{JobId, Token};
+use osteon_coordinator::store::Store as _;
+
+use super::{Happening, World};
+
+impl World {
+    /// Looks at a record when the coordinator has decided on it.
+    pub(super) fn look_at(&mut self, record: &Record) {
+        match record {
+            Record::Expulsion(record) => {
+                let process = record.worker.process();
+                let lied = self.lies.iter().any(|(liar, _)| *liar == process);
+                assert!(lied, "{record:?}: it never lied");
+                self.counts.expelled += u64::from(self.expelled.insert(process));
+            }
+            Record::End { end, .. } => {
+                // Written again, it was decided on before.
+                if self.ends.insert(end.job, end.clone()).is_some_and(|before| before == *end) {
+                    return;
+                }
+                let of_job = self.clients.iter().find(|client| client.job == Some(end.job));
+                // Of a job whose client has not heard of it nothing is known here.
+                let seed = of_job.map(|client| client.specification.monte_carlo.seed);
+                let at_large = |(liar, of): &(u32, u64)| {
+                    seed.is_none_or(|seed| seed == *of) && !self.expelled.contains(liar)
+                };
+                if self.lies.iter().any(at_large) {
+                    self.deceived.insert(end.job);
+                } else {
+                    self.deceived.remove(&end.job);
+                }
+            }
+            Record::Evaluation { record, is_last } => {
+                let before = self.store.evaluation(record.job, record.number).unwrap();
+                if let Some(before) = before.filter(|before| before.workers != record.workers) {
+                    let same = before.outcomes == record.outcomes;
+                    self.counts.replaced += u64::from(!same);
+                    self.counts.confirmed += u64::from(same);
+                    assert_eq!(*is_last, !same);
+                }
+            }
+            Record::Job(_) => {}
+        }
+    }
+
+    pub(super) fn write(&mut self, record: &Record) {
+        let (job, key) = record.key();
+        let event = if self.refuses() {
+            Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
+        } else {
+            self.put(record);
+            Event::Stored { job, key }
+        };
+        self.within(5, Happening::Report(event));
+    }
+
+    pub(super) fn put(&mut self, record: &Record) {
+        let store = &mut self.store;
+        match record {
+            Record::Job(record) => store.put_job(record),
+            Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+            Record::End { end, summary } => store.finish_job(end, summary),
+            Record::Expulsion(record) => store.put_expulsion(record),
+        }
+        .unwrap();
+    }
+
+    pub(super) fn read(&mut self, job: JobId, number: u64) {
+        let found = if self.refuses() {
+            Err("the cable is out".to_owned())
+        } else {
+            Ok(self.store.evaluation(job, number).unwrap())
+        };
+        self.within(5, Happening::Report(Event::Read { job, number, found }));
+    }
+
+    /// Somebody wants ended jobs forgotten, once every client has heard of its own.
+    pub(super) fn prune(&mut self) {
+        if self.clients.iter().all(|client| client.job.is_some()) {
+            let token = Token(self.number());
+            let retention = Retention::default();
+            self.react(Event::Requested { token, request: Request::Prune(retention) });
+        }
+        self.within(3000, Happening::Prune);
+    }
+
+    pub(super) fn forget(&mut self, token: Option<Token>, jobs: Vec<JobId>) {
+        let outcome = if self.refuses() {
+            Err("the disk is full".to_owned())
+        } else {
+            self.forget_now(&jobs);
+            Ok(())
+        };
+        self.within(5, Happening::Report(Event::Pruned { token, jobs, outcome }));
+    }
+
+    /// Looks at what ended jobs left, and forgets it.
+    pub(super) fn forget_now(&mut self, jobs: &[JobId]) {
+        for stored in self.store.jobs().unwrap() {
+            let job = stored.record.job;
+            if jobs.contains(&job) {
+                let end = stored.end.unwrap();
+                self.check_result(&stored.record, &end);
+                self.counts.pruned += 1;
+                for client in &mut self.clients {
+                    if client.job == Some(job) {
+                        client.pruned = true;
+                        client.wants_end = false;
+                    }
+                }
+            }
+        }
+        self.store.forget_jobs(jobs).unwrap();
+    }
+
+    fn refuses(&mut self) -> bool {
+        let refuses = self.draw(30) == 0 || self.outage.contains(&self.now);
+        self.counts.refusals += u64::from(refuses);
+        refuses
+    }
+}

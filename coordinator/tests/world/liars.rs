@@ -1,0 +1,79 @@
+//! Workers whose answers are wrong.
+
+use std::collections::BTreeSet;
+
+use osteon_coordinator::event::Event;
+use osteon_coordinator::ids::{BatchId, WorkerId};
+use osteon_proto::batch::Work;
+
+use super::World;
+use crate::fake;
+
+/// Processes that lie, if any do. They are of the first workers: those that come in the place of
+/// others are honest.
+pub(super) fn some(draw: &mut impl FnMut(u64) -> u64) -> BTreeSet<u32> {
+    match draw(6) {
+        0 => [1].into(),
+        1 => [1, 2].into(),
+        2 => [2].into(),
+        _ => BTreeSet::new(),
+    }
+}
+
+impl World {
+    /// The process of a worker that arrives: a new one, or one that was here and comes back.
+    pub(super) fn process(&mut self) -> u32 {
+        let gone = |process: &u32| {
+            let here = self.workers.values().any(|worker| worker.process == *process);
+            !here && !self.expelled.contains(process)
+        };
+        let gone: Vec<u32> = (1..=self.processes).filter(gone).collect();
+        let returns = self.draw(2) == 0;
+        match gone.last() {
+            Some(process) if returns => *process,
+            _ => {
+                self.processes += 1;
+                self.processes
+            }
+        }
+    }
+
+    /// What a worker answers: liars lie in every third batch.
+    pub(super) fn answer(&mut self, worker: WorkerId, batch: BatchId, work: &Work) -> Event {
+        let mut solved = fake::solved(work);
+        let process = self.workers[&worker].process;
+        if self.liars.contains(&process) && self.draw(3) == 0 {
+            let at = self.draw(solved.len() as u64) as usize;
+            // No two liars agree.
+            if self.draw(4) == 0 {
+                solved[at].estimated_error += f64::from(process);
+            } else {
+                solved[at].outcome = Ok(4000.0 + f64::from(process));
+            }
+            self.note_lie(process, work);
+        }
+        Event::Answered { worker, batch, solved, elapsed_s: 0.01 }
+    }
+
+    pub(super) fn has_second_thoughts(&self, worker: WorkerId) -> bool {
+        self.liars.contains(&self.workers[&worker].process)
+    }
+
+    /// A worker answers a batch that is settled again, and differently.
+    pub(super) fn lie(&mut self, worker: WorkerId, batch: BatchId, work: &Work) {
+        let Some(known) = self.workers.get(&worker) else {
+            return;
+        };
+        if !known.stalled && !known.holds.contains_key(&batch) {
+            let mut solved = fake::solved(work);
+            solved[0].outcome = Ok(1.0);
+            self.note_lie(known.process, work);
+            self.message(worker, Event::Answered { worker, batch, solved, elapsed_s: 0.01 });
+        }
+    }
+
+    fn note_lie(&mut self, process: u32, work: &Work) {
+        self.counts.lies += 1;
+        self.lies.insert((process, work.seed));
+    }
+}
