@@ -10,21 +10,22 @@
 //! converges slowly, and how close is different from bone to bone; so every bone is computed in
 //! passes, each finer than the one before, until two of them tell the same (`passes.rs`). The first
 //! pass looks at all that comes before the direct wave; the others, knowing what is picked, at the
-//! first packet only, for which far less of time, fluids and wavenumbers is needed.
+//! first packet only, for which far less of time and fluids, and a coarser grid of wavenumbers, is
+//! needed.
 //!
 //! What an element size, order and time step mean:
 //!
-//! - in the second pass of a plate that is not thin, elements are at most `element_size`, and in a
-//!   layer whose slowest wavelength across it, at the centre frequency, is below 1.5 mm, smaller in
-//!   that proportion: the mesh follows the bone;
+//! - in all passes but the first, elements are at most `element_size`, and smaller where waves at
+//!   the centre frequency are shorter than 1.5 mm: in a fluid in proportion to its wavelength, in the
+//!   bone to the mean, on a scale of ratios, of its slowest wavelength across and the coupling's;
 //! - a time step above the bone's stability limit in the first pass is a failure that names the
 //!   limit; without one the step is the limit. Other passes take the same share of their own limits;
 //! - `refinement` r divides element size and time step, and multiplies the limit of wavenumbers,
 //!   by √r. For smooth pulses the error of elements of order n falls at least as r^(-(n+1)/2),
 //!   that of time steps as r^(-2) ([`element_convergence`], [`time_step_convergence`]).
 //!
-//! The estimated error is the change of the velocity by the last pass, and what the scatter of the
-//! changes of its times could make of it. It is an estimate of size, not a bound.
+//! The estimated error is half of the change of the velocity by the last pass, and of what the scatter
+//! of the changes of its times could make of it. It is an estimate of size, not a bound.
 
 mod convergence;
 mod element;

@@ -116,6 +116,16 @@ fn random_draws_agree_with_the_exact_method() {
     }
 }
 
+/// Bones whose coarser passes tell the same by accident, and a slow one in a thin plate.
+#[test]
+fn bones_that_converge_late_agree_with_the_exact_method() {
+    for (thickness, index, relative) in [(1e-3, 2, 3e-4), (2e-3, 40, 1e-4), (4e-3, 25, 1e-4)] {
+        let setup = setup(|s| s.layers.bone_thickness = thickness);
+        let what = format!("{thickness} m, draw {index}");
+        check_agreement(&setup, &bone(0.6, 7, index), relative, &what);
+    }
+}
+
 #[test]
 fn other_probes_and_layers_agree_with_the_exact_method() {
     let changes: [(&str, Change); 4] = [

@@ -20,7 +20,7 @@ impl Kernel for Limit<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> f64 {
-        stability_limit(self.operator, self.wavenumber, self.state)
+        stability_limit::<V, 1>(self.operator, self.wavenumber, self.state)
     }
 }
 
@@ -87,7 +87,7 @@ impl Kernel for Response<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        run_block(self.operator, self.k, self.times, self.receiver, self.memory);
+        run_block::<V>(self.operator, self.k, self.times, self.receiver, self.memory);
     }
 }
 
@@ -110,7 +110,7 @@ impl Kernel for March<'_> {
                 k.0[lane] = (block * LANES + lane) as f64 * self.plan.wavenumber_step;
             }
             self.incident.fill(k, self.times.ratio, &mut memory.load);
-            run_block(self.operator, k, self.times, (node, &weights), memory);
+            run_block::<V>(self.operator, k, self.times, (node, &weights), memory);
             for (r, receiver) in self.receivers.iter().enumerate() {
                 let sums = &mut memory.pressures[r * samples..(r + 1) * samples];
                 let factors = transform(self.plan, k, receiver.distance);
@@ -124,7 +124,7 @@ impl Kernel for March<'_> {
 
 /// Steps eight wavenumbers through all times; records the pressure at the receivers' height.
 #[inline(always)]
-fn run_block(
+fn run_block<V: Vector>(
     operator: &Operator<1>,
     k: Lanes,
     times: Times,
@@ -133,7 +133,7 @@ fn run_block(
 ) {
     let load = &memory.load;
     let state = &mut memory.state;
-    state.start(operator, k, [load[1], load[2]], times.step);
+    state.start::<V, 1>(operator, k, [load[1], load[2]], times.step);
     for n in 1..times.samples * times.ratio {
         if n.is_multiple_of(times.ratio) {
             let mut pressure = Lanes::ZERO;
@@ -142,7 +142,7 @@ fn run_block(
             }
             memory.record[n / times.ratio] = pressure;
         }
-        state.step(operator, k, [load[n - 1], load[n], load[n + 1]], times.step);
+        state.step::<V, 1>(operator, k, [load[n - 1], load[n], load[n + 1]], times.step);
     }
 }
 

@@ -46,15 +46,20 @@ impl LayerMesh {
 
 impl Mesh {
     /// The mesh for `scope`, of elements `finer` times smaller than the setup says.
+    ///
+    /// Where shear waves in the bone are slower than sound in the coupling fluid, elements follow
+    /// the mean of the two on a scale of ratios: the slowest waves have little part in the first
+    /// arrival.
     pub(super) fn new(setup: &Setup, bone: &Bone, scope: &Scope, finer: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let size = |slowest: f64| {
             let share = (slowest / fc / WAVELENGTH).min(1.0);
             setup.solver.element_size * share / finer
         };
+        let coupling = setup.layers.coupling.sound_speed;
         let sizes = [
-            size(setup.layers.coupling.sound_speed),
-            size(Medium::new(bone).slowest_across()),
+            size(coupling),
+            size((coupling * Medium::new(bone).slowest_across()).sqrt()),
             size(setup.layers.marrow.sound_speed),
         ];
         Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
@@ -128,6 +133,21 @@ mod tests {
         assert!(
             (Medium::new(&bone()).slowest_across() - (3.389e9_f64 / 1598.8).sqrt()).abs() < 0.1
         );
+    }
+
+    #[test]
+    fn elements_in_the_bone_follow_the_mean_of_slow_waves_there_and_in_the_coupling() {
+        let setup = Setup::default();
+        let scope = Scope::whole(&setup, 3960.1);
+        let mut slow = bone();
+        // Four times the density: waves of half the speed, 0.728 mm long; in the fluid 1.5 mm.
+        slow.density *= 4.0;
+        for (bone, largest) in [(bone(), 0.5e-3 * 0.985), (slow, 0.5e-3 * 0.697)] {
+            let mesh = Mesh::new(&setup, &bone, &scope, 1.0);
+            let elements = (4e-3_f64 / largest).ceil();
+            assert_eq!(mesh.bone, LayerMesh { elements: elements as usize, size: 4e-3 / elements });
+            assert!((mesh.coupling.size / 0.5e-3 - 1.0).abs() < 0.1);
+        }
     }
 
     #[test]

@@ -17,35 +17,29 @@
 //! u_tt = -(E τ + k² A11 u - ik A13 y) / ρ,   y = D u / J,   τ = A33 y + ik A31 u,   E_ij = D_ji w_j / (w_i J)
 //! ```
 //!
-//! and a node that two elements of a layer share takes the mean of the two. Displacements are
-//! multiplied by a stiffness per length, which makes them comparable with pressures.
+//! (`solid.rs` says in which form it is computed), and a node that two elements of a layer share
+//! takes the mean of the two. Displacements are multiplied by a stiffness per length, which makes
+//! them comparable with pressures.
 
-#![expect(
-    clippy::manual_memcpy,
-    reason = "a loop of constant length stays in registers, a copied slice goes through memory"
-)]
+mod axes;
+mod fluid;
+mod halves;
+mod solid;
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::layers::Fluid;
 
+use self::fluid::FluidLayer;
+use self::solid::SolidLayer;
+pub(super) use self::solid::{SOLID, Scratch};
 use super::element::Element;
-use super::mesh::{LayerMesh, Mesh};
+use super::mesh::Mesh;
 use crate::lanes::Lanes;
+use crate::vector::Vector;
 
-/// Real numbers per node of the solid: real and imaginary parts of three displacements.
-pub(super) const SOLID: usize = 6;
 /// Real numbers per node of fluid 2.
 const MARROW: usize = 2;
-/// Place of u3's real part in a node of the solid.
-const U3: usize = 2;
-/// The same of its imaginary part.
-const U3_IM: usize = 5;
-/// A node of the solid.
-type Node = [Lanes; SOLID];
-/// Rows of a solid element's matrix that are computed at a time.
-const SOLID_ROWS: usize = 3;
-/// The same of a fluid element.
-const FLUID_ROWS: usize = 9;
+/// Nodes of an element of the default degree, for which loops are unrolled.
+const USUAL_NODES: usize = 9;
 /// A length by which displacements are scaled, m.
 const LENGTH: f64 = 1e-3;
 
@@ -60,52 +54,6 @@ pub(super) struct Operator<const COUPLING: usize> {
     marrow: FluidLayer,
 }
 
-#[derive(Debug, Clone)]
-struct FluidLayer {
-    elements: usize,
-    /// Nodes of one element.
-    count: usize,
-    /// -c² E D / J: entry (i, j) at `[j * count + i]`.
-    stiffness: Vec<f64>,
-    /// -c², (m/s)².
-    diagonal: f64,
-    /// p_tt at the interface per (scaled) u3_tt there.
-    drive: f64,
-}
-
-#[derive(Debug, Clone)]
-struct SolidLayer {
-    elements: usize,
-    count: usize,
-    /// D / J: entry (i, j) at `[j * count + i]`.
-    derivative: Vec<f64>,
-    /// -E in the same order.
-    divergence: Vec<f64>,
-    /// A33 / ρ, A31 / ρ, A11 / ρ by rows.
-    a33: [[f64; 3]; 3],
-    a31: [[f64; 3]; 3],
-    a11: [[f64; 3]; 3],
-    /// (Scaled) u3_tt at a face per pressure there.
-    drive: f64,
-}
-
-/// Scratch memory of one element.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Scratch {
-    slope: Vec<Node>,
-    traction: Vec<Node>,
-    body: Vec<Node>,
-}
-
-impl Scratch {
-    /// Makes room for elements of `count` nodes.
-    pub(super) fn resize(&mut self, count: usize) {
-        for nodes in [&mut self.slope, &mut self.traction, &mut self.body] {
-            nodes.resize(count, [Lanes::ZERO; SOLID]);
-        }
-    }
-}
-
 impl<const COUPLING: usize> Operator<COUPLING> {
     pub(super) fn new(setup: &Setup, bone: &Bone, mesh: &Mesh) -> Self {
         let element = &mesh.element;
@@ -118,11 +66,6 @@ impl<const COUPLING: usize> Operator<COUPLING> {
             solid: SolidLayer::new(bone, &mesh.bone, element, scale),
             marrow: FluidLayer::new(&setup.layers.marrow, &mesh.marrow, element, scale),
         }
-    }
-
-    /// Nodes of one element.
-    pub(super) fn element_nodes(&self) -> usize {
-        self.solid.count
     }
 
     /// Real numbers (in each lane) of a state.
@@ -144,7 +87,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
     /// `out` = A `x` + the effect of the pressure `load` on the upper face; `sink` sees every
     /// number of it once, as soon as it is final.
     #[inline(always)]
-    pub(super) fn apply<S: Sink>(
+    pub(super) fn apply<V: Vector, S: Sink>(
         &self,
         k: Lanes,
         x: &[Lanes],
@@ -159,36 +102,54 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         let (p1_out, rest) = out.split_at_mut(coupling);
         let (u_out, p2_out) = rest.split_at_mut(solid);
 
-        self.solid.apply(k, u, scratch, u_out, coupling, sink);
-        let up = Lanes::splat(self.solid.drive);
-        let down = -up;
+        self.solid.apply::<V, S>(k, u, scratch, u_out, coupling, sink);
         let top = solid - SOLID;
-        u_out[top + U3] = down.mul_add(p1[0] + load, u_out[top + U3]);
-        if COUPLING == 2 {
-            u_out[top + U3_IM] = down.mul_add(p1[1], u_out[top + U3_IM]);
-        }
         let face = marrow - MARROW;
-        u_out[U3] = up.mul_add(p2[face], u_out[U3]);
-        u_out[U3_IM] = up.mul_add(p2[face + 1], u_out[U3_IM]);
-        sink.take(coupling, &u_out[..SOLID]);
-        sink.take(coupling + top, &u_out[top..]);
+        let on_top = [p1[0] + load, if COUPLING == 2 { p1[1] } else { Lanes::ZERO }];
+        self.push(&mut u_out[top..], on_top.map(|p| -p));
+        self.push(&mut u_out[..SOLID], [p2[face], p2[face + 1]]);
+        sink.take::<V>(coupling, &u_out[..SOLID]);
+        sink.take::<V>(coupling + top, &u_out[top..]);
 
-        self.coupling.apply::<COUPLING, S>(k, p1, p1_out, 0, sink);
+        self.coupling.apply::<COUPLING, V, S>(k, p1, p1_out, 0, sink);
         let drive = Lanes::splat(self.coupling.drive);
-        p1_out[0] = drive.mul_add(u_out[top + U3], p1_out[0]);
-        if COUPLING == 2 {
-            p1_out[1] = drive.mul_add(u_out[top + U3_IM], p1_out[1]);
+        let moved = self.across(&u_out[top..]);
+        for c in 0..COUPLING {
+            p1_out[c] = drive.mul_add(moved[c], p1_out[c]);
         }
-        let free = coupling - COUPLING;
-        p1_out[free..].fill(Lanes::ZERO);
-        sink.take(0, &p1_out[..COUPLING]);
+        p1_out[coupling - COUPLING..].fill(Lanes::ZERO);
+        sink.take::<V>(0, &p1_out[..COUPLING]);
 
-        self.marrow.apply::<MARROW, S>(k, p2, p2_out, coupling + solid, sink);
+        self.marrow.apply::<MARROW, V, S>(k, p2, p2_out, coupling + solid, sink);
         let drive = Lanes::splat(-self.marrow.drive);
-        p2_out[face] = drive.mul_add(u_out[U3], p2_out[face]);
-        p2_out[face + 1] = drive.mul_add(u_out[U3_IM], p2_out[face + 1]);
+        let moved = self.across(&u_out[..SOLID]);
+        for c in 0..MARROW {
+            p2_out[face + c] = drive.mul_add(moved[c], p2_out[face + c]);
+        }
         p2_out[..MARROW].fill(Lanes::ZERO);
-        sink.take(coupling + solid + face, &p2_out[face..]);
+        sink.take::<V>(coupling + solid + face, &p2_out[face..]);
+    }
+
+    /// Adds what the pressure `p` (real and imaginary part) does to a face, pushing it upwards.
+    #[inline(always)]
+    fn push(&self, face: &mut [Lanes], p: [Lanes; 2]) {
+        for i in 0..3 {
+            let drive = Lanes::splat(self.solid.drive[i]);
+            face[i] = drive.mul_add(p[0], face[i]);
+            face[i + 3] = drive.mul_add(p[1], face[i + 3]);
+        }
+    }
+
+    /// The component across the layers, its real and imaginary part.
+    #[inline(always)]
+    fn across(&self, face: &[Lanes]) -> [Lanes; 2] {
+        let mut across = [Lanes::ZERO; 2];
+        for i in 0..3 {
+            let depth = Lanes::splat(self.solid.depth[i]);
+            across[0] = depth.mul_add(face[i], across[0]);
+            across[1] = depth.mul_add(face[i + 3], across[1]);
+        }
+        across
     }
 }
 
@@ -197,7 +158,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
 /// The free ends of the fluids, where p = 0 for ever, are not shown.
 pub(super) trait Sink {
     /// Numbers `start` … of A x are `values`. To be `#[inline(always)]`.
-    fn take(&mut self, start: usize, values: &[Lanes]);
+    fn take<V: Vector>(&mut self, start: usize, values: &[Lanes]);
 }
 
 /// Nothing is done.
@@ -205,253 +166,29 @@ pub(super) struct Keep;
 
 impl Sink for Keep {
     #[inline(always)]
-    fn take(&mut self, _: usize, _: &[Lanes]) {}
+    fn take<V: Vector>(&mut self, _: usize, _: &[Lanes]) {}
 }
 
-impl FluidLayer {
-    fn new(fluid: &Fluid, mesh: &LayerMesh, element: &Element, scale: f64) -> Self {
-        let half = 0.5 * mesh.size;
-        let count = element.count();
-        let square = fluid.sound_speed * fluid.sound_speed;
-        let divergence = divergence(element, half);
-        let mut stiffness = vec![0.0; count * count];
-        for j in 0..count {
-            for i in 0..count {
-                let sum = (0..count).fold(0.0, |sum, m| {
-                    divergence[m * count + i].mul_add(element.derivative[m][j] / half, sum)
-                });
-                stiffness[j * count + i] = square * sum;
-            }
-        }
-        Self {
-            elements: mesh.elements,
-            count,
-            stiffness,
-            diagonal: -square,
-            drive: fluid.density * square / (element.weights[0] * half * scale),
-        }
-    }
-
-    #[inline(always)]
-    fn apply<const C: usize, S: Sink>(
-        &self,
-        k: Lanes,
-        p: &[Lanes],
-        out: &mut [Lanes],
-        offset: usize,
-        sink: &mut S,
-    ) {
-        let n = self.count;
-        let (p, _) = p.as_chunks::<C>();
-        let (out, _) = out.as_chunks_mut::<C>();
-        let diagonal = k * k * Lanes::splat(self.diagonal);
-        for e in 0..self.elements {
-            let start = e * (n - 1);
-            let p = &p[start..start + n];
-            let out = &mut out[start..start + n];
-            let shared = out[0];
-            let mut i = 0;
-            while i + FLUID_ROWS <= n {
-                fluid_rows::<FLUID_ROWS, C>(&self.stiffness, i, diagonal, p, out);
-                i += FLUID_ROWS;
-            }
-            while i < n {
-                fluid_rows::<1, C>(&self.stiffness, i, diagonal, p, out);
-                i += 1;
-            }
-            if e > 0 {
-                average(&shared, &mut out[0]);
-            }
-            let first = usize::from(e == 0);
-            sink.take(offset + (start + first) * C, out[first..n - 1].as_flattened());
-        }
-    }
-}
-
-impl SolidLayer {
-    fn new(bone: &Bone, mesh: &LayerMesh, element: &Element, scale: f64) -> Self {
-        let half = 0.5 * mesh.size;
-        let count = element.count();
-        let mut derivative = vec![0.0; count * count];
-        for j in 0..count {
-            for i in 0..count {
-                derivative[j * count + i] = element.derivative[i][j] / half;
-            }
-        }
-        Self {
-            elements: mesh.elements,
-            count,
-            derivative,
-            divergence: divergence(element, half),
-            a33: block(bone, 2, 2),
-            a31: block(bone, 2, 0),
-            a11: block(bone, 0, 0),
-            drive: scale / (bone.density * element.weights[0] * half),
-        }
-    }
-
-    #[inline(always)]
-    fn apply<S: Sink>(
-        &self,
-        k: Lanes,
-        u: &[Lanes],
-        scratch: &mut Scratch,
-        out: &mut [Lanes],
-        offset: usize,
-        sink: &mut S,
-    ) {
-        let n = self.count;
-        let (u, _) = u.as_chunks::<SOLID>();
-        let (out, _) = out.as_chunks_mut::<SOLID>();
-        let slope = &mut scratch.slope[..n];
-        let traction = &mut scratch.traction[..n];
-        let body = &mut scratch.body[..n];
-        for e in 0..self.elements {
-            let start = e * (n - 1);
-            let u = &u[start..start + n];
-            let out = &mut out[start..start + n];
-            let shared = out[0];
-            product::<false>(&self.derivative, u, u, slope);
-            for i in 0..n {
-                self.node(k, &u[i], &slope[i], &mut traction[i], &mut body[i]);
-            }
-            product::<true>(&self.divergence, traction, body, out);
-            if e > 0 {
-                average(&shared, &mut out[0]);
-            }
-            let first = usize::from(e == 0);
-            sink.take(offset + (start + first) * SOLID, out[first..n - 1].as_flattened());
-        }
-    }
-
-    /// From u and its slope y at a node: τ, and the body force ik A13 y - k² A11 u.
-    #[inline(always)]
-    fn node(&self, k: Lanes, u: &Node, y: &Node, traction: &mut Node, body: &mut Node) {
-        // k u and so on without the factor i, which swaps real and imaginary parts.
-        let ku = [k * u[0], k * u[1], k * u[2], k * u[3], k * u[4], k * u[5]];
-        for i in 0..3 {
-            let (mut re, mut im) = (Lanes::ZERO, Lanes::ZERO);
-            let (mut body_re, mut body_im) = (Lanes::ZERO, Lanes::ZERO);
-            for m in 0..3 {
-                let a33 = Lanes::splat(self.a33[i][m]);
-                let a31 = Lanes::splat(self.a31[i][m]);
-                let a13 = Lanes::splat(self.a31[m][i]);
-                let a11 = Lanes::splat(self.a11[i][m]);
-                re = a33.mul_add(y[m], (-a31).mul_add(ku[m + 3], re));
-                im = a33.mul_add(y[m + 3], a31.mul_add(ku[m], im));
-                body_re = a13.mul_add(y[m + 3], a11.mul_add(ku[m], body_re));
-                body_im = a13.mul_add(y[m], (-a11).mul_add(ku[m + 3], body_im));
-            }
-            traction[i] = re;
-            traction[i + 3] = im;
-            body[i] = -(k * body_re);
-            body[i + 3] = k * body_im;
-        }
-    }
-}
-
-/// A_jl / ρ, (m/s)².
-fn block(bone: &Bone, j: usize, l: usize) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|m| bone.elasticity.component(i, j, m, l) / bone.density)
-    })
-}
-
-/// -E of an element of half length `half` (m): entry (i, j) at `[j * count + i]`.
-fn divergence(element: &Element, half: f64) -> Vec<f64> {
+/// -E D / J of an element of half length `half` (m), by rows.
+fn stiffness(element: &Element, half: f64) -> Vec<Vec<f64>> {
     let count = element.count();
-    let mut divergence = vec![0.0; count * count];
-    for j in 0..count {
-        for i in 0..count {
-            divergence[j * count + i] =
-                -(element.derivative[j][i] * element.weights[j] / (element.weights[i] * half));
-        }
-    }
-    divergence
+    let (d, w) = (&element.derivative, &element.weights);
+    let entry = |i: usize, j: usize| {
+        let sum = (0..count).fold(0.0, |sum, m| (w[m] * d[m][i]).mul_add(d[m][j], sum));
+        -sum / (w[i] * half * half)
+    };
+    (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
 }
 
 /// The mean of what two elements say of their shared node.
 #[inline(always)]
-fn average<const C: usize>(below: &[Lanes; C], node: &mut [Lanes; C]) {
-    let half = Lanes::splat(0.5);
+fn average<const C: usize, V: Vector>(below: &[Lanes; C], node: &mut [Lanes; C]) {
+    let half = V::splat(0.5);
     for c in 0..C {
-        node[c] = half * (node[c] + below[c]);
-    }
-}
-
-/// `out` = matrix · `x` (+ `add` if `ADD`).
-#[inline(always)]
-fn product<const ADD: bool>(matrix: &[f64], x: &[Node], add: &[Node], out: &mut [Node]) {
-    let mut i = 0;
-    while i + SOLID_ROWS <= x.len() {
-        solid_rows::<ADD, SOLID_ROWS>(matrix, i, x, add, out);
-        i += SOLID_ROWS;
-    }
-    while i < x.len() {
-        solid_rows::<ADD, 1>(matrix, i, x, add, out);
-        i += 1;
-    }
-}
-
-/// Rows `i` … `i + R` of [`product`]: all sums stay in registers.
-#[inline(always)]
-fn solid_rows<const ADD: bool, const R: usize>(
-    matrix: &[f64],
-    i: usize,
-    x: &[Node],
-    add: &[Node],
-    out: &mut [Node],
-) {
-    let n = x.len();
-    let mut sums = [[Lanes::ZERO; SOLID]; R];
-    if ADD {
-        for r in 0..R {
-            sums[r] = add[i + r];
+        for part in 0..V::PARTS {
+            let sum = V::load(&node[c], part).add(V::load(&below[c], part));
+            half.mul(sum).store(&mut node[c], part);
         }
-    }
-    for j in 0..n {
-        let column = &matrix[j * n + i..j * n + i + R];
-        let node = &x[j];
-        for r in 0..R {
-            let factor = Lanes::splat(column[r]);
-            for c in 0..SOLID {
-                sums[r][c] = factor.mul_add(node[c], sums[r][c]);
-            }
-        }
-    }
-    for r in 0..R {
-        out[i + r] = sums[r];
-    }
-}
-
-/// Rows `i` … `i + R` of a fluid's element: stiffness · `p` + diagonal `p`.
-#[inline(always)]
-fn fluid_rows<const R: usize, const C: usize>(
-    matrix: &[f64],
-    i: usize,
-    diagonal: Lanes,
-    p: &[[Lanes; C]],
-    out: &mut [[Lanes; C]],
-) {
-    let n = p.len();
-    let mut sums = [[Lanes::ZERO; C]; R];
-    for r in 0..R {
-        for c in 0..C {
-            sums[r][c] = diagonal * p[i + r][c];
-        }
-    }
-    for j in 0..n {
-        let column = &matrix[j * n + i..j * n + i + R];
-        let node = &p[j];
-        for r in 0..R {
-            let factor = Lanes::splat(column[r]);
-            for c in 0..C {
-                sums[r][c] = factor.mul_add(node[c], sums[r][c]);
-            }
-        }
-    }
-    for r in 0..R {
-        out[i + r] = sums[r];
     }
 }
 

@@ -6,7 +6,7 @@ use osteon_common::outcome::FailureKind;
 use super::incident::Incident;
 use super::march::{Limit, March, Memory, Receiver};
 use super::operator::Operator;
-use super::plan::{Plan, SAMPLES_BEYOND, Times};
+use super::plan::{Plan, SAMPLES_BEYOND, Times, thinness};
 use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
 use crate::isa::Isa;
@@ -15,14 +15,11 @@ use crate::solver::not_finite;
 use crate::{Arrival, Failure};
 
 /// How fine the first pass is, over what the setup says.
-const FIRST: f64 = 0.65;
-/// A plate thinner than this many metres at 1 Hz (m·Hz) starts finer, by the root of how much
-/// thinner it is: its first extremum lies closer to the wave of the kink.
-const THIN_PLATE: f64 = 2000.0;
-/// Most that a thin plate starts finer.
-const THIN_PLATE_MAX: f64 = 1.5;
-/// How much finer every pass is than the one before.
-const FINER: f64 = 1.55;
+const FIRST: f64 = 0.75;
+/// The same of the second, which in a thin plate is finer still by the fourth root of how thin it is.
+const SECOND: f64 = 1.2;
+/// How much finer every pass from the third on is than the one before.
+const FINER: f64 = 1.5;
 /// Most passes.
 const PASSES_MAX: usize = 4;
 /// Passes without a velocity after which there is none: coarse ones can miss a weak arrival.
@@ -30,8 +27,12 @@ const FAILURES_MAX: usize = 3;
 /// After the first, passes look this many periods of the centre frequency beyond the picked
 /// extremum: what the picking rule compares it with, and a little more.
 const PACKET_PERIODS: f64 = 1.25;
-/// Estimated relative error of the velocity at which passes end, at refinement 1.
-const SMALL_ERROR: f64 = 4e-5;
+/// Share of what a pass changes that is taken for its error: elements have a high order, and most of
+/// the waves of the kink that one pass misses are in the next.
+const REMAINDER: f64 = 0.5;
+/// Estimated relative error of the velocity at which passes end, at refinement 1; in a thin plate
+/// larger by the square of how thin it is, since there the kink's waves die out more slowly.
+const SMALL_ERROR: f64 = 2.5e-5;
 /// Change of the mean of all times, in periods of the centre frequency, at which passes end. That
 /// all times shift alike is the error of the elements, which falls fast; that they scatter is the
 /// kink's, and part of the estimated error.
@@ -66,14 +67,13 @@ impl Passes<'_> {
     /// A typed failure when the case has no velocity in three passes, or what has to be computed is
     /// above its bounds.
     pub(super) fn arrival(&mut self) -> Result<Arrival, Failure> {
-        let mut finer = self.first();
-        let mut last = self.pass(finer, None);
+        let mut last = self.pass(self.fineness(0), None);
         let mut estimate = 1.0;
         for passes in 1..PASSES_MAX {
             if last.as_ref().is_err_and(is_final) {
                 break;
             }
-            finer *= FINER;
+            let finer = self.fineness(passes);
             let mut next = self.pass(finer, last.as_ref().ok());
             if last.is_ok() && next.as_ref().is_err_and(|failure| !is_final(failure)) {
                 // What is picked now may lie behind the packet that was looked at.
@@ -86,9 +86,7 @@ impl Passes<'_> {
                     let change = Change::new(&before.pick, &after.pick);
                     estimate = self.estimate(&change, &after.pick);
                     last = next;
-                    let refinement = self.setup.solver.refinement;
-                    let periods = self.setup.probe.center_frequency * change.shift;
-                    if refinement * estimate <= SMALL_ERROR && refinement * periods <= SMALL_SHIFT {
+                    if self.is_small(&change, estimate) {
                         break;
                     }
                 }
@@ -106,12 +104,14 @@ impl Passes<'_> {
         })
     }
 
-    /// How fine the first pass is.
-    fn first(&self) -> f64 {
-        let setup = self.setup;
-        let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
-        let thin = (THIN_PLATE / thickness).sqrt().clamp(1.0, THIN_PLATE_MAX);
-        FIRST * thin * setup.solver.refinement.sqrt()
+    /// How fine a pass is; they are counted from 0.
+    fn fineness(&self, pass: usize) -> f64 {
+        let over = if pass == 0 {
+            FIRST
+        } else {
+            (2..=pass).fold(SECOND * thinness(self.setup).sqrt().sqrt(), |over, _| FINER * over)
+        };
+        over * self.setup.solver.refinement.sqrt()
     }
 
     /// The relative error of the velocity: its change, and what the scatter of the times would make
@@ -124,7 +124,16 @@ impl Passes<'_> {
             square = (x - mean).mul_add(x - mean, square);
             largest = largest.max((x - mean).abs());
         }
-        change.velocity + pick.velocity * change.scatter * largest / square
+        REMAINDER * (change.velocity + pick.velocity * change.scatter * largest / square)
+    }
+
+    /// Whether a pass changed so little that it can be the last.
+    fn is_small(&self, change: &Change, estimate: f64) -> bool {
+        let refinement = self.setup.solver.refinement;
+        let periods = self.setup.probe.center_frequency * change.shift;
+        let thinness = thinness(self.setup);
+        refinement * estimate <= SMALL_ERROR * thinness * thinness
+            && refinement * periods <= SMALL_SHIFT
     }
 
     /// Computes the bone `finer` times as fine as the setup says: the packet that was found
@@ -187,7 +196,7 @@ impl Passes<'_> {
         let share = match self.setup.solver.time_step {
             None => 1.0,
             Some(step) => {
-                let allowed = limit * self.first();
+                let allowed = limit * self.fineness(0);
                 if step > allowed {
                     return Err(Failure {
                         kind: FailureKind::NoConvergence,

@@ -14,6 +14,11 @@ use crate::lanes::LANES;
 /// Highest frequency over centre frequency whose waves along the coupling fluid are resolved, at
 /// the fineness that the setup says. The large reflected wave needs it more than the first arrival.
 const BAND: f64 = 4.0;
+/// Plates thinner than this many metres at 1 Hz (m·Hz) are computed finer: their first extremum lies
+/// closer to the wave of the kink.
+const THIN_PLATE: f64 = 2000.0;
+/// Thinness beyond which nothing is made finer still.
+const THINNESS_MAX: f64 = 2.25;
 /// Exponent at which evanescent waves between face and probe are neglected.
 const EVANESCENCE: f64 = 12.0;
 /// Where the taper of wavenumbers starts, as a fraction of their limit.
@@ -25,7 +30,7 @@ pub(super) const SAMPLES_BEYOND: usize = 8;
 /// Most elements of a mesh.
 const ELEMENTS_MAX: usize = 2000;
 /// Nodes per wavelength in the coupling fluid at the frequency above which nothing is resolved.
-const NODES_PER_WAVELENGTH: f64 = 4.0;
+const NODES_PER_WAVELENGTH: f64 = 3.0;
 /// Samples per period of that frequency.
 const BAND_SAMPLES: f64 = 6.0;
 /// Most time steps.
@@ -97,7 +102,7 @@ impl Plan {
             band: sound_speed / (NODES_PER_WAVELENGTH * spacing),
             mesh,
             wavenumber_step: 2.0 * PI / length,
-            wavenumber_limit: finer
+            wavenumber_limit: wavenumber_fineness(setup, finer)
                 * propagating.mul_add(propagating, evanescent * evanescent).sqrt(),
             end,
         })
@@ -148,7 +153,49 @@ impl Plan {
     }
 }
 
+/// How much thinner the plate is than one that is not thin; at least 1.
+pub(super) fn thinness(setup: &Setup) -> f64 {
+    let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
+    (THIN_PLATE / thickness).clamp(1.0, THINNESS_MAX)
+}
+
+/// How far wavenumbers reach over what the setup says, for elements `finer` times as fine.
+///
+/// Of waves of one frequency the slow ones are the first to be cut off, and what is picked is fast.
+/// So beyond what the setup says wavenumbers grow as the root of the fineness only, and of thinness.
+fn wavenumber_fineness(setup: &Setup, finer: f64) -> f64 {
+    let usual = setup.solver.refinement.sqrt();
+    let over = finer / usual;
+    usual * over.min((over * thinness(setup)).sqrt())
+}
+
 /// The computation would take more than its bounds allow.
 fn too_large(detail: String) -> Failure {
     Failure { kind: FailureKind::NoConvergence, detail }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wavenumbers_grow_with_fineness_and_thinness_by_the_root() {
+        for (thickness, refinement, finer, expected) in [
+            (4e-3, 1.0, 0.75, 0.75),
+            (4e-3, 1.0, 1.44, 1.2),
+            (4e-3, 4.0, 2.88, 2.4),
+            (1e-3, 1.0, 2.0, 2.0),
+            (1e-3, 1.0, 4.5, 3.0),
+            (1e-4, 1.0, 4.0, 3.0),
+        ] {
+            let mut setup = Setup::default();
+            setup.layers.bone_thickness = thickness;
+            setup.solver.refinement = refinement;
+            let found = wavenumber_fineness(&setup, finer);
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{thickness} m, {refinement}, {finer}: {found}"
+            );
+        }
+    }
 }

@@ -8,6 +8,7 @@
 
 use super::operator::{Keep, Operator, Scratch, Sink};
 use crate::lanes::{LANES, Lanes};
+use crate::vector::Vector;
 
 /// Steps of the power iteration. The largest eigenvalues lie close together, and after m steps
 /// from a random vector of n numbers about 0.87 ln(n) / (m - 1) of the largest can be missing: 3 %
@@ -18,7 +19,7 @@ pub(super) const STABLE_SHARE: f64 = 0.98;
 
 /// The largest stable time step, s, at wavenumber `k` (rad/m).
 #[inline(always)]
-pub(super) fn stability_limit<const COUPLING: usize>(
+pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     operator: &Operator<COUPLING>,
     k: f64,
     state: &mut State,
@@ -35,7 +36,8 @@ pub(super) fn stability_limit<const COUPLING: usize>(
     let k = Lanes::splat(k);
     let mut growth = Lanes::ZERO;
     for _ in 0..POWER_STEPS {
-        operator.apply(k, &state.now, Lanes::ZERO, &mut state.scratch, &mut state.first, &mut Keep);
+        let scratch = &mut state.scratch;
+        operator.apply::<V, Keep>(k, &state.now, Lanes::ZERO, scratch, &mut state.first, &mut Keep);
         let mut square = Lanes::ZERO;
         for &value in &state.first {
             square = value.mul_add(value, square);
@@ -66,7 +68,6 @@ pub(super) struct State {
 impl State {
     /// Everything at rest.
     pub(super) fn rest<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
-        self.scratch.resize(operator.element_nodes());
         let len = operator.len();
         for vector in [&mut self.now, &mut self.before, &mut self.first, &mut self.second] {
             vector.clear();
@@ -77,7 +78,7 @@ impl State {
     /// From rest at t = 0 to t = `step` under a load that starts as t² or more smoothly; `load`
     /// are its values at 1 and 2 steps.
     #[inline(always)]
-    pub(super) fn start<const COUPLING: usize>(
+    pub(super) fn start<V: Vector, const COUPLING: usize>(
         &mut self,
         operator: &Operator<COUPLING>,
         k: Lanes,
@@ -87,7 +88,8 @@ impl State {
         self.rest(operator);
         // ∫∫ of a load α t² + β t³ over one step, from its values.
         let mean = Lanes::splat(7.0 / 60.0).mul_add(load[0], Lanes::splat(-1.0 / 120.0) * load[1]);
-        operator.apply(k, &self.before, mean, &mut self.scratch, &mut self.first, &mut Keep);
+        let out = &mut self.first;
+        operator.apply::<V, Keep>(k, &self.before, mean, &mut self.scratch, out, &mut Keep);
         let square = Lanes::splat(step * step);
         for (now, &first) in self.now.iter_mut().zip(&self.first) {
             *now = square * first;
@@ -96,25 +98,26 @@ impl State {
 
     /// One step; `load` are the load's values one step before, now, and one step after.
     #[inline(always)]
-    pub(super) fn step<const COUPLING: usize>(
+    pub(super) fn step<V: Vector, const COUPLING: usize>(
         &mut self,
         operator: &Operator<COUPLING>,
         k: Lanes,
         load: [Lanes; 3],
         step: f64,
     ) {
-        operator.apply(k, &self.now, load[1], &mut self.scratch, &mut self.first, &mut Keep);
+        let out = &mut self.first;
+        operator.apply::<V, Keep>(k, &self.now, load[1], &mut self.scratch, out, &mut Keep);
         let square = step * step;
         let bend = Lanes::splat(1.0 / square) * ((load[2] - load[1]) - (load[1] - load[0]));
         let mut advance = Advance {
             now: &self.now,
             before: &mut self.before,
             rate: &self.first,
-            once: Lanes::splat(square),
-            twice: Lanes::splat(square * square / 12.0),
+            once: square,
+            twice: square * square / 12.0,
         };
         let out = &mut self.second;
-        operator.apply(k, &self.first, bend, &mut self.scratch, out, &mut advance);
+        operator.apply::<V, Advance>(k, &self.first, bend, &mut self.scratch, out, &mut advance);
         std::mem::swap(&mut self.now, &mut self.before);
     }
 }
@@ -126,21 +129,25 @@ struct Advance<'a> {
     /// a.
     rate: &'a [Lanes],
     /// Δ².
-    once: Lanes,
+    once: f64,
     /// Δ⁴/12.
-    twice: Lanes,
+    twice: f64,
 }
 
 impl Sink for Advance<'_> {
     #[inline(always)]
-    fn take(&mut self, start: usize, values: &[Lanes]) {
+    fn take<V: Vector>(&mut self, start: usize, values: &[Lanes]) {
         let end = start + values.len();
         let (now, rate) = (&self.now[start..end], &self.rate[start..end]);
         let before = &mut self.before[start..end];
-        let two = Lanes::splat(2.0);
+        let (once, twice, two) = (V::splat(self.once), V::splat(self.twice), V::splat(2.0));
         for i in 0..values.len() {
-            let change = self.once.mul_add(rate[i], self.twice * values[i]);
-            before[i] = two.mul_add(now[i], change - before[i]);
+            for part in 0..V::PARTS {
+                let bend = twice.mul(V::load(&values[i], part));
+                let change = once.mul_add(V::load(&rate[i], part), bend);
+                let change = change.sub(V::load(&before[i], part));
+                two.mul_add(V::load(&now[i], part), change).store(&mut before[i], part);
+            }
         }
     }
 }

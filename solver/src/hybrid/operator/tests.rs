@@ -1,10 +1,13 @@
+use osteon_common::layers::Fluid;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
 use super::*;
+use crate::hybrid::mesh::LayerMesh;
 use crate::hybrid::scope::Scope;
 use crate::hybrid::stepping::{State, stability_limit};
 use crate::lanes::LANES;
+use crate::vector::Scalar;
 
 /// A triclinic draw.
 fn bone() -> Bone {
@@ -46,9 +49,8 @@ fn noise<const C: usize>(operator: &Operator<C>, seed: u64) -> Vec<Lanes> {
 
 fn applied<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes]) -> Vec<Lanes> {
     let mut scratch = Scratch::default();
-    scratch.resize(operator.element_nodes());
     let mut out = vec![Lanes::ZERO; x.len()];
-    operator.apply(k, x, Lanes::ZERO, &mut scratch, &mut out, &mut Keep);
+    operator.apply::<Scalar, Keep>(k, x, Lanes::ZERO, &mut scratch, &mut out, &mut Keep);
     out
 }
 
@@ -122,7 +124,7 @@ fn energy_without_source_is_conserved() {
     let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
     let mut state = State::default();
-    let step = 0.9 * stability_limit(&operator, k.0[LANES - 1], &mut state);
+    let step = 0.9 * stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
     state.rest(&operator);
     state.now = noise(&operator, 3);
     state.before = noise(&operator, 4);
@@ -143,7 +145,7 @@ fn energy_without_source_is_conserved() {
     };
     let before = energy(&state);
     for _ in 0..2000 {
-        state.step(&operator, k, [Lanes::ZERO; 3], step);
+        state.step::<Scalar, _>(&operator, k, [Lanes::ZERO; 3], step);
     }
     let after = energy(&state);
     for lane in 0..LANES {
@@ -158,14 +160,14 @@ fn driven<const C: usize>() -> Vec<Lanes> {
     let operator = Operator::<C>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
     let mut state = State::default();
-    let step = stability_limit(&operator, k.0[LANES - 1], &mut state);
+    let step = stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
     let load = |n: usize| {
         let t = n as f64 * step / 0.3e-6 - 6.1;
         Lanes::splat(libm::exp(-t * t))
     };
-    state.start(&operator, k, [load(1), load(2)], step);
+    state.start::<Scalar, _>(&operator, k, [load(1), load(2)], step);
     for n in 1..600 {
-        state.step(&operator, k, [load(n - 1), load(n), load(n + 1)], step);
+        state.step::<Scalar, _>(&operator, k, [load(n - 1), load(n), load(n + 1)], step);
     }
     state.now[..operator.lengths().0].to_vec()
 }
@@ -191,12 +193,12 @@ fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
     let operator = Operator::<1>::new(&setup(), &bone(), &mesh());
     let k = Lanes::splat(4900.0);
     let mut state = State::default();
-    let limit = stability_limit(&operator, 4900.0, &mut state);
+    let limit = stability_limit::<Scalar, _>(&operator, 4900.0, &mut state);
     for (share, stable) in [(1.0, true), (1.05, false)] {
         state.rest(&operator);
         state.now = noise(&operator, 5);
         for _ in 0..3000 {
-            state.step(&operator, k, [Lanes::ZERO; 3], share * limit);
+            state.step::<Scalar, _>(&operator, k, [Lanes::ZERO; 3], share * limit);
         }
         let bounded = state.now.iter().flat_map(|p| p.0).all(|p| p.abs() < 1e6);
         assert_eq!(bounded, stable, "{share} of the limit");
