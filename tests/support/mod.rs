@@ -129,6 +129,12 @@ impl Owned {
         Self(command.stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap())
     }
 
+    /// As [`spawn`](Self::spawn), with stderr at the end of a file.
+    pub(crate) fn spawn_logging(command: &mut Command, log: &Path) -> Self {
+        let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
+        Self(command.stdout(Stdio::piped()).stderr(log).spawn().unwrap())
+    }
+
     pub(crate) fn id(&self) -> u32 {
         self.0.id()
     }
