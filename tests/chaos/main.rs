@@ -28,3 +28,6 @@ mod support;
 
 mod answers;
 mod kills;
+mod network;
+mod resumed;
+mod stopped;

@@ -108,17 +108,25 @@ impl Api {
 
     /// The result of an ended job.
     pub(crate) fn result(&mut self, job: &str) -> JobResult {
+        let result = |part| match part {
+            Part::Result(result) => Some(result),
+            _ => None,
+        };
+        self.parts(job).into_iter().find_map(result).unwrap()
+    }
+
+    /// All that an ended job left.
+    pub(crate) fn parts(&mut self, job: &str) -> Vec<Part> {
         let request = FetchRequest { job: job.to_owned() };
-        let found = self.call(async |client| {
-            let mut parts = client.fetch(request).await?.into_inner();
-            while let Some(part) = parts.message().await? {
-                if let Some(Part::Result(result)) = part.part {
-                    return Ok(result);
-                }
+        let parts = self.call(async |client| {
+            let mut stream = client.fetch(request).await?.into_inner();
+            let mut parts = Vec::new();
+            while let Some(response) = stream.message().await? {
+                parts.extend(response.part);
             }
-            Err(Status::not_found("no result among the parts"))
+            Ok(parts)
         });
-        found.unwrap()
+        parts.unwrap()
     }
 }
 
