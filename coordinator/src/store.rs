@@ -174,6 +174,18 @@ pub enum StoreError {
         /// What SQLite said.
         source: rusqlite::Error,
     },
+    /// The system fails to read or write it.
+    #[error(
+        "{} cannot be read or written: {source}; see that its disk is sound and that no quota is \
+         used up",
+        path.display()
+    )]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
     /// It cannot be opened or written.
     #[error(
         "{} cannot be written: {source}; give the coordinator's user write permission to it and \

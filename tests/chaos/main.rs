@@ -27,6 +27,8 @@ mod service;
 mod support;
 
 mod answers;
+mod crowd;
+mod disk;
 mod kills;
 mod network;
 mod resumed;

@@ -2,7 +2,8 @@
 //! workers, and what their logs tell.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::support::{Owned, Scratch, eventually, osteon, text};
 
@@ -10,6 +11,8 @@ use crate::support::{Owned, Scratch, eventually, osteon, text};
 pub(crate) struct Service {
     directory: PathBuf,
     log: PathBuf,
+    /// What starts it, before its own command.
+    enter: Vec<String>,
     options: Vec<String>,
     url: String,
     process: Option<Owned>,
@@ -18,9 +21,20 @@ pub(crate) struct Service {
 impl Service {
     /// On a free port, with its store and its log in `scratch`.
     pub(crate) fn start(scratch: &Scratch, options: &[&str]) -> Self {
+        Self::start_in(scratch, &scratch.path("store"), &[], options)
+    }
+
+    /// With its store in `directory`, started by the command `enter` that another one follows.
+    pub(crate) fn start_in(
+        scratch: &Scratch,
+        directory: &Path,
+        enter: &[String],
+        options: &[&str],
+    ) -> Self {
         let mut service = Self {
-            directory: scratch.path("store"),
+            directory: directory.to_owned(),
             log: scratch.path("coordinator.log"),
+            enter: enter.to_vec(),
             options: options.iter().map(|&option| option.to_owned()).collect(),
             url: "http://127.0.0.1:0".to_owned(),
             process: None,
@@ -35,7 +49,14 @@ impl Service {
         let listen = self.url.trim_start_matches("http://").to_owned();
         // Somebody else's connection may hold the port for a moment.
         eventually("the coordinator starts", || {
-            let mut command = osteon();
+            let mut command = match self.enter.split_first() {
+                None => osteon(),
+                Some((program, arguments)) => {
+                    let mut command = Command::new(program);
+                    command.args(arguments).arg(osteon().get_program());
+                    command
+                }
+            };
             command.args(["coordinator", "--listen", &listen, "--store"]).arg(&self.directory);
             command.args(&self.options).env("RUST_LOG", "info");
             let mut process = Owned::spawn_logging(&mut command, &self.log);
@@ -94,7 +115,7 @@ pub(crate) fn worker(scratch: &Scratch, url: &str) -> Owned {
 }
 
 /// The digest of the job in a file, computed without a disturbance in one embedded run.
-pub(crate) fn undisturbed(command: &str, job: &std::path::Path) -> String {
+pub(crate) fn undisturbed(command: &str, job: &Path) -> String {
     let result = crate::support::run(&[command, text(job), "--json"]).json();
     result["digest"].as_str().unwrap().to_owned()
 }
