@@ -70,6 +70,31 @@ fn submission_is_idempotent_by_request_id() {
 }
 
 #[test]
+fn a_store_that_cannot_be_used_is_named_and_left_as_it_is() {
+    let scratch = Scratch::new();
+    let refused = |store: &std::path::Path, expected: &str| {
+        let listen = ["coordinator", "--listen", "127.0.0.1:0", "--store"];
+        let refused = run(&[&listen[..], &[store.to_str().unwrap()]].concat());
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        assert!(refused.stderr.contains(expected), "{expected}: {refused:?}");
+        assert!(refused.stderr.contains("choose another"), "{refused:?}");
+    };
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let holder =
+        format!("is in use by the coordinator with process {} on ", coordinator.process.id());
+    refused(&scratch.path("store"), &holder);
+    assert_eq!(coordinator.client(&["jobs"]).succeeded(), "no jobs\n");
+
+    let garbage = scratch.path("garbage");
+    fs::create_dir(&garbage).unwrap();
+    fs::write(garbage.join("osteon.sqlite"), "no database at all").unwrap();
+    refused(&garbage, "is damaged or no database");
+    assert_eq!(fs::read(garbage.join("osteon.sqlite")).unwrap(), b"no database at all");
+    refused(&garbage.join("osteon.sqlite"), "cannot create");
+    refused(std::path::Path::new("/proc/self"), "cannot write and lock");
+}
+
+#[test]
 fn ended_jobs_are_pruned_and_their_ids_printed() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(30, 4));

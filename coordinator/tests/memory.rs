@@ -75,7 +75,7 @@ fn ended_jobs_take_little_memory() {
     react(&mut state, Event::Hello { worker: WorkerId(1), hello }, Duration::ZERO);
     let mut one_more = |seed| {
         let mut specification = fake::identification(REALIZATIONS, 2, seed);
-        specification.data = Some(Data::Velocities(vec![3900.0, 3901.0].repeat(50_000)));
+        specification.data = Some(Data::Velocities([3900.0, 3901.0].repeat(50_000)));
         let request = Request::Submit {
             specification: Arc::new(specification),
             request_id: String::new(),

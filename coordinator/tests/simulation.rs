@@ -37,7 +37,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     }
     // A simulation in which nothing goes wrong tests nothing.
     if seeds.end - seeds.start == SCHEDULES {
-        let world::Counts { lost, revoked, closed, late, restarts, refusals, .. } = seen;
+        let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -45,6 +45,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("late answers", late),
             ("restarts", restarts),
             ("refusals of the store", refusals),
+            ("batches computed again to compare", checked),
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }

@@ -66,7 +66,7 @@ pub(super) fn hand_check(
             if let Some(evaluation) = state.evaluation_mut(job) {
                 evaluation.disputes[at].judge = batch;
             }
-            return true;
+            return batch.is_some();
         }
         let of_others = |audit: &Audit| audit.by != name;
         let at = evaluation.audits.iter().position(of_others);

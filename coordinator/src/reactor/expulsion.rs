@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Effects, batches, reread, workers};
+use super::{Effects, batches, jobs, reread, workers};
 use crate::effect::{CloseReason, Effect, Record};
 use crate::evaluation::Evaluation;
 use crate::ids::{JobId, WorkerId};
@@ -103,10 +103,18 @@ pub(super) fn stored(state: &mut State, number: u64, effects: &mut Effects) {
 }
 
 /// The expulsion with this number could not be stored; it is tried again.
-pub(super) fn store_failed(state: &mut State, number: u64) {
+pub(super) fn store_failed(
+    state: &mut State,
+    number: u64,
+    error: String,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let found = state.expelled.iter_mut().find(|expelled| expelled.record.number == number);
     if let Some(expelled) = found {
         expelled.refused = true;
+        let since = expelled.record.at;
+        jobs::despair_if_late(state, since, error, now, effects);
     }
 }
 

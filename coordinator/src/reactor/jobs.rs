@@ -77,7 +77,7 @@ pub(super) fn store_failed(
     effects: &mut Effects,
 ) {
     if let RecordKey::Expulsion(number) = key {
-        expulsion::store_failed(state, number);
+        expulsion::store_failed(state, number, error, now, effects);
         return;
     }
     let retry_at = now + state.config.store_retry;

@@ -37,8 +37,15 @@ use columns::{
 pub struct SqliteStore {
     connection: Connection,
     path: PathBuf,
-    /// Held until the end.
-    _lock: File,
+    /// Held until the end; says whose the store is.
+    lock: File,
+}
+
+impl Drop for SqliteStore {
+    fn drop(&mut self) {
+        // A name that is left there does no harm: what counts is the lock.
+        let _ = self.lock.set_len(0);
+    }
 }
 
 impl SqliteStore {
@@ -50,7 +57,7 @@ impl SqliteStore {
     /// SQLite refuses.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let (connection, lock, path) = opening::open(directory)?;
-        Ok(Self { connection, path, _lock: lock })
+        Ok(Self { connection, path, lock })
     }
 
     fn refused(&self, source: rusqlite::Error) -> StoreError {

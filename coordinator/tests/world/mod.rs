@@ -47,6 +47,8 @@ pub(crate) struct Counts {
     pub(crate) exposed: u64,
     /// Times without any write.
     pub(crate) outages: u64,
+    /// Batches of which somebody has answered every realization before.
+    pub(crate) checked: u64,
     /// Wrong answers.
     pub(crate) lies: u64,
     /// Workers expelled.
@@ -75,6 +77,7 @@ impl Counts {
         self.cancelled += other.cancelled;
         self.exposed += other.exposed;
         self.outages += other.outages;
+        self.checked += other.checked;
         self.lies += other.lies;
         self.expelled += other.expelled;
         self.replaced += other.replaced;
@@ -155,6 +158,8 @@ pub(crate) struct World {
     lies: BTreeSet<(u32, u64)>,
     /// Who is expelled.
     expelled: BTreeSet<u32>,
+    /// Seed, point and indices of batches that were answered in this life of the coordinator.
+    answered_batches: BTreeSet<(u64, u64, u64, u32)>,
     /// Jobs that end while somebody who lied in them is not found out.
     deceived: BTreeSet<JobId>,
     /// The last decision on the end of each job.
@@ -222,6 +227,7 @@ impl World {
             liars,
             lies: BTreeSet::new(),
             expelled: BTreeSet::new(),
+            answered_batches: BTreeSet::new(),
             deceived: BTreeSet::new(),
             ends: BTreeMap::new(),
             processes: 0,
@@ -388,8 +394,8 @@ impl World {
             }
             self.counts.late += u64::from(held.is_none());
             let known = self.workers.get_mut(&worker).unwrap();
-            if !malformed {
-                known.holds.remove(batch);
+            if !malformed && let Some(work) = known.holds.remove(batch) {
+                self.answered_batches.insert(key(&work));
             }
         }
         self.workers.get_mut(&worker).unwrap().heard = self.now;
@@ -468,6 +474,7 @@ impl World {
             self.within(500, Happening::Arrive);
         }
         self.workers.clear();
+        self.answered_batches.clear();
         self.submissions.clear();
         self.cancellations.clear();
         let expelled = self.store.expulsions().unwrap();
@@ -521,6 +528,7 @@ impl World {
 
     /// A worker gets a batch; the dice say what becomes of it.
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
+        self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let known = self.workers.get_mut(&worker).unwrap();
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
@@ -549,6 +557,12 @@ impl World {
             _ => self.within(150, Happening::Message(worker, right)),
         }
     }
+}
+
+/// What a batch is about.
+fn key(work: &Work) -> (u64, u64, u64, u32) {
+    let point = work.point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()));
+    (work.seed, point, work.first, work.count)
 }
 
 /// One to three clients with small jobs.

@@ -147,3 +147,22 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
     let effects = rig.event(stored(1, RecordKey::Evaluation(0)));
     assert!(effects.iter().all(|effect| effect.starts_with("send")), "{effects:?}");
 }
+
+#[test]
+fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
+    let (mut rig, _) = rig(&[2], 1);
+    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    let expelled = expose(&mut rig, 2).swap_remove(0);
+    let failed = || Event::StoreFailed {
+        job: JobId(2),
+        key: RecordKey::Expulsion(1),
+        error: "the disk is full".to_owned(),
+    };
+    for _ in 0..2 {
+        rig.check(failed(), &[]);
+        rig.check_after(Duration::from_secs(2), &[&expelled]);
+    }
+    rig.check(failed(), &["despair after 4s: the disk is full"]);
+    rig.check_after(Duration::from_secs(2), &[&expelled]);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+}

@@ -244,7 +244,7 @@ fn with_a_rollback_journal_everything_is_the_same() {
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
-    let mut store = SqliteStore { connection, path, _lock: lock };
+    let mut store = SqliteStore { connection, path, lock };
     store.put_evaluation(&evaluation(1, 0), true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
