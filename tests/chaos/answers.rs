@@ -5,9 +5,7 @@ use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_common::version;
-use osteon_proto::v1::{
-    ExpelledWorker, JobState, JobStatus, ListExpelledRequest, WorkerHello,
-};
+use osteon_proto::v1::{ExpelledWorker, JobState, JobStatus, ListExpelledRequest, WorkerHello};
 use tonic::{Code, Status};
 
 use crate::api::{Api, specification};
@@ -134,8 +132,7 @@ fn one_liar_among_two_is_an_integrity_error_that_names_both() {
     for part in ["peer (process 1)", &format!("(process {})", honest.id()), "realization "] {
         assert!(ended.reason.contains(part), "{part} in {}", ended.reason);
     }
-    let watched =
-        osteon(&["watch", &story.job, "--coordinator", story.service.url()]);
+    let watched = osteon(&["watch", &story.job, "--coordinator", story.service.url()]);
     assert_eq!(watched.code, Some(1), "{watched:?}");
     assert!(watched.stdout.contains("peer (process 1)"), "{watched:?}");
     assert!(story.expelled().is_empty(), "nobody can say who lied");
@@ -166,6 +163,52 @@ fn what_a_worker_answers_after_its_lease_changes_nothing() {
     story.check_end();
     assert_eq!(story.service.expirations(), 1);
     assert!(story.expelled().is_empty());
+}
+
+/// Workers that compute rightly and die of one realization, again and again.
+async fn mortals(url: String, process: u32, deadly: (u64, u64)) {
+    let mut attached = 0;
+    // Until the coordinator is gone.
+    while let Ok(mut peer) = Peer::attach(&url, hello(process + attached)).await {
+        attached += 1;
+        while let Ok((batch, work)) = peer.batch().await {
+            let (seed, index) = deadly;
+            if work.seed == seed
+                && (work.first..work.first + u64::from(work.count)).contains(&index)
+            {
+                break;
+            }
+            peer.answer(batch, &peer::solve(&work)).await;
+        }
+    }
+}
+
+#[test]
+fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
+    let scratch = Scratch::new();
+    let text = job(40, 4);
+    let doomed = scratch.write("doomed.toml", &text);
+    let sound = scratch.write("sound.toml", &text.replace("seed = 7", "seed = 8"));
+    let mut service = Service::start(&scratch, &[]);
+    let mut api = Api::new(service.url());
+    let [doomed, other] = [doomed.as_path(), sound.as_path()].map(|file| {
+        let job = specification(file, JobKind::Identification);
+        api.submit(&job, "").unwrap()
+    });
+    let workers = [100, 200].map(|process| {
+        let url = service.url().to_owned();
+        on_thread(move || mortals(url, process, (7, 33)))
+    });
+    let failed = api.end(&doomed);
+    assert_eq!(failed.status(), JobStatus::Failed);
+    for part in ["realization 33", "osteon draw", "--index 33"] {
+        assert!(failed.reason.contains(part), "{part} in {}", failed.reason);
+    }
+    assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
+    service.kill();
+    for worker in workers {
+        worker.join().unwrap();
+    }
 }
 
 /// Its hello is changed on the way to the coordinator.

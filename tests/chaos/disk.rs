@@ -26,7 +26,8 @@ impl Disk {
     fn mount(scratch: &Scratch, options: &str) -> Option<Self> {
         let directory = scratch.path("disk");
         fs::create_dir_all(&directory).unwrap();
-        let mount = format!("mount -t tmpfs -o {options} tmpfs {} && echo mounted", text(&directory));
+        let mount =
+            format!("mount -t tmpfs -o {options} tmpfs {} && echo mounted", text(&directory));
         // As root, or as root of a user namespace.
         for user in [&[] as &[&str], &["--user", "--map-root-user"]] {
             let mut command = Command::new("unshare");

@@ -29,7 +29,8 @@ const SUBMITTERS: usize = 4;
 #[test]
 fn killed_and_stopped_again_and_again_every_job_ends_with_its_digest() {
     let number = |name: &str, default: u64| {
-        std::env::var(name).map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name}")))
+        std::env::var(name)
+            .map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name}")))
     };
     let seed = number("OSTEON_CHAOS_SEED", 1);
     let kills = number("OSTEON_CHAOS_KILLS", KILLS as u64) as usize;
