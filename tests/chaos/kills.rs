@@ -16,7 +16,7 @@ use crate::service::{Service, undisturbed};
 use crate::support::{Owned, Scratch, eventually, job};
 
 /// Kills of the coordinator, and as many of workers, unless the environment asks for others.
-const KILLS: usize = 26;
+const KILLS: usize = 50;
 /// Most realizations between two blows.
 const PAUSE_MAX: usize = 70;
 /// Workers, of one thread each.

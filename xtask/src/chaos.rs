@@ -6,7 +6,7 @@ use crate::{cargo, cargo_command};
 
 const USAGE: &str = "usage: cargo xtask chaos [--kills N] [--seed S]";
 /// Kills of the coordinator, and as many of workers.
-const KILLS: u64 = 50;
+const KILLS: u64 = 200;
 /// The test.
 const STORM: &str = "kills::killed_and_stopped_again_and_again_every_job_ends_with_its_digest";
 

@@ -49,7 +49,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "chaos",
-        "kills coordinator and workers while jobs run: --kills N (50 each) --seed S (1)",
+        "kills coordinator and workers while jobs run: --kills N (200 each) --seed S (1)",
         Action::Function(chaos::storm),
     ),
     ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
