@@ -39,7 +39,9 @@ fn killed_and_stopped_again_and_again_every_job_ends_with_its_digest() {
     let mut blows = vec![Blow::KillCoordinator; kills - kills / 4];
     blows.extend(vec![Blow::KillDuringSubmission; kills / 4]);
     blows.extend(vec![Blow::KillWorker; kills]);
-    blows.extend(vec![Blow::StopWorker; 1 + kills / 12]);
+    for rare in [Blow::StopWorker, Blow::EndWorker, Blow::EndCoordinator] {
+        blows.extend(vec![rare; 1 + kills / 12]);
+    }
     random.shuffle(&mut blows);
 
     let scratch = Scratch::new();
@@ -61,6 +63,9 @@ enum Blow {
     KillWorker,
     /// Until its lease has ended; then it wakes.
     StopWorker,
+    /// In order, by SIGTERM.
+    EndWorker,
+    EndCoordinator,
 }
 
 /// What jobs may be, and what their digests are.
@@ -137,6 +142,12 @@ impl<'a> Storm<'a> {
         match blow {
             Blow::KillCoordinator => {
                 self.service.kill();
+                self.survived.coordinator_kills += 1;
+                self.rise();
+            }
+            Blow::EndCoordinator => {
+                self.service.end();
+                self.survived.orderly_ends += 1;
                 self.rise();
             }
             Blow::KillDuringSubmission => self.kill_during_submission(),
@@ -146,26 +157,41 @@ impl<'a> Storm<'a> {
                 self.workers[doomed] = self.service.worker(self.scratch);
                 self.survived.worker_kills += 1;
             }
-            Blow::StopWorker => {
-                let stopped = self.random.below(WORKERS);
-                let expired = self.service.expirations();
-                // It is sure to have a lease that can end.
-                eventually("all workers are attached", || {
-                    let jobs = self.api.jobs();
-                    jobs.is_some_and(|jobs| jobs.iter().all(|job| job.workers as usize == WORKERS))
-                });
-                self.workers[stopped].signal("STOP");
-                eventually("the lease ends", || self.service.expirations() > expired);
-                self.workers[stopped].signal("CONT");
-                self.survived.stops += 1;
+            Blow::EndWorker => {
+                let leaving = self.random.below(WORKERS);
+                // Before, it may not know the signal.
+                self.until_attached();
+                self.workers[leaving].signal("TERM");
+                assert_eq!(self.workers[leaving].code(), Some(0));
+                self.workers[leaving] = self.service.worker(self.scratch);
+                self.survived.orderly_ends += 1;
             }
+            Blow::StopWorker => self.stop_worker(),
         }
     }
 
-    /// Starts the coordinator after a kill, and looks whether anything is lost.
+    fn until_attached(&mut self) {
+        eventually("all workers are attached", || {
+            let jobs = self.api.jobs();
+            jobs.is_some_and(|jobs| jobs.iter().all(|job| job.workers as usize == WORKERS))
+        });
+    }
+
+    fn stop_worker(&mut self) {
+        let stopped = self.random.below(WORKERS);
+        // It must have a lease that can end.
+        self.until_attached();
+        let expired = self.service.expirations();
+        self.workers[stopped].signal("STOP");
+        eventually("the lease ends", || self.service.expirations() > expired);
+        self.workers[stopped].signal("CONT");
+        self.survived.stops += 1;
+    }
+
+    /// Starts the coordinator again, and looks whether anything is lost.
     fn rise(&mut self) {
         self.service.start_again();
-        self.survived.coordinator_kills += 1;
+        self.survived.restarts += 1;
         let mut found = None;
         eventually("the coordinator answers", || {
             found = self.api.jobs();
@@ -210,6 +236,7 @@ impl<'a> Storm<'a> {
                 self.requests[request].1 = job;
             }
         });
+        self.survived.coordinator_kills += 1;
         self.rise();
     }
 
@@ -236,7 +263,9 @@ impl<'a> Storm<'a> {
 #[derive(Debug, Default)]
 struct Survived {
     coordinator_kills: usize,
+    restarts: usize,
     worker_kills: usize,
+    orderly_ends: usize,
     stops: usize,
     /// Submissions that were cut off.
     unanswered: usize,
@@ -249,6 +278,7 @@ struct Survived {
 impl Survived {
     fn check(&self, kills: usize) {
         assert_eq!((self.coordinator_kills, self.worker_kills), (kills, kills));
+        assert!(self.restarts > kills && self.orderly_ends > 1, "{self}");
         assert!(self.stops > 0 && self.expirations >= self.stops && self.retries > 0, "{self}");
         assert!(self.jobs >= BUSY && self.evaluations > 0, "{self}");
     }
@@ -258,11 +288,13 @@ impl fmt::Display for Survived {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} kills and restarts of the coordinator, {} kills of workers, {} stopped workers, \
-             {} lease expirations, {} batches retried by others, {} submissions cut off; \
-             {} jobs with {} evaluations, every digest as undisturbed",
+            "{} kills of the coordinator, {} kills of workers, {} orderly ends, {} restarts of the \
+             coordinator, {} stopped workers, {} lease expirations, {} batches retried by others, \
+             {} submissions cut off; {} jobs with {} evaluations, every digest as undisturbed",
             self.coordinator_kills,
             self.worker_kills,
+            self.orderly_ends,
+            self.restarts,
             self.stops,
             self.expirations,
             self.retries,

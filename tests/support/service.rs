@@ -75,6 +75,13 @@ impl Service {
         self.process.take().unwrap().kill();
     }
 
+    /// SIGTERM, and its orderly end.
+    pub(crate) fn end(&mut self) {
+        let mut process = self.process.take().unwrap();
+        process.signal("TERM");
+        assert_eq!(process.code(), Some(0));
+    }
+
     pub(crate) fn url(&self) -> &str {
         &self.url
     }
