@@ -376,6 +376,13 @@ pub trait Store: Send {
     /// When that is not durable.
     fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
 
+    /// The highest identifier of a job that was forgotten: no other job gets it, since somebody
+    /// may still ask for it.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError>;
+
     /// Makes durable that a worker is expelled.
     ///
     /// # Errors
