@@ -148,6 +148,10 @@ pub(crate) struct CoordinatorArguments {
     /// Forget ended jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
+    /// Give what a worker holds to others when nothing was heard of it for so long, s, 1 to 3600;
+    /// both sides give five signs of life in that time
+    #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
+    pub(crate) lease: Duration,
 }
 
 /// Of `worker`.
@@ -395,6 +399,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number <= SECONDS_MAX => Ok(number),
         _ => Err(format!("it must be a number above 0 and at most {SECONDS_MAX} (s)")),
+    }
+}
+
+fn lease(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (1.0..=3600.0).contains(&number) => Ok(Duration::from_secs_f64(number)),
+        _ => Err("it must be a number from 1 to 3600 (s)".to_owned()),
     }
 }
 

@@ -218,7 +218,7 @@ fn a_worker_without_a_workers_certificate_is_told_why_and_ends() {
             }
         }
         let log = scratch.path("refused.log");
-        let mut worker = Owned::logged(&mut command, &log);
+        let mut worker = Owned::spawn_logging(&mut command, &log);
         assert_eq!(worker.code(), Some(1), "{name:?}");
         let told = fs::read_to_string(&log).unwrap();
         assert!(told.contains(expected) && told.contains(&secure.url), "{name:?}: {told}");
@@ -371,7 +371,7 @@ fn tokens_count_on_a_listener_without_tls_too() {
     let mut command = osteon();
     command.args(["coordinator", "--listen", &url, "--store"]).arg(scratch.path("store"));
     command.arg("--tokens").arg(scratch.path("tokens"));
-    let mut process = Owned::logged(&mut command, &scratch.path("log"));
+    let mut process = Owned::spawn_logging(&mut command, &scratch.path("log"));
     assert_eq!(process.line(), url);
     let with = |words: &[&str], token: Option<&str>| {
         let mut command = osteon();

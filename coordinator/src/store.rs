@@ -174,6 +174,18 @@ pub enum StoreError {
         /// What SQLite said.
         source: rusqlite::Error,
     },
+    /// The system fails to read or write it.
+    #[error(
+        "{} cannot be read or written: {source}; see that its disk is sound and that no quota is \
+         used up",
+        path.display()
+    )]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
     /// It cannot be opened or written.
     #[error(
         "{} cannot be written: {source}; give the coordinator's user write permission to it and \
@@ -363,6 +375,13 @@ pub trait Store: Send {
     /// # Errors
     /// When that is not durable.
     fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
+
+    /// The highest identifier of a job that was forgotten: no other job gets it, since somebody
+    /// may still ask for it.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError>;
 
     /// Makes durable that a worker is expelled.
     ///

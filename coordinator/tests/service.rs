@@ -202,7 +202,9 @@ async fn a_restarted_coordinator_goes_on() {
     check_leftover(&mut jobs, &job, &specification).await;
     let listed = jobs.list(ListRequest::default()).await.unwrap().into_inner();
     assert_eq!(listed.jobs.len(), 1);
-    assert_eq!(listed.jobs[0], JobSnapshot { workers: 0, ..last });
+    let sequence = listed.jobs[0].sequence;
+    assert!(sequence > last.sequence, "{sequence} after {}", last.sequence);
+    assert_eq!(listed.jobs[0], JobSnapshot { workers: 0, sequence, ..last });
     drop(jobs);
     third.shutdown().await;
 }
@@ -311,6 +313,10 @@ impl Store for BrokenStore {
 
     fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         self.sound.forget_jobs(jobs)
+    }
+
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
+        self.sound.last_forgotten()
     }
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {

@@ -77,3 +77,13 @@ fn ages_have_units() {
         assert_eq!(age(text).unwrap().as_secs_f64(), seconds, "{text}");
     }
 }
+
+#[test]
+fn leases_last_for_a_second_to_an_hour() {
+    for (text, seconds) in [("1", 1.0), ("2.5", 2.5), ("3600", 3600.0)] {
+        assert_eq!(lease(text).unwrap().as_secs_f64(), seconds, "{text}");
+    }
+    for text in ["0.9", "3601", "-1", "NaN", "inf", "1s", ""] {
+        assert!(lease(text).unwrap_err().contains("from 1 to 3600"), "{text}");
+    }
+}

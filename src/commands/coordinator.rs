@@ -14,6 +14,9 @@ use crate::resolved::Format;
 use crate::results_directory;
 use crate::signals;
 
+/// Signs of life while a lease lasts: some may come late.
+const HEARTBEATS_PER_LEASE: u32 = 5;
+
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unasked. The URL in use is
 /// printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
@@ -33,6 +36,8 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let config = Config {
         audit_fraction: arguments.audit_fraction,
         keep_ended: arguments.keep_ended,
+        heartbeat: arguments.lease / HEARTBEATS_PER_LEASE,
+        expiry: arguments.lease,
         ..Config::default()
     };
     let coordinator = osteon_coordinator::start(listener, Box::new(store), config)

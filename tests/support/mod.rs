@@ -101,7 +101,7 @@ pub(crate) struct Finished {
 }
 
 impl Finished {
-    fn of(output: Output) -> Self {
+    pub(crate) fn of(output: Output) -> Self {
         Self {
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),
@@ -129,9 +129,9 @@ impl Owned {
         Self(command.stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap())
     }
 
-    /// With stderr in a file.
-    pub(crate) fn logged(command: &mut Command, log: &Path) -> Self {
-        let log = fs::File::create(log).unwrap();
+    /// As [`spawn`](Self::spawn), with stderr at the end of a file.
+    pub(crate) fn spawn_logging(command: &mut Command, log: &Path) -> Self {
+        let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
         Self(command.stdout(Stdio::piped()).stderr(log).spawn().unwrap())
     }
 

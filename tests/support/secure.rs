@@ -56,7 +56,7 @@ impl Secure {
         command.arg(self.scratch.path("certs/ca.pem"));
         command.arg("--tls-cert").arg(self.scratch.path(&format!("certs/{name}.pem")));
         command.arg("--tls-key").arg(self.scratch.path(&format!("certs/{name}-key.pem")));
-        Owned::logged(command.env("RUST_LOG", "trace"), &self.scratch.path(log))
+        Owned::spawn_logging(command.env("RUST_LOG", "trace"), &self.scratch.path(log))
     }
 
     /// What a file holds.
@@ -96,7 +96,7 @@ pub(crate) fn serve(scratch: &Scratch, name: &str) -> (Owned, String) {
     let mut command = osteon();
     command.args(["coordinator", "--listen", "127.0.0.1:0"]).args(door(scratch, name));
     command.env("RUST_LOG", "trace");
-    let mut process = Owned::logged(&mut command, &scratch.path("coordinator.log"));
+    let mut process = Owned::spawn_logging(&mut command, &scratch.path("coordinator.log"));
     let url = process.line();
     assert!(url.starts_with("https://127.0.0.1:"), "{url}");
     (process, url)

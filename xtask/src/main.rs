@@ -1,5 +1,6 @@
 //! Every developer command in one place: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
+mod chaos;
 mod digests;
 mod tables;
 
@@ -45,6 +46,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "digests",
         "compares the digest of a batch over instruction sets and builds; checks AArch64",
         Action::Function(digests::compare),
+    ),
+    (
+        "chaos",
+        "kills coordinator and workers while jobs run: --kills N (200 each) --seed S (1)",
+        Action::Function(chaos::storm),
     ),
     ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
     (

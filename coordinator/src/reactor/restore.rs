@@ -9,7 +9,7 @@ use super::{Effects, jobs};
 use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
-use crate::state::{EndedJob, Expelled, Job, Stage, State};
+use crate::state::{EndedJob, Expelled, Job, Stage, State, sequence};
 use crate::store::{ExpulsionRecord, JobRecord, Store, StoreError};
 
 /// What a store holds, its evaluations aside.
@@ -19,6 +19,7 @@ pub struct Restored {
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
     expelled: Vec<ExpulsionRecord>,
+    last_forgotten: Option<JobId>,
 }
 
 impl Restored {
@@ -45,6 +46,7 @@ impl Restored {
             store.forget_expulsions()?;
         }
         restored.expelled = store.expulsions()?;
+        restored.last_forgotten = store.last_forgotten()?;
         Ok(restored)
     }
 }
@@ -75,10 +77,13 @@ impl State {
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
         let mut effects = Effects::new();
-        let Restored { ended, unfinished, expelled } = restored;
+        let Restored { ended, unfinished, expelled, last_forgotten } = restored;
+        state.next_job = last_forgotten.map_or(1, |job| job.0 + 1);
         let durable = |record| Expelled { record, store_at: None, refused: false };
         state.expelled = expelled.into_iter().map(durable).collect();
-        for (id, job) in ended {
+        for (id, mut job) in ended {
+            // Snapshots were published while the end was on its way to the store.
+            job.sequence = sequence(job.sequence, now);
             state.know(id, &job.request_id);
             state.ended.insert(id, job);
         }

@@ -17,6 +17,7 @@ pub struct MemoryStore(Arc<Mutex<Content>>);
 #[derive(Debug, Default)]
 struct Content {
     jobs: BTreeMap<JobId, StoredJob>,
+    last_forgotten: Option<JobId>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
     summaries: BTreeMap<JobId, Summary>,
     expulsions: BTreeMap<u64, ExpulsionRecord>,
@@ -100,10 +101,15 @@ impl Store for MemoryStore {
 
     fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         let mut content = self.content();
+        content.last_forgotten = content.last_forgotten.max(jobs.iter().max().copied());
         content.jobs.retain(|job, _| !jobs.contains(job));
         content.summaries.retain(|job, _| !jobs.contains(job));
         content.evaluations.retain(|(job, _), _| !jobs.contains(job));
         Ok(())
+    }
+
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
+        Ok(self.content().last_forgotten)
     }
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {

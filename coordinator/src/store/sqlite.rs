@@ -32,6 +32,10 @@ use columns::{
     nanoseconds, pack_errors, pack_outcomes, pack_workers,
 };
 
+/// The number in the file's header, changed with the tables or not at all, that holds the highest
+/// identifier of a forgotten job.
+const LAST_FORGOTTEN: &str = "user_version";
+
 /// A store in a SQLite file.
 #[derive(Debug)]
 pub struct SqliteStore {
@@ -303,6 +307,10 @@ impl Store for SqliteStore {
             for job in jobs {
                 transaction.execute("DELETE FROM job WHERE id = ?1", params![job.0])?;
             }
+            let known: i32 =
+                transaction.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
+            let highest = jobs.iter().map(|job| i32::try_from(job.0).unwrap_or(i32::MAX)).max();
+            transaction.pragma_update(None, LAST_FORGOTTEN, known.max(highest.unwrap_or(0)))?;
             transaction.commit()
         };
         forget().map_err(|source| self.refused(source))?;
@@ -310,6 +318,15 @@ impl Store for SqliteStore {
             tracing::warn!(%error, "the room of removed jobs is not given back yet");
         }
         Ok(())
+    }
+
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
+        let read = |row: &Row<'_>| row.get(0);
+        let known: i32 = self
+            .connection
+            .pragma_query_value(None, LAST_FORGOTTEN, read)
+            .map_err(|source| self.refused(source))?;
+        Ok(u64::try_from(known).ok().filter(|known| *known > 0).map(JobId))
     }
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {

@@ -199,6 +199,7 @@ pub(super) fn refusal(path: &Path, source: rusqlite::Error) -> StoreError {
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
             StoreError::InUse { path, holder: "another process".to_owned() }
         }
+        Some(ErrorCode::SystemIoFailure) => StoreError::Io { path, source },
         Some(ErrorCode::DiskFull) => StoreError::Full { path, source },
         Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => {
             StoreError::NotWritable { path, source }

@@ -1,0 +1,58 @@
+//! Identifiers of jobs are given once: whoever asks for a job that was forgotten, or fetches it
+//! late, shall not get the job of somebody else. It did happen after a restart, when the newest
+//! job had been forgotten: the next one got its number.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod fake;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_coordinator::config::Config;
+use osteon_coordinator::effect::{Effect, Record};
+use osteon_coordinator::event::{Event, Request};
+use osteon_coordinator::ids::{JobId, Token};
+use osteon_coordinator::reactor::{Restored, react};
+use osteon_coordinator::state::State;
+use osteon_coordinator::store::Store;
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::store::sqlite::SqliteStore;
+
+/// The identifier that the next life gives to a job, which it stores.
+fn next(store: &mut dyn Store) -> JobId {
+    let restored = Restored::load(store).unwrap();
+    let (mut state, _) = State::restore(Config::default(), restored, Duration::ZERO);
+    let request = Request::Submit {
+        specification: Arc::new(fake::propagation(10, 1)),
+        request_id: String::new(),
+        client: String::new(),
+        priority: 0,
+    };
+    let submitted = Event::Requested { token: Token(1), request };
+    let effects = react(&mut state, submitted, Duration::ZERO);
+    let [Effect::Store(Record::Job(record))] = effects.as_slice() else { panic!("{effects:?}") };
+    store.put_job(record).unwrap();
+    record.job
+}
+
+fn check(mut open: impl FnMut() -> Box<dyn Store>) {
+    assert_eq!(next(&mut *open()), JobId(1));
+    assert_eq!(next(&mut *open()), JobId(2));
+    open().forget_jobs(&[JobId(2)]).unwrap();
+    assert_eq!(next(&mut *open()), JobId(3));
+    // An older one does not make it less.
+    open().forget_jobs(&[JobId(3)]).unwrap();
+    open().forget_jobs(&[JobId(1)]).unwrap();
+    assert_eq!(open().last_forgotten().unwrap(), Some(JobId(3)));
+    assert_eq!(next(&mut *open()), JobId(4));
+}
+
+#[test]
+fn no_job_gets_the_number_of_a_forgotten_one() {
+    let memory = MemoryStore::new();
+    check(|| Box::new(memory.clone()));
+    let directory = tempfile::tempdir().unwrap();
+    check(|| Box::new(SqliteStore::open(directory.path()).unwrap()));
+}

@@ -1,0 +1,234 @@
+//! Workers that answer twice, out of turn, too late, or wrongly, or are of another version.
+
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_common::version;
+use osteon_proto::v1::{ExpelledWorker, JobState, JobStatus, ListExpelledRequest, WorkerHello};
+use tonic::{Code, Status};
+
+use crate::api::{Api, specification};
+use crate::peer::{self, Peer, hello};
+use crate::proxy::Proxy;
+use crate::service::{Service, undisturbed};
+use crate::support::{Scratch, eventually, job, run as osteon};
+
+/// How long a peer waits for a second batch before it answers the first.
+const MORE: Duration = Duration::from_millis(50);
+
+/// A coordinator, its client, a job that it has accepted, and the digest that it must have.
+struct Story {
+    scratch: Scratch,
+    service: Service,
+    api: Api,
+    job: String,
+    digest: String,
+}
+
+impl Story {
+    fn begin(options: &[&str]) -> Self {
+        let scratch = Scratch::new();
+        let file = scratch.write("job.toml", &job(40, 8));
+        let digest = undisturbed("identify", &file);
+        let service = Service::start(&scratch, options);
+        let mut api = Api::new(service.url());
+        let specification = specification(&file, JobKind::Identification);
+        let job = api.submit(&specification, "").unwrap();
+        Self { scratch, service, api, job, digest }
+    }
+
+    fn check_end(&mut self) {
+        assert_eq!(self.api.end(&self.job).digest, self.digest);
+    }
+
+    fn expelled(&mut self) -> Vec<ExpelledWorker> {
+        let listed =
+            self.api.call(async |client| client.list_expelled(ListExpelledRequest {}).await);
+        listed.unwrap().into_inner().workers
+    }
+}
+
+/// Runs a peer on a thread of its own.
+fn on_thread<T: Send + 'static, F: Future<Output = T>>(
+    peer: impl FnOnce() -> F + Send + 'static,
+) -> JoinHandle<T> {
+    std::thread::spawn(move || {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        runtime.unwrap().block_on(peer())
+    })
+}
+
+/// What a peer returns, once it has ended.
+fn end<T>(peer: JoinHandle<T>) -> T {
+    eventually("the peer's stay ends", || peer.is_finished());
+    peer.join().unwrap()
+}
+
+/// Right answers, each twice, the later batch first, and one to a batch that nobody sent, until
+/// the stay ends; how often batches were answered out of turn.
+async fn shuffler(url: String) -> usize {
+    let mut peer = Peer::attach(&url, hello(1)).await.unwrap();
+    let mut held = Vec::new();
+    let mut reordered = 0;
+    loop {
+        match tokio::time::timeout(MORE, peer.batch()).await {
+            Ok(Ok((batch, work))) => held.push((batch, peer::solve(&work))),
+            Ok(Err(_)) => return reordered,
+            Err(_) => {
+                reordered += usize::from(held.len() > 1);
+                while let Some((batch, solved)) = held.pop() {
+                    peer.answer(batch, &solved).await;
+                    peer.answer(batch, &solved).await;
+                }
+                peer.answer(u64::MAX, &[]).await;
+            }
+        }
+    }
+}
+
+#[test]
+fn duplicated_and_reordered_answers_change_nothing() {
+    let mut story = Story::begin(&[]);
+    let url = story.service.url().to_owned();
+    let peer = on_thread(|| shuffler(url));
+    story.check_end();
+    story.service.kill();
+    assert!(end(peer) > 0, "nothing was answered out of turn");
+}
+
+/// A worker that lies about every batch until its stay ends; how it ends.
+async fn liar(url: String, hello: WorkerHello) -> Status {
+    let mut peer = match Peer::attach(&url, hello).await {
+        Ok(peer) => peer,
+        Err(refusal) => return refusal,
+    };
+    loop {
+        match peer.batch().await {
+            Ok((batch, work)) => peer.answer(batch, &peer::lie(&work)).await,
+            Err(end) => return end,
+        }
+    }
+}
+
+#[test]
+fn one_liar_among_three_is_expelled_and_leaves_no_trace() {
+    let mut story = Story::begin(&["--audit-fraction", "0.5"]);
+    let url = story.service.url().to_owned();
+    let liar = on_thread(|| liar(url, hello(1)));
+    let _honest = [(); 2].map(|()| story.service.worker(&story.scratch));
+    story.check_end();
+    let end = end(liar);
+    assert_eq!(end.code(), Code::PermissionDenied, "{end}");
+    assert!(end.message().contains("expelled") && end.message().contains("agree on"), "{end}");
+    let expelled = story.expelled();
+    assert_eq!(expelled.len(), 1, "{expelled:?}");
+    assert_eq!((expelled[0].host.as_str(), expelled[0].process), ("peer", 1));
+}
+
+#[test]
+fn one_liar_among_two_is_an_integrity_error_that_names_both() {
+    let mut story = Story::begin(&["--audit-fraction", "0.5", "--lease", "1"]);
+    let url = story.service.url().to_owned();
+    let honest = story.service.worker(&story.scratch);
+    let _liar = on_thread(|| liar(url, hello(1)));
+    let wanted = |seen: &osteon_proto::v1::JobSnapshot| seen.state() == JobState::Ended;
+    let ended = story.api.until("the job fails", &story.job, wanted);
+    assert_eq!(ended.status(), JobStatus::Failed, "{ended:?}");
+    for part in ["peer (process 1)", &format!("(process {})", honest.id()), "realization "] {
+        assert!(ended.reason.contains(part), "{part} in {}", ended.reason);
+    }
+    let watched = osteon(&["watch", &story.job, "--coordinator", story.service.url()]);
+    assert_eq!(watched.code, Some(1), "{watched:?}");
+    assert!(watched.stdout.contains("peer (process 1)"), "{watched:?}");
+    assert!(story.expelled().is_empty(), "nobody can say who lied");
+}
+
+/// A worker that takes a batch and is silent until its lease ends, then comes back and answers
+/// the old batch wrongly.
+#[test]
+fn what_a_worker_answers_after_its_lease_changes_nothing() {
+    let mut story = Story::begin(&["--lease", "1", "--audit-fraction", "1"]);
+    let url = story.service.url().to_owned();
+    let zombie = on_thread(async move || {
+        let mut peer = Peer::attach(&url, hello(1)).await.unwrap();
+        let (batch, work) = peer.batch().await.unwrap();
+        let end = loop {
+            if let Err(end) = peer.message().await {
+                break end;
+            }
+        };
+        assert_eq!(end.code(), Code::Aborted, "{end}");
+        assert!(end.message().contains("nothing was heard"), "{end}");
+        let mut peer = Peer::attach(&url, hello(1)).await.unwrap();
+        peer.answer(batch, &peer::lie(&work)).await;
+        peer.batch().await.unwrap();
+    });
+    end(zombie);
+    let _honest = [(); 2].map(|()| story.service.worker(&story.scratch));
+    story.check_end();
+    assert!(story.service.expirations() > 0);
+    assert!(story.expelled().is_empty());
+}
+
+/// Workers that compute rightly and die of one realization, again and again.
+async fn mortals(url: String, process: u32, deadly: (u64, u64)) {
+    let mut attached = 0;
+    // Until the coordinator is gone.
+    while let Ok(mut peer) = Peer::attach(&url, hello(process + attached)).await {
+        attached += 1;
+        while let Ok((batch, work)) = peer.batch().await {
+            let (seed, index) = deadly;
+            if work.seed == seed
+                && (work.first..work.first + u64::from(work.count)).contains(&index)
+            {
+                break;
+            }
+            peer.answer(batch, &peer::solve(&work)).await;
+        }
+    }
+}
+
+#[test]
+fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
+    let scratch = Scratch::new();
+    let text = job(40, 4);
+    let doomed = scratch.write("doomed.toml", &text);
+    let sound = scratch.write("sound.toml", &text.replace("seed = 7", "seed = 8"));
+    let mut service = Service::start(&scratch, &[]);
+    let mut api = Api::new(service.url());
+    let [doomed, other] = [doomed.as_path(), sound.as_path()].map(|file| {
+        let job = specification(file, JobKind::Identification);
+        api.submit(&job, "").unwrap()
+    });
+    let workers = [100, 200].map(|process| {
+        let url = service.url().to_owned();
+        on_thread(move || mortals(url, process, (7, 33)))
+    });
+    let failed = api.end(&doomed);
+    assert_eq!(failed.status(), JobStatus::Failed);
+    for part in ["realization 33", "osteon draw", "--index 33"] {
+        assert!(failed.reason.contains(part), "{part} in {}", failed.reason);
+    }
+    assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
+    service.kill();
+    for worker in workers {
+        end(worker);
+    }
+}
+
+/// Its hello is changed on the way to the coordinator.
+#[test]
+fn a_worker_of_another_version_reads_why_it_is_refused() {
+    let scratch = Scratch::new();
+    let service = Service::start(&scratch, &[]);
+    let ours = version::fingerprint();
+    let theirs = ours.replace("osteon ", "other* ");
+    let proxy = Proxy::start(service.url());
+    proxy.rewrite(ours.as_bytes(), theirs.as_bytes());
+    let refused = osteon(&["worker", "--coordinator", &proxy.url(), "--threads", "1"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    for part in [&ours, &theirs, "run the same version of osteon on both"] {
+        assert!(refused.stderr.contains(part), "{part} in {refused:?}");
+    }
+}

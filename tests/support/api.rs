@@ -1,0 +1,149 @@
+//! The service of jobs as an outside client sees it, in calls that block.
+
+use std::path::Path;
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_common::job_file;
+use osteon_proto::endpoint::{connect, jobs_client};
+use osteon_proto::specification;
+use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::v1::jobs_client::JobsClient;
+use osteon_proto::v1::{
+    FetchRequest, GetRequest, JobResult, JobSnapshot, JobSpecification, JobState, ListRequest,
+    SubmitRequest,
+};
+use tokio::runtime::Runtime;
+use tonic::transport::Channel;
+use tonic::{Code, Status};
+
+use crate::support::eventually;
+
+/// Longest wait for one answer.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// A client of one coordinator, over all its lives.
+pub(crate) struct Api {
+    runtime: Runtime,
+    url: String,
+    client: Option<JobsClient<Channel>>,
+}
+
+impl Api {
+    pub(crate) fn new(url: &str) -> Self {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .unwrap();
+        Self { runtime, url: url.to_owned(), client: None }
+    }
+
+    /// One call; `Unavailable` when nobody answers.
+    pub(crate) fn call<T>(
+        &mut self,
+        call: impl AsyncFnOnce(&mut JobsClient<Channel>) -> Result<T, Status>,
+    ) -> Result<T, Status> {
+        let Self { runtime, url, client } = self;
+        let answer = runtime.block_on(async {
+            let attempt = async {
+                if client.is_none() {
+                    *client = Some(client_of(url).await?);
+                }
+                call(client.as_mut().unwrap()).await
+            };
+            let late = Status::unavailable("no answer in time");
+            tokio::time::timeout(TIMEOUT, attempt).await.unwrap_or(Err(late))
+        });
+        if answer.is_err() {
+            self.client = None;
+        }
+        answer
+    }
+
+    /// All jobs; `None` when nobody answers.
+    pub(crate) fn jobs(&mut self) -> Option<Vec<JobSnapshot>> {
+        let listed = self.call(async |client| client.list(ListRequest::default()).await);
+        listed.ok().map(|listed| listed.into_inner().jobs)
+    }
+
+    /// Submits a job.
+    pub(crate) fn submit(&mut self, job: &JobSpecification, id: &str) -> Result<String, Status> {
+        let request = SubmitRequest {
+            specification: Some(job.clone()),
+            request_id: id.to_owned(),
+            client: "the test".to_owned(),
+            priority: 0,
+        };
+        self.call(async |client| Ok(client.submit(request).await?.into_inner().job))
+    }
+
+    /// One job.
+    pub(crate) fn job(&mut self, job: &str) -> JobSnapshot {
+        let request = GetRequest { job: job.to_owned() };
+        let got = self.call(async |client| client.get(request).await);
+        got.unwrap().into_inner().snapshot.unwrap()
+    }
+
+    /// Looks until a job is as `wanted`.
+    pub(crate) fn until(
+        &mut self,
+        what: &str,
+        job: &str,
+        wanted: impl Fn(&JobSnapshot) -> bool,
+    ) -> JobSnapshot {
+        let mut last = None;
+        eventually(what, || {
+            let seen = last.insert(self.job(job));
+            wanted(seen)
+        });
+        last.unwrap()
+    }
+
+    /// Waits for the end of a job; its result.
+    pub(crate) fn end(&mut self, job: &str) -> JobResult {
+        self.until("the job ends", job, |seen| seen.state() == JobState::Ended);
+        self.result(job)
+    }
+
+    /// The result of an ended job.
+    pub(crate) fn result(&mut self, job: &str) -> JobResult {
+        let result = |part| match part {
+            Part::Result(result) => Some(result),
+            _ => None,
+        };
+        self.parts(job).into_iter().find_map(result).unwrap()
+    }
+
+    /// All that an ended job left.
+    pub(crate) fn parts(&mut self, job: &str) -> Vec<Part> {
+        let request = FetchRequest { job: job.to_owned() };
+        let parts = self.call(async |client| {
+            let mut stream = client.fetch(request).await?.into_inner();
+            let mut parts = Vec::new();
+            while let Some(response) = stream.message().await? {
+                parts.extend(response.part);
+            }
+            Ok(parts)
+        });
+        parts.unwrap()
+    }
+}
+
+/// A client with a connection of its own.
+pub(crate) async fn client_of(url: &str) -> Result<JobsClient<Channel>, Status> {
+    let endpoint = url.parse().unwrap();
+    let channel = connect(&endpoint, TIMEOUT).await;
+    channel.map(jobs_client).map_err(|error| Status::new(Code::Unavailable, error.to_string()))
+}
+
+/// The specification that a job file has.
+pub(crate) fn specification(file: &Path, kind: JobKind) -> JobSpecification {
+    specification::to_message(&job_file::read(file, kind).unwrap())
+}
+
+/// How many realizations of complete and current evaluations a job has.
+pub(crate) fn progress(job: &JobSnapshot) -> u64 {
+    let current = if job.state() == JobState::Ended { 0 } else { job.realizations_done };
+    job.evaluations * job.realizations + current
+}

@@ -1,0 +1,30 @@
+//! The storm of kills of `tests/chaos`, as long as one likes.
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{cargo, cargo_command};
+
+const USAGE: &str = "usage: cargo xtask chaos [--kills N] [--seed S]";
+/// Kills of the coordinator, and as many of workers.
+const KILLS: u64 = 200;
+/// The test.
+const STORM: &str = "kills::killed_and_stopped_again_and_again_every_job_ends_with_its_digest";
+
+/// Runs the storm with the kills and the seed of `words`.
+pub(crate) fn storm(words: &[String]) -> Result<()> {
+    let (mut kills, mut seed) = (KILLS, 1);
+    let mut words = words.iter();
+    while let Some(word) = words.next() {
+        let number = words.next().context(USAGE)?.parse().context(USAGE)?;
+        match word.as_str() {
+            "--kills" => kills = number,
+            "--seed" => seed = number,
+            _ => bail!(USAGE),
+        }
+    }
+    let arguments = ["test", "--package", "osteon", "--test", "chaos", "--", "--nocapture"];
+    let mut command = cargo_command(&[&arguments[..], &["--exact", STORM]].concat());
+    command.env("OSTEON_CHAOS_KILLS", kills.to_string());
+    command.env("OSTEON_CHAOS_SEED", seed.to_string());
+    cargo(&mut command)
+}
