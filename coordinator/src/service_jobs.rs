@@ -85,13 +85,9 @@ impl Jobs for JobsService {
     ) -> Result<Response<SubmitResponse>, Status> {
         let SubmitRequest { specification: message, request_id } = request.into_inner();
         if request_id.len() > NAME_BYTES_MAX {
-            return Err(Status::invalid_argument(format!(
-                "request_id has {} bytes; at most {NAME_BYTES_MAX} are allowed",
-                request_id.len()
-            )));
+            return Err(too_long("request_id", &request_id));
         }
-        let message =
-            message.ok_or_else(|| Status::invalid_argument("specification is missing"))?;
+        let message = message.ok_or_else(|| status::bad_field("specification", "is missing"))?;
         let specification = specification::from_message(&message)
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
@@ -112,8 +108,9 @@ impl Jobs for JobsService {
         let after = match page_token.as_str() {
             "" => None,
             token => Some(JobId::parse(token).ok_or_else(|| {
-                Status::invalid_argument(
-                    "page_token is not one that List returned; leave it empty for the first page",
+                status::bad_field(
+                    "page_token",
+                    "is not one that List returned; leave it empty for the first page",
                 )
             })?),
         };
@@ -208,17 +205,23 @@ fn parts(leftover: Leftover) -> impl Iterator<Item = Part> + Send {
 
 fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
-        return Err(Status::invalid_argument("the job's id is too long"));
+        return Err(too_long("job", text));
     }
     JobId::parse(text).ok_or_else(|| {
-        Status::not_found(format!("there is no job `{text}`; `osteon jobs` lists those there are"))
+        let message = format!("there is no job `{text}`; `osteon jobs` lists those there are");
+        status::no_job(text, message)
     })
+}
+
+fn too_long(field: &str, value: &str) -> Status {
+    let message = format!("has {} bytes; at most {NAME_BYTES_MAX} are allowed", value.len());
+    status::bad_field(field, &message)
 }
 
 fn refused(refusal: &Refusal) -> Status {
     let message = refusal.to_string();
     match refusal {
-        Refusal::NoJob { .. } => Status::not_found(message),
+        Refusal::NoJob { job } => status::no_job(job.to_string(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } => Status::resource_exhausted(message),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
