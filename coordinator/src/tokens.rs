@@ -9,6 +9,9 @@ use osteon_proto::credential_file::{self, CredentialError};
 use osteon_proto::token::{PREFIX, Token, TokenHash};
 use thiserror::Error;
 
+/// So many hexadecimal digits in a row may be a secret: half of a token's.
+const SECRET_DIGITS: usize = 32;
+
 /// What the holder of a token may do; each role may do what those before it may.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
@@ -83,7 +86,7 @@ pub enum LineFault {
     /// The name is unusable.
     #[error(
         "has no usable name; allowed are 1 to {NAME_BYTES_MAX} letters, digits and `.`, `_`, `-`, `@`, \
-         not beginning with `{PREFIX}`"
+         without `{PREFIX}` and without {SECRET_DIGITS} hexadecimal digits in a row"
     )]
     Name,
     /// The role is unknown.
@@ -192,13 +195,13 @@ impl Role {
     }
 }
 
-/// Whether a token can have this name. Names are shown: what begins as a token does, be it one with
-/// a piece missing, is none.
+/// Whether a token can have this name. Names are shown: what may be a token, or most of one, is none.
 pub fn is_name(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-@".contains(&byte);
     (1..=NAME_BYTES_MAX).contains(&name.len())
         && name.bytes().all(allowed)
-        && !name.starts_with(PREFIX)
+        && !name.contains(PREFIX)
+        && !name.split(|c: char| !c.is_ascii_hexdigit()).any(|run| run.len() >= SECRET_DIGITS)
 }
 
 /// The line of a file of tokens.
@@ -266,6 +269,8 @@ mod tests {
             (format!("{long} read {hash}"), "no usable name"),
             (format!("{secret} read {hash}"), "no usable name"),
             (format!("{} read {hash}", &secret[..40]), "no usable name"),
+            (format!("o{secret} read {hash}"), "no usable name"),
+            (format!("{} read {hash}", &secret[7..]), "no usable name"),
             (format!("ann write {hash}"), "gives `ann` an unknown role"),
             (format!("ann {secret} {hash}"), "gives `ann` an unknown role"),
             (format!("ann read {secret}"), "holds the token of `ann` itself"),

@@ -39,7 +39,7 @@ fn credentials() -> Vec<Vec<u8>> {
     let key = rcgen::KeyPair::generate().unwrap();
     let certificate = rcgen::CertificateParams::default().self_signed(&key).unwrap().pem();
     let both = certificate.clone() + &key.serialize_pem();
-    let mut all = bytes("tokens");
+    let mut all = [bytes("tokens"), bytes("credentials")].concat();
     all.extend([certificate.into_bytes(), both.into_bytes()]);
     all
 }
