@@ -10,6 +10,8 @@ mod commands;
 mod door;
 mod embedded;
 mod ending;
+#[cfg(test)]
+mod fuzz;
 mod instruction_set;
 mod new_files;
 mod output;

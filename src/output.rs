@@ -64,7 +64,7 @@ pub(crate) fn stdout(format: Format) -> Box<dyn Output> {
 }
 
 /// The output of `format` on `writer`.
-fn on<'a>(format: Format, writer: Box<dyn Write + 'a>) -> Box<dyn Output + 'a> {
+pub(crate) fn on<'a>(format: Format, writer: Box<dyn Write + 'a>) -> Box<dyn Output + 'a> {
     match format {
         Format::Text => Box::new(text::TextOutput::new(writer)),
         Format::Json => Box::new(json::JsonOutput::new(writer)),

@@ -128,3 +128,23 @@ fn the_network_pages_commands_make_what_a_coordinator_takes() {
         assert!(url.starts_with("https://node-1.example:"), "{url}");
     }
 }
+
+#[test]
+fn the_grpc_pages_code_is_the_tested_clients() {
+    let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path));
+    let (page, client) = (read("docs/grpc.md").unwrap(), read("tests/python/osteon_client.py"));
+    let client = client.unwrap();
+    let blocks: Vec<&str> = page
+        .split("```python\n")
+        .skip(1)
+        .map(|block| block.split("```").next().unwrap_or_default())
+        .collect();
+    assert!(blocks.len() > 5, "{} blocks", blocks.len());
+    for block in &blocks {
+        assert!(client.contains(block), "the tested client has not:\n{block}");
+    }
+    // And all of it is shown.
+    for function in client.lines().filter(|line| line.starts_with("def ")) {
+        assert!(blocks.iter().any(|block| block.contains(function)), "{function} is not shown");
+    }
+}

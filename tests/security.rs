@@ -85,10 +85,15 @@ fn secrets(scratch: &Scratch) -> Vec<String> {
 }
 
 /// Every method, the roles that may call it, and whether a certificate is enough.
-const METHODS: [(&str, &[&str], bool); 9] = [
+const METHODS: [(&str, &[&str], bool); 10] = [
     ("/grpc.health.v1.Health/Check", &["none", "stranger", "read", "submit", "admin"], true),
     (
         "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+        &["read", "submit", "admin"],
+        true,
+    ),
+    (
+        "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
         &["read", "submit", "admin"],
         true,
     ),

@@ -113,19 +113,14 @@ impl Jobs for JobsService {
         let client = holder.unwrap_or(client);
         for (field, value) in [("request_id", &request_id), ("client", &client)] {
             if value.len() > NAME_BYTES_MAX {
-                return Err(Status::invalid_argument(format!(
-                    "{field} has {} bytes; at most {NAME_BYTES_MAX} are allowed",
-                    value.len()
-                )));
+                return Err(too_long(field, value));
             }
         }
         if priority > PRIORITY_MAX {
-            return Err(Status::invalid_argument(format!(
-                "priority is {priority}; 0 to {PRIORITY_MAX} are allowed"
-            )));
+            let message = format!("is {priority}; 0 to {PRIORITY_MAX} are allowed");
+            return Err(status::bad_field("priority", &message));
         }
-        let message =
-            message.ok_or_else(|| Status::invalid_argument("specification is missing"))?;
+        let message = message.ok_or_else(|| status::bad_field("specification", "is missing"))?;
         let specification = specification::from_message(&message)
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
@@ -147,8 +142,9 @@ impl Jobs for JobsService {
         let after = match page_token.as_str() {
             "" => None,
             token => Some(JobId::parse(token).ok_or_else(|| {
-                Status::invalid_argument(
-                    "page_token is not one that List returned; leave it empty for the first page",
+                status::bad_field(
+                    "page_token",
+                    "is not one that List returned; leave it empty for the first page",
                 )
             })?),
         };
@@ -199,10 +195,8 @@ impl Jobs for JobsService {
     ) -> Result<Response<PruneResponse>, Status> {
         let PruneRequest { keep_for_s, keep_last } = request.into_inner();
         let keep_for = keep_for_s.map(Duration::try_from_secs_f64).transpose().map_err(|_| {
-            Status::invalid_argument(format!(
-                "keep_for_s is {}; it must be a number from 0 to 3.2e9 (s)",
-                keep_for_s.unwrap_or_default()
-            ))
+            let given = keep_for_s.unwrap_or_default();
+            status::bad_field("keep_for_s", &format!("is {given}; 0 to 3.2e9 (s) are allowed"))
         })?;
         match self.ask(event::Request::Prune(Retention { keep_for, keep_last })).await? {
             Answer::Pruned(jobs) => {
@@ -253,17 +247,23 @@ fn parts(leftover: Leftover) -> impl Iterator<Item = Part> + Send {
 
 fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
-        return Err(Status::invalid_argument("the job's id is too long"));
+        return Err(too_long("job", text));
     }
     JobId::parse(text).ok_or_else(|| {
-        Status::not_found(format!("there is no job `{text}`; `osteon jobs` lists those there are"))
+        let message = format!("there is no job `{text}`; `osteon jobs` lists those there are");
+        status::no_job(text, message)
     })
+}
+
+fn too_long(field: &str, value: &str) -> Status {
+    let message = format!("has {} bytes; at most {NAME_BYTES_MAX} are allowed", value.len());
+    status::bad_field(field, &message)
 }
 
 fn refused(refusal: &Refusal) -> Status {
     let message = refusal.to_string();
     match refusal {
-        Refusal::NoJob { .. } => Status::not_found(message),
+        Refusal::NoJob { job } => status::no_job(job.to_string(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } => status::resource_exhausted(message, RETRY),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),

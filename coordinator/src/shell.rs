@@ -173,11 +173,15 @@ async fn services(
     let (health, health_service) = tonic_health::server::health_reporter();
     health.set_serving::<JobsServer<JobsService>>().await;
     health.set_serving::<WorkersServer<WorkersService>>().await;
-    let reflection = tonic_reflection::server::Builder::configure()
-        .register_encoded_file_descriptor_set(v1::FILE_DESCRIPTOR_SET)
-        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-        .build_v1()
-        .map_err(|source| StartError::Reflection { source })?;
+    let described = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(v1::FILE_DESCRIPTOR_SET)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let unreadable = |source| StartError::Reflection { source };
+    let reflection = described().build_v1().map_err(unreadable)?;
+    // The official clients of some languages know this version only.
+    let reflection_v1alpha = described().build_v1alpha().map_err(unreadable)?;
     Ok(Server::builder()
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE))
@@ -187,6 +191,7 @@ async fn services(
         .layer(AccessLayer::new(policy))
         .add_service(health_service)
         .add_service(reflection)
+        .add_service(reflection_v1alpha)
         .add_service(
             JobsServer::new(jobs)
                 .max_decoding_message_size(MESSAGE_BYTES_MAX)

@@ -30,6 +30,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
 
 const TIMEOUT: Duration = Duration::from_secs(30);
 
@@ -246,6 +247,11 @@ async fn bad_requests_are_refused_with_reasons() {
     for job in ["99", "none", ""] {
         let refused = client.get(GetRequest { job: job.to_owned() }).await.unwrap_err();
         assert_eq!(refused.code(), Code::NotFound, "{refused}");
+        let resource = refused.get_details_resource_info().unwrap();
+        assert_eq!(
+            (resource.resource_type.as_str(), resource.resource_name.as_str()),
+            ("job", job)
+        );
     }
     let request = ListRequest { page_token: "nonsense".to_owned(), ..ListRequest::default() };
     assert_eq!(client.list(request).await.unwrap_err().code(), Code::InvalidArgument);
@@ -406,6 +412,7 @@ async fn health_and_reflection_are_on_the_same_port() {
     for expected in ["osteon.v1.Jobs", "osteon.v1.Workers", "grpc.health.v1.Health"] {
         assert!(names.contains(&expected), "{names:?}");
     }
+    assert!(names.iter().all(|name| name.starts_with("grpc.") || name.starts_with("osteon.v1.")));
     drop((health, reflection, answers));
     coordinator.shutdown().await;
 }

@@ -72,12 +72,12 @@ pub enum CredentialError {
         mode: u32,
     },
     /// It is damaged.
-    #[error("{} is no PEM file: {source}", path.display())]
+    #[error("{} is no PEM file: {fault}", path.display())]
     Pem {
         /// The file.
         path: PathBuf,
-        /// Where.
-        source: pem::Error,
+        /// What is wrong.
+        fault: PemFault,
     },
     /// It holds no certificate.
     #[error(
@@ -154,6 +154,30 @@ pub enum CredentialError {
     },
 }
 
+/// What is wrong with a PEM file. Not the parser's own error: that repeats what the file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum PemFault {
+    /// `-----BEGIN` without the rest.
+    #[error("a line `-----BEGIN …-----` is damaged")]
+    Begin,
+    /// No `-----END`.
+    #[error("a line `-----END …-----` is missing or damaged")]
+    End,
+    /// Anything else between the two.
+    #[error("what stands between `-----BEGIN …-----` and `-----END …-----` is damaged")]
+    Content,
+}
+
+impl From<&pem::Error> for PemFault {
+    fn from(error: &pem::Error) -> Self {
+        match error {
+            pem::Error::IllegalSectionStart { .. } => Self::Begin,
+            pem::Error::MissingSectionEnd { .. } => Self::End,
+            _ => Self::Content,
+        }
+    }
+}
+
 /// A certificate with the chain above it, and its key.
 #[derive(Debug)]
 pub struct Identity {
@@ -191,7 +215,7 @@ pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialEr
 pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, CredentialError> {
     let bytes = read(path, Kind::Trusted)?;
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&bytes).collect();
-    let found = found.map_err(|source| CredentialError::Pem { path: path.to_owned(), source })?;
+    let found = found.map_err(|error| damaged(path, &error))?;
     if found.is_empty() {
         return Err(CredentialError::NoCertificate { path: path.to_owned() });
     }
@@ -220,8 +244,12 @@ fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CredentialError> {
     let bytes = read(path, Kind::Secret)?;
     PrivateKeyDer::from_pem_slice(&bytes).map_err(|source| match source {
         pem::Error::NoItemsFound => CredentialError::NoKey { path: path.to_owned() },
-        source => CredentialError::Pem { path: path.to_owned(), source },
+        error => damaged(path, &error),
     })
+}
+
+fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
+    CredentialError::Pem { path: path.to_owned(), fault: error.into() }
 }
 
 /// The permissions looked at are those of the file that is read, whatever its name means later.

@@ -1,6 +1,7 @@
 //! Results and the history of a job as messages.
 
 use osteon_common::job::JobKind;
+use osteon_common::limits::REALIZATIONS_MAX;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::results::{
     BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
@@ -210,6 +211,11 @@ fn failures_from_message(messages: &[v1::FailureCount]) -> Result<FailureCounts,
         if failures.get(kind) != 0 {
             return Err(Malformed::UnknownValue { field: "code", value: message.code.into() });
         }
+        if message.count > REALIZATIONS_MAX {
+            let (value, allowed) =
+                (message.count as f64, "no more realizations can fail than 10^7");
+            return Err(Malformed::OutOfRange { field: "count", value, allowed });
+        }
         failures.add(kind, message.count);
     }
     Ok(failures)
@@ -335,6 +341,9 @@ mod tests {
         }
         let unknown = [v1::FailureCount { code: 6, count: 1 }];
         assert!(failures_from_message(&unknown).is_err());
+        let many = |count| failures_from_message(&[v1::FailureCount { code: 1, count }]);
+        assert_eq!(many(REALIZATIONS_MAX).unwrap().total(), REALIZATIONS_MAX);
+        assert!(many(REALIZATIONS_MAX + 1).is_err());
         assert_eq!(
             from_message(&v1::JobResult::default(), vec![]),
             Err(Malformed::Missing { field: "solver" })

@@ -1,4 +1,4 @@
-//! Violations as a gRPC status with `google.rpc.BadRequest`, and back.
+//! Refusals as a gRPC status with the details of `google.rpc`, and violations back from one.
 
 use std::time::Duration;
 
@@ -53,6 +53,20 @@ pub fn violations(status: &Status) -> Option<Violations> {
     (!violations.is_empty()).then_some(violations)
 }
 
+/// `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names the one `field` of a request that is
+/// at fault; `message` goes on after its name.
+pub fn bad_field(field: &str, message: &str) -> Status {
+    let details = ErrorDetails::with_bad_request_violation(field, message);
+    Status::with_error_details(Code::InvalidArgument, format!("{field} {message}"), details)
+}
+
+/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the `job`.
+pub fn no_job(job: impl Into<String>, message: impl Into<String>) -> Status {
+    let message = message.into();
+    let details = ErrorDetails::with_resource_info("job", job, "", &message);
+    Status::with_error_details(Code::NotFound, message, details)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,5 +107,23 @@ mod tests {
     fn other_statuses_carry_none() {
         assert_eq!(violations(&Status::not_found("no job")), None);
         assert_eq!(violations(&Status::invalid_argument("plain")), None);
+    }
+
+    #[test]
+    fn a_field_and_a_job_are_named_for_programs() {
+        let status = bad_field("page_token", "is not one that List returned");
+        assert_eq!(status.code(), Code::InvalidArgument);
+        assert_eq!(status.message(), "page_token is not one that List returned");
+        let mut expected = Violations::new();
+        expected.add("page_token", "is not one that List returned");
+        assert_eq!(violations(&status), Some(expected));
+
+        let status = no_job("17", "there is no job 17");
+        assert_eq!((status.code(), status.message()), (Code::NotFound, "there is no job 17"));
+        let resource = status.get_details_resource_info().unwrap();
+        assert_eq!(
+            (resource.resource_type.as_str(), resource.resource_name.as_str()),
+            ("job", "17")
+        );
     }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 use tokio_rustls::rustls::crypto::ring;
 
 /// Every token begins so; scanners for leaked secrets can look for it.
-const PREFIX: &str = "osteon_";
+pub const PREFIX: &str = "osteon_";
 /// Random bytes of a token.
 const RANDOM_BYTES: usize = 32;
 /// Characters of a token: the prefix and two hexadecimal digits for each byte.

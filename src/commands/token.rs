@@ -18,7 +18,8 @@ pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
     })?;
     if !tokens::is_name(name) {
         return Err(Failure::bad_input(anyhow!(
-            "`{name}` cannot be a token's name; allowed are 1 to 256 letters, digits and . _ - @"
+            "`{name}` cannot be a token's name; allowed are 1 to 256 letters, digits and . _ - @, \
+             without osteon_ and without 32 hexadecimal digits in a row"
         )));
     }
     let token = Token::generate().map_err(Failure::failed)?;

@@ -2,6 +2,7 @@
 
 mod chaos;
 mod digests;
+mod python;
 mod tables;
 
 use std::env;
@@ -20,6 +21,8 @@ enum Action {
     Cargo(&'static [Cargo]),
     /// Runs a function, which may take more words.
     Function(fn(&[String]) -> Result<()>),
+    /// Runs other commands, by name.
+    Commands(&'static [&'static str]),
 }
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
@@ -36,7 +39,16 @@ const TASKS: &[(&str, &str, Action)] = &[
     ("format", "format the code", Action::Cargo(&[&["fmt", "--all"]])),
     ("lint", "formatting and lints, as CI wants them", Action::Cargo(&[FORMAT, LINT])),
     ("test", "every test", Action::Cargo(&[TEST])),
-    ("ci", "what CI runs: formatting, lints, every test", Action::Cargo(&[FORMAT, LINT, TEST])),
+    (
+        "python",
+        "tests the gRPC API by a client in Python; takes names of tests",
+        Action::Function(python::test),
+    ),
+    (
+        "ci",
+        "what CI runs: formatting, lints, every test, the client in Python",
+        Action::Commands(&["lint", "test", "python"]),
+    ),
     (
         "tables",
         "makes the tables of docs/validation.md again: all, or those of the studies named",
@@ -72,15 +84,20 @@ fn main() -> ExitCode {
 
 fn run() -> Result<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let named = arguments.split_first().and_then(|(name, words)| {
-        let (_, _, action) = TASKS.iter().find(|(task, _, _)| task == name)?;
-        Some((action, words))
-    });
-    match named {
-        Some((Action::Cargo(commands), [])) => {
+    let (name, words) =
+        arguments.split_first().map_or(("", &[][..]), |(name, words)| (name.as_str(), words));
+    perform(name, words)
+}
+
+/// Does what the command `name` does.
+fn perform(name: &str, words: &[String]) -> Result<()> {
+    let action = TASKS.iter().find(|(task, _, _)| *task == name).map(|(_, _, action)| action);
+    match (action, words) {
+        (Some(Action::Cargo(commands)), []) => {
             commands.iter().try_for_each(|arguments| cargo(&mut cargo_command(arguments)))
         }
-        Some((Action::Function(function), words)) => function(words),
+        (Some(Action::Function(function)), words) => function(words),
+        (Some(Action::Commands(names)), []) => names.iter().try_for_each(|name| perform(name, &[])),
         _ => bail!("usage: cargo xtask COMMAND, one of:\n{}", list()),
     }
 }
@@ -96,7 +113,7 @@ fn cargo_command(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs it, and fails if it does.
+/// Runs a program, and fails if it does.
 fn cargo(command: &mut Command) -> Result<()> {
     announce(command);
     let status = command.status().with_context(|| format!("cannot run {command:?}"))?;

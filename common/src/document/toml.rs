@@ -1,5 +1,7 @@
 //! TOML text to a tree, with the line of every key and element.
 
+mod nesting;
+
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
@@ -7,6 +9,11 @@ use super::{Format, Malformed, Node, Value, position};
 
 /// The tree of a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
+    if let Some(offset) = nesting::too_deep(text) {
+        let (line, column) = position(text, offset);
+        let message = "too many brackets are open here".to_owned();
+        return Err(Malformed { format: Format::Toml, line, column, message });
+    }
     let table = DeTable::parse(text).map_err(|error| malformed(text, &error))?;
     let lines = Lines::new(text);
     Ok(Node { line: None, value: lines.table(table.get_ref()) })

@@ -1,0 +1,285 @@
+//! What comes over the wire, damaged: never a panic, a bound on the work, and what is accepted is
+//! accepted again, to the bit, when it is written out.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
+use std::path::Path;
+
+use osteon_common::document::Format;
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::outcome::{FailureKind, Outcome, Solved};
+use osteon_common::{job_file, results_csv, results_json};
+use osteon_fuzz::{bounded, config, damaged, texts};
+use osteon_proto::batch::{self, Work};
+use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::{realizations, results, specification, status, v1};
+use proptest::prelude::*;
+use prost::Message as _;
+use tonic::{Code, Status};
+
+/// Longest details of a status, bytes: HTTP/2 peers refuse trailers above 16 KiB, in base64.
+const DETAILS_BYTES_MAX: usize = 12 << 10;
+
+/// Every job of the corpus that is one.
+fn jobs() -> Vec<JobSpecification> {
+    let kinds = [JobKind::Identification, JobKind::Propagation];
+    let read = |text: &String| {
+        kinds.map(|kind| job_file::parse(text, Format::Toml, Path::new("/nonexistent"), kind).ok())
+    };
+    let jobs: Vec<_> = texts("jobs").iter().flat_map(read).flatten().collect();
+    assert!(jobs.len() > 3, "{} jobs", jobs.len());
+    jobs
+}
+
+fn specifications() -> Vec<Vec<u8>> {
+    jobs().iter().map(|job| specification::to_message(job).encode_to_vec()).collect()
+}
+
+fn check_specification(bytes: &[u8]) {
+    let decode = || v1::JobSpecification::decode(bytes);
+    let Ok(message) = bounded(bytes.len(), decode) else { return };
+    match bounded(bytes.len(), || specification::from_message(&message)) {
+        Ok(job) => {
+            assert!(job.check().is_empty(), "{}", job.check());
+            let written = specification::to_message(&job);
+            assert_eq!(specification::from_message(&written).as_ref(), Ok(&job));
+            // What the wire accepts, a file may say.
+            let text = job_file::to_toml(&job);
+            let read = job_file::parse(&text, Format::Toml, Path::new(""), job.kind).unwrap();
+            assert_eq!(read, job);
+            assert_eq!(specification::to_message(&read), written);
+        }
+        Err(violations) => {
+            let refusal = status::invalid_argument(&violations);
+            assert!(refusal.details().len() <= DETAILS_BYTES_MAX, "{}", refusal.details().len());
+            assert!(status::violations(&refusal).is_some());
+        }
+    }
+}
+
+fn batches() -> Vec<Vec<u8>> {
+    let work = |job: &JobSpecification| Work {
+        setup: job.setup,
+        point: job.start(),
+        seed: job.monte_carlo.seed,
+        sampling: job.monte_carlo.sampling,
+        first: 17,
+        count: 5,
+    };
+    jobs().iter().map(|job| batch::to_message(3, &work(job)).encode_to_vec()).collect()
+}
+
+fn check_batch(bytes: &[u8]) {
+    let Ok(message) = bounded(bytes.len(), || v1::Batch::decode(bytes)) else { return };
+    match bounded(bytes.len(), || batch::from_message(&message)) {
+        Ok(work) => {
+            let written = batch::to_message(message.batch, &work);
+            assert_eq!(batch::from_message(&written), Ok(work));
+            // A worker guesses nothing: what it took is all that was said.
+            assert_eq!(written, message);
+        }
+        Err(malformed) => assert!(malformed.to_string().len() < DETAILS_BYTES_MAX),
+    }
+}
+
+fn outcomes() -> Vec<Outcome> {
+    vec![Ok(3900.5), Err(FailureKind::NoArrival), Ok(4000.25), Ok(f64::MIN_POSITIVE)]
+}
+
+fn answers() -> Vec<Vec<u8>> {
+    let solve = |outcome: Outcome| Solved {
+        outcome,
+        estimated_error: if outcome.is_ok() { 2e-5 } else { 0.0 },
+    };
+    let solved: Vec<_> = outcomes().into_iter().map(solve).collect();
+    [1, 100]
+        .map(|times| batch::answer_to_message(3, &solved.repeat(times), 0.25).encode_to_vec())
+        .to_vec()
+}
+
+fn check_answer(bytes: &[u8]) {
+    let Ok(message) = bounded(bytes.len(), || v1::BatchResult::decode(bytes)) else { return };
+    if let Ok(solved) = bounded(bytes.len(), || batch::answer_from_message(&message)) {
+        let written = batch::answer_to_message(message.batch, &solved, message.elapsed_s);
+        assert_eq!(written.encode_to_vec(), message.encode_to_vec());
+        assert!(solved.iter().all(Solved::is_sound));
+    }
+}
+
+fn moments() -> v1::Moments {
+    v1::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }
+}
+
+fn row(number: u64) -> v1::EvaluationRow {
+    let failures =
+        vec![v1::FailureCount { code: 1, count: 1 }, v1::FailureCount { code: 5, count: 2 }];
+    v1::EvaluationRow {
+        number,
+        point: vec![1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029],
+        moments: Some(moments()),
+        cost: Some(f64::INFINITY),
+        failures,
+        estimated_error: Some(v1::EstimatedError { median: 1e-5, largest: 3e-5 }),
+    }
+}
+
+fn result() -> v1::JobResult {
+    let job = specification::to_message(&jobs()[0]);
+    let (row, velocity) = (row(0), (Some(moments()), Some(moments())));
+    let (moments, standard_error) = velocity;
+    v1::JobResult {
+        status: v1::JobStatus::Converged.into(),
+        digest: "00".repeat(32),
+        best: Some(v1::BestPoint {
+            point: row.point,
+            cost: Some(1e-11),
+            velocity: Some(v1::Estimate { moments, standard_error }),
+            failures: row.failures,
+            estimated_error: row.estimated_error,
+        }),
+        data: moments,
+        evaluations: 3,
+        realizations: 4,
+        seed: 1,
+        solver: job.solver,
+        picking: job.picking,
+        version: "0.1.0".to_owned(),
+        ..v1::JobResult::default()
+    }
+}
+
+/// Parts of a fetch: a result, its history and its realizations.
+fn fetches() -> Vec<Vec<u8>> {
+    let parts = [
+        Part::Result(result()),
+        Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect() }),
+        Part::Realizations(realizations::to_message(0, &outcomes())),
+    ];
+    parts.map(|part| v1::FetchResponse { part: Some(part) }.encode_to_vec()).to_vec()
+}
+
+/// What a client does with a part of a fetch.
+fn check_fetch(bytes: &[u8]) {
+    let decode = || v1::FetchResponse::decode(bytes);
+    let Ok(v1::FetchResponse { part: Some(part) }) = bounded(bytes.len(), decode) else { return };
+    bounded(bytes.len(), || match part {
+        Part::Specification(message) => check_specification(&message.encode_to_vec()),
+        Part::Result(message) => check_result(&message),
+        Part::History(block) => check_history(&block),
+        Part::Realizations(block) => {
+            let Ok((first, outcomes)) = realizations::from_message(&block) else { return };
+            assert_eq!(realizations::to_message(first, &outcomes), block);
+        }
+    });
+}
+
+fn check_result(message: &v1::JobResult) {
+    let Ok(result) = results::from_message(message, outcomes()) else { return };
+    let written = results::to_message(&result);
+    let again = results::from_message(&written, outcomes()).unwrap();
+    // In bytes, for numbers that are none.
+    assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
+    let setup = jobs()[0].setup;
+    for text in
+        [results_json::identification(&result, &setup), results_json::propagation(&result, &setup)]
+    {
+        serde_json::from_str::<serde_json::Value>(&text).unwrap();
+    }
+}
+
+fn check_history(block: &v1::HistoryBlock) {
+    let rows = block.rows.iter().map(results::evaluation_from_message);
+    let Ok(rows) = rows.collect::<Result<Vec<_>, _>>() else { return };
+    for row in &rows {
+        let written = results::evaluation_to_message(row);
+        let again = results::evaluation_from_message(&written).unwrap();
+        let again = results::evaluation_to_message(&again);
+        assert_eq!(again.encode_to_vec(), written.encode_to_vec());
+    }
+    assert_eq!(results_csv::history(&rows).lines().count(), rows.len() + 1);
+}
+
+#[test]
+fn every_seed_is_taken() {
+    for bytes in specifications() {
+        let message = v1::JobSpecification::decode(bytes.as_slice()).unwrap();
+        specification::from_message(&message).unwrap();
+        check_specification(&bytes);
+    }
+    for bytes in batches() {
+        batch::from_message(&v1::Batch::decode(bytes.as_slice()).unwrap()).unwrap();
+        check_batch(&bytes);
+    }
+    for bytes in answers() {
+        let message = v1::BatchResult::decode(bytes.as_slice()).unwrap();
+        batch::answer_from_message(&message).unwrap();
+        check_answer(&bytes);
+    }
+    results::from_message(&result(), outcomes()).unwrap();
+    results::evaluation_from_message(&row(0)).unwrap();
+    fetches().iter().for_each(|bytes| check_fetch(bytes));
+}
+
+#[test]
+fn large_and_deep_messages_take_no_more_than_their_share() {
+    let mut job = specification::to_message(&jobs()[0]);
+    // At the bound, and above it.
+    for count in [1_000_000, 1_000_001] {
+        job.data = Some(v1::Data { velocities: vec![-1.0; count], ..v1::Data::default() });
+        check_specification(&job.encode_to_vec());
+    }
+    let long = Some("x".repeat(1 << 20));
+    job.picking.as_mut().unwrap().extremum = long.clone();
+    job.solver.as_mut().unwrap().method = long;
+    check_specification(&job.encode_to_vec());
+    // The same fields again and again: the last ones count.
+    check_specification(&specifications()[0].repeat(1000));
+    // Messages within messages: refused, or not looked at.
+    let mut nested = Vec::new();
+    for _ in 0..2000 {
+        let mut outer = vec![0x12];
+        prost::encoding::encode_varint(nested.len() as u64, &mut outer);
+        outer.append(&mut nested);
+        nested = outer;
+    }
+    check_specification(&nested);
+    check_fetch(&nested);
+    let failures = vec![v1::FailureCount { code: 1, count: u64::MAX }; 10_000];
+    for failures in
+        [failures, (1..=5).map(|code| v1::FailureCount { code, count: u64::MAX }).collect()]
+    {
+        let rows = vec![v1::EvaluationRow { failures, ..row(0) }];
+        let part = Some(Part::History(v1::HistoryBlock { rows }));
+        check_fetch(&v1::FetchResponse { part }.encode_to_vec());
+    }
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn damaged_specifications_are_read_or_refused(bytes in damaged(specifications())) {
+        check_specification(&bytes);
+    }
+
+    #[test]
+    fn damaged_batches_are_read_or_refused(bytes in damaged(batches())) {
+        check_batch(&bytes);
+    }
+
+    #[test]
+    fn damaged_answers_are_read_or_refused(bytes in damaged(answers())) {
+        check_answer(&bytes);
+    }
+
+    #[test]
+    fn damaged_fetches_are_read_or_refused(bytes in damaged(fetches())) {
+        check_fetch(&bytes);
+    }
+
+    #[test]
+    fn arbitrary_details_of_a_status_do_not_matter(bytes: Vec<u8>) {
+        let status = Status::with_details(Code::InvalidArgument, "no", bytes.into());
+        let _ = status::violations(&status);
+    }
+}

@@ -1,0 +1,102 @@
+//! Directories of results whose files are damaged: what is stored is shown, judged or refused, and
+//! never a panic.
+
+use std::fs;
+use std::path::Path;
+
+use osteon_common::document::Format as FileFormat;
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job_file;
+use osteon_fuzz::{bounded, config, damaged_text, texts};
+use proptest::prelude::*;
+
+use crate::output::{self, ShownResult};
+use crate::resolved::Format;
+use crate::results_directory::{self, ResultsDirectory};
+use crate::verdict;
+
+const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
+
+fn specification(kind: JobKind) -> JobSpecification {
+    let read = |text: &String| job_file::parse(text, FileFormat::Toml, Path::new(""), kind).ok();
+    texts("jobs").iter().find_map(read).unwrap()
+}
+
+/// Does with `result.json` what commands do.
+fn check_result(json: &str) {
+    for kind in KINDS {
+        let specification = specification(kind);
+        let ended = bounded(json.len(), || verdict::ending(kind, &specification, json));
+        let cancelled = bounded(json.len(), || verdict::is_cancelled(json));
+        assert!(!cancelled || kind == JobKind::Propagation || ended == crate::Ending::RunFailed);
+        let specification = &specification;
+        let shown = ShownResult { kind, specification, json, directory: None };
+        for format in [Format::Text, Format::Json] {
+            let mut bytes = Vec::new();
+            let mut output = output::on(format, Box::new(&mut bytes));
+            bounded(json.len(), || output.result(&shown)).unwrap();
+            drop(output);
+            assert!(String::from_utf8(bytes).unwrap().len() < 64 * json.len() + 4096);
+        }
+    }
+}
+
+/// A directory with these files: its result is taken only with the job that it belongs to.
+fn check_directory(job: &str, json: &str) {
+    for kind in KINDS {
+        let specification = specification(kind);
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join("job.toml"), job).unwrap();
+        fs::write(directory.path().join("result.json"), json).unwrap();
+        let stored = bounded(job.len() + json.len(), || {
+            ResultsDirectory::stored(directory.path(), &specification)
+        });
+        let same = job == job_file::to_toml(&specification);
+        match stored {
+            Ok(stored) => assert!(same && stored.as_deref() == Some(json)),
+            Err(failure) => {
+                assert!(!same && failure.exit_code() == 2 && failure.to_string().len() < 4096);
+            }
+        }
+        let _ = bounded(job.len(), || results_directory::job_of(directory.path(), kind));
+    }
+}
+
+/// Jobs as a run writes them.
+fn stored_jobs() -> Vec<String> {
+    KINDS.map(|kind| job_file::to_toml(&specification(kind))).to_vec()
+}
+
+#[test]
+fn every_seed_is_shown() {
+    texts("results").iter().for_each(|json| check_result(json));
+    for (job, json) in stored_jobs().iter().zip(texts("results")) {
+        check_directory(job, &json);
+    }
+}
+
+#[test]
+fn large_results_take_no_more_than_their_share() {
+    let counts: Vec<_> = (0..30_000).map(|i| format!("\"k{i}\": 1")).collect();
+    check_result(&format!("{{\"failures\": {{{}}}}}", counts.join(",")));
+    check_result(&format!("{{\"reason\": \"{}\"}}", "x".repeat(400_000)));
+    check_result(&"[".repeat(400_000));
+    check_directory(&"\n".repeat(400_000), "");
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn damaged_results_are_shown_or_refused(json in damaged_text(texts("results"))) {
+        check_result(&json);
+    }
+
+    #[test]
+    fn damaged_directories_are_taken_or_refused(
+        job in damaged_text(stored_jobs()),
+        json in damaged_text(texts("results")),
+    ) {
+        check_directory(&job, &json);
+    }
+}
