@@ -359,6 +359,8 @@ pub(crate) enum Study {
     Methods(DrawsArguments),
     /// How the exact method's error falls with refinement
     Refinement(DrawsArguments),
+    /// Errors of the exact method with random mean models of bone
+    Models(DrawsArguments),
     /// Errors of the exact method with random layers, probes and bones
     Setups(DrawsArguments),
     /// Jumps of the velocity between bones whose elasticity differs by 1e-9

@@ -31,6 +31,8 @@ pub use thinning::{RUN, Run, smooth_step};
 const RUNG_RATIO: f64 = 1.05;
 /// Rungs of the ladder: its last speed is 270 times the first.
 pub const RUNGS: usize = 116;
+/// Share of a rung's highest speed over which it passes into the next.
+const RUNG_OVERLAP: f64 = 5e-4;
 /// Speed, m/s, at which a setup's sampling is sized before any bone is known: the usual bound of
 /// speeds in cortical bone.
 const NOMINAL_SPEED: f64 = 4000.0;
@@ -83,6 +85,9 @@ const APART: f64 = 2.2;
 pub enum Grade {
     /// What most bones need.
     Quick,
+    /// The same with no frequency thinned out and no slow wave left out: what a bone needs whose first
+    /// arrival is small against the waves that come later.
+    Plain,
     /// What a bone needs whose first arrival is weak or slow, or lies close to later ones: twice
     /// the band, and period and length that take in the whole window before the direct wave.
     Thorough,
@@ -151,6 +156,18 @@ pub fn rung(setup: &Setup, speed: f64) -> Option<usize> {
     None
 }
 
+/// How near the upper edge of its rung a speed (m/s) is: 0 up to shortly below it, 1 at the edge,
+/// linear between. What is computed at two rungs differs by a little; there both count.
+pub fn nearness_to_next(setup: &Setup, rung: usize, speed: f64) -> f64 {
+    let edge = rung_speed(setup, rung);
+    ((speed / edge - (1.0 - RUNG_OVERLAP)) / RUNG_OVERLAP).clamp(0.0, 1.0)
+}
+
+/// Highest speed of a rung, m/s.
+pub fn rung_speed(setup: &Setup, rung: usize) -> f64 {
+    (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO)
+}
+
 /// Earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels along the
 /// bone at `speed` (m/s) and through the coupling fluid at its ends.
 ///
@@ -184,12 +201,12 @@ pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
 impl Sampling {
     /// The sampling that picks velocities of bones whose waves are no faster than the rung's speed.
     pub fn at_rung(setup: &Setup, rung: usize, grade: Grade) -> Self {
-        let speed = (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO);
+        let speed = rung_speed(setup, rung);
         let fc = setup.probe.center_frequency;
         // In periods: length of the reflected wave; how late after the earliest possible arrival a
         // picked extremum is provided for, and how late a repeated source may be heard.
         let (reflected_length, latest_pick, latest_source) = match grade {
-            Grade::Quick => (1.0, 1.4, 1.4),
+            Grade::Quick | Grade::Plain => (1.0, 1.4, 1.4),
             Grade::Thorough => (4.0, 2.5, f64::INFINITY),
         };
         let mut longest = SHORTEST_PERIOD / fc;
@@ -230,10 +247,14 @@ impl Sampling {
         let (first_band, band) = relative_bands(grade, refinement, thinness(setup));
         let (unit, evanescence) = match grade {
             Grade::Quick => (thinness(setup).min(1.4), EVANESCENCE),
+            Grade::Plain => (f64::INFINITY, EVANESCENCE),
             // Finer sampling is also less truncated, slowly.
-            Grade::Thorough => (1.5, EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))),
+            Grade::Thorough => (
+                1.5 * refinement.max(2.0),
+                EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0)),
+            ),
         };
-        let unit = unit * crowding(setup, speed);
+        let unit = unit * crowding(setup, speed) * (THINNED_PERIOD / (period * fc)).max(1.0);
         let through_fluid = earliest_arrival(setup, 0.0, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
@@ -248,7 +269,7 @@ impl Sampling {
             upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
             lower_echoes: lower_echoes(setup, speed),
             sound_speed: coupling.sound_speed,
-            unit: unit * refinement.max(1.0) * (THINNED_PERIOD / (period * fc)).max(1.0) * fc,
+            unit: unit * fc,
         }
     }
 
@@ -334,7 +355,7 @@ impl Sampling {
 fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> (f64, f64) {
     let wide = (10.5 * thinness).min(24.0);
     match grade {
-        Grade::Quick => (5.25 * thinness * refinement, wide * refinement),
+        Grade::Quick | Grade::Plain => (5.25 * thinness * refinement, wide * refinement),
         // 23 for a thick plate at refinement 5.
         Grade::Thorough => (wide * refinement.sqrt(), wide * refinement.sqrt()),
     }

@@ -1,11 +1,12 @@
 //! Exact layers in (frequency, wavenumber).
 //!
-//! A bone is looked at up to four times. The first look is quick and enough for most. Where its
-//! estimated error is large, the band is widened. Where a doubt remains (a late or weak pick, picks
+//! A bone is looked at several times. The first look is quick and enough for most. Where its
+//! estimated error is large, the band is widened. Where the first arrival is small against later waves,
+//! the same is done with nothing thinned out. Where a doubt remains (a late or weak pick, picks
 //! off their line, no pick at all) the bone is computed again with a thorough sampling, and where
-//! even that one's estimated error is large, with a refined one. Between doubt and none two looks are
-//! blended, so that the velocity stays a continuous function of the bone. All of this depends on the
-//! bone alone.
+//! even that one finds nothing or its estimated error is large, with a refined one. Between doubt and
+//! none two looks are blended, and so are those of neighbouring rungs of the speed ladder, so that the
+//! velocity stays a continuous function of the bone. All of this depends on the bone alone.
 
 pub(crate) mod direct;
 pub(crate) mod growth;
@@ -44,7 +45,7 @@ const KEPT_PAIRS_MAX: u64 = 400_000;
 /// from none to full.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
 /// The same of any other doubt.
-const LARGE_ERROR: (f64, f64) = (1e-4, 2e-4);
+const LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
 /// Refinement of the last look.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency, between
@@ -56,6 +57,9 @@ const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
 const WEAK: (f64, f64) = (1.2, 1.6);
 /// Distances from the line, in periods, between which a doubt grows.
 const OFF_LINE: (f64, f64) = (0.02, 0.03);
+/// Sizes of a pick over the largest wave in its window between which a doubt shrinks: thinning and what is
+/// left out of slow waves reach some 1e-5 of those.
+const SMALL: (f64, f64) = (0.02, 0.03);
 /// Picks of two looks that differ by more than this, in periods, are different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
@@ -66,6 +70,7 @@ pub(crate) struct Exact {
     distances: Vec<f64>,
     isa: Isa,
     quick: Ladder,
+    plain: Ladder,
     thorough: Ladder,
     refined: Ladder,
     /// Pairs whose tables are kept.
@@ -96,6 +101,7 @@ impl Exact {
             distances: sampling::distances(setup).collect(),
             isa,
             quick: Ladder::new(setup, Grade::Quick),
+            plain: Ladder::new(setup, Grade::Plain),
             thorough: Ladder::new(setup, Grade::Thorough),
             refined: Ladder::new(&refined, Grade::Thorough),
             kept: AtomicU64::new(0),
@@ -108,12 +114,15 @@ impl Exact {
         workspace: &mut ExactWorkspace,
     ) -> Result<Arrival, Failure> {
         let (medium, speed) = self.solid(bone)?;
-        let mut sight = Sight { exact: self, medium: &medium, speed, workspace };
-        let estimated = match sampling::first_grade(&self.setup) {
-            Grade::Quick => sight.quick()?,
-            Grade::Thorough => sight.thorough(&self.thorough)?,
-        };
-        Ok(estimated.into())
+        let rung = sampling::rung(&self.setup, speed).ok_or_else(|| too_large(speed))?;
+        let mut sight = Sight { exact: self, medium: &medium, speed, rung, workspace };
+        let mut found = sight.looks();
+        let next = sampling::nearness_to_next(&self.setup, rung, speed);
+        if next > 0.0 {
+            sight.rung += 1;
+            found = self.merged_if_possible(found, sight.looks(), next);
+        }
+        found.map(Arrival::from)
     }
 
     /// The solid of a bone, and the bound of every wave's speed, m/s.
@@ -133,17 +142,12 @@ impl Exact {
         self.isa.run(FillPlate { medium, thickness, plate });
     }
 
-    /// The lowest rung that is fast enough for `speed` (m/s).
-    fn rung<'a>(&self, ladder: &'a Ladder, speed: f64) -> Result<&'a Rung, Failure> {
-        let too_large = || Failure {
-            kind: FailureKind::NoConvergence,
-            detail: format!(
-                "waves of up to {speed:.0} m/s need more than {:.0e} (frequency, wavenumber) pairs",
-                PAIRS_MARGIN * SAMPLING_PAIRS_MAX
-            ),
+    /// One rung of a ladder, which a bone with waves of up to `speed` (m/s) needs.
+    fn rung<'a>(&self, ladder: &'a Ladder, index: usize, speed: f64) -> Result<&'a Rung, Failure> {
+        let Some(rung) = ladder.rungs.get(index) else {
+            return Err(too_large(speed));
         };
-        let index = sampling::rung(&self.setup, speed).ok_or_else(too_large)?;
-        let rung = ladder.rungs[index].get_or_init(|| {
+        let rung = rung.get_or_init(|| {
             let sampling = Sampling::at_rung(&ladder.setup, index, ladder.grade);
             let pairs = sampling.pairs(sampling.band);
             if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
@@ -156,7 +160,7 @@ impl Exact {
             }
             Some(Box::new(Rung::new(&ladder.setup, sampling, keep)))
         });
-        rung.as_deref().ok_or_else(too_large)
+        rung.as_deref().ok_or_else(|| too_large(speed))
     }
 
     /// An estimated error as it counts against bounds that are meant for refinement 1: who asks for
@@ -198,6 +202,20 @@ impl Exact {
         }
     }
 
+    /// The same, unless the second look would be more than may be computed: then what was found
+    /// stands, with its error.
+    fn merged_if_possible(
+        &self,
+        first: Result<Estimated, Failure>,
+        second: Result<Estimated, Failure>,
+        doubt: f64,
+    ) -> Result<Estimated, Failure> {
+        match second {
+            Err(Failure { kind: FailureKind::NoConvergence, .. }) => first,
+            second => self.merged(first, second, doubt),
+        }
+    }
+
     fn same_extremum(&self, first: &Estimated, second: &Estimated) -> bool {
         let most = SAME_EXTREMUM / self.setup.probe.center_frequency;
         first.pick.times.iter().zip(&second.pick.times).all(|(a, b)| (a - b).abs() <= most)
@@ -215,14 +233,25 @@ impl Exact {
         let fc = self.setup.probe.center_frequency;
         let (velocity, residual) = picking::line(&self.distances, &times, fc)?;
         let ratio = blend(first.pick.ratio, second.pick.ratio);
+        let prominence = blend(first.pick.prominence, second.pick.prominence);
         let error = blend(first.error, second.error);
-        Ok(Estimated { pick: Pick { velocity, times, ratio, residual }, error })
+        Ok(Estimated { pick: Pick { velocity, times, ratio, residual, prominence }, error })
     }
 }
 
 impl From<Estimated> for Arrival {
     fn from(Estimated { pick, error }: Estimated) -> Self {
         Self { velocity: pick.velocity, times: pick.times, estimated_error: error }
+    }
+}
+
+fn too_large(speed: f64) -> Failure {
+    Failure {
+        kind: FailureKind::NoConvergence,
+        detail: format!(
+            "waves of up to {speed:.0} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            PAIRS_MARGIN * SAMPLING_PAIRS_MAX
+        ),
     }
 }
 
@@ -237,14 +266,35 @@ struct Sight<'a> {
     medium: &'a Medium,
     /// Bound of every wave's speed, m/s.
     speed: f64,
+    rung: usize,
     workspace: &'a mut ExactWorkspace,
 }
 
 impl Sight<'_> {
     /// As many looks as the bone needs.
-    fn quick(&mut self) -> Result<Estimated, Failure> {
+    fn looks(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
-        let rung = exact.rung(&exact.quick, self.speed)?;
+        if sampling::first_grade(&exact.setup) == Grade::Thorough {
+            return self.thorough(&exact.thorough);
+        }
+        let mut found = self.quick(&exact.quick);
+        let doubt = found.as_ref().map_or(0.0, |found| 1.0 - rise(found.pick.prominence, SMALL));
+        if doubt > 0.0 {
+            let plain = self.quick(&exact.plain);
+            found = exact.merged(found, plain, doubt);
+        }
+        let doubt = found.as_ref().map_or(1.0, |found| exact.doubt(found, self.speed));
+        if doubt > 0.0 {
+            let last = self.careful();
+            found = exact.merged(found, last, doubt);
+        }
+        found
+    }
+
+    /// A look in the first band, and one in the whole band if that is needed.
+    fn quick(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
+        let exact = self.exact;
+        let rung = exact.rung(ladder, self.rung, self.speed)?;
         exact.fill_plate(self.medium, &mut self.workspace.fast);
         self.workspace.spectra.clear(&rung.tables);
         self.fill(rung, 0, rung.first.lines);
@@ -256,11 +306,6 @@ impl Sight<'_> {
             let wider = self.look(rung, &rung.whole);
             found = exact.merged(found, wider, doubt);
         }
-        let doubt = found.as_ref().map_or(1.0, |found| exact.doubt(found, self.speed));
-        if doubt > 0.0 {
-            let last = self.careful();
-            found = exact.merged(found, last, doubt);
-        }
         found
     }
 
@@ -268,21 +313,25 @@ impl Sight<'_> {
     fn careful(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         let thorough = self.thorough(&exact.thorough);
-        let doubt =
-            thorough.as_ref().map_or(0.0, |found| rise(exact.counted(found.error), LARGE_ERROR));
+        let doubt = match &thorough {
+            Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
+            // Whether there is an arrival is for the best look to say.
+            Err(Failure {
+                kind: FailureKind::NoArrival | FailureKind::InconsistentArrival,
+                ..
+            }) => 1.0,
+            Err(_) => 0.0,
+        };
         if doubt == 0.0 {
             return thorough;
         }
-        match self.thorough(&exact.refined) {
-            // More than may be computed: what was found stands, with its error.
-            Err(Failure { kind: FailureKind::NoConvergence, .. }) => thorough,
-            refined => exact.merged(thorough, refined, doubt),
-        }
+        let refined = self.thorough(&exact.refined);
+        exact.merged_if_possible(thorough, refined, doubt)
     }
 
     /// One look, and a good one.
     fn thorough(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
-        let rung = self.exact.rung(ladder, self.speed)?;
+        let rung = self.exact.rung(ladder, self.rung, self.speed)?;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
         self.exact.fill_plate(self.medium, accurate);
         spectra.clear(&rung.tables);
@@ -328,6 +377,12 @@ impl<const TERMS: usize> Kernel for FillPlate<'_, TERMS> {
     fn run<V: Vector>(self) {
         self.plate.fill::<V>(self.medium, self.thickness);
     }
+}
+
+/// Bound of the speed, m/s, of every wave along x1 in the bone: √(λ/ρ) with the largest eigenvalue λ
+/// of the Christoffel matrix of x1.
+pub fn fastest_wave(bone: &Bone) -> f64 {
+    Medium::new(bone).fastest
 }
 
 /// Admittance Y(k, s) = û3(0)/p̂(0), m/Pa, of the bone on its marrow.

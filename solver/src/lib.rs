@@ -26,7 +26,7 @@ mod solver;
 mod vector;
 
 pub use complex::Complex;
-pub use exact::admittance;
+pub use exact::{admittance, fastest_wave};
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
 pub use hybrid::{Hybrid, HybridWorkspace};

@@ -44,6 +44,11 @@ impl Window {
         self.extrema.retain(|e| e.pressure.abs() >= FLOOR * largest);
     }
 
+    /// Largest |p| of an extremum, or at the end.
+    fn largest(&self) -> f64 {
+        self.extrema.iter().fold(self.last, |max, e| max.max(e.pressure.abs()))
+    }
+
     /// |p| of extremum `rank` over its packet's peak.
     fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
         let first = self.extrema.get(rank)?;
@@ -66,6 +71,8 @@ pub(crate) struct Pick {
     pub(crate) ratio: f64,
     /// Largest distance of a time from the line, s.
     pub(crate) residual: f64,
+    /// |p| of the extremum over the largest in the window, at the receiver where this is smallest.
+    pub(crate) prominence: f64,
 }
 
 /// Picks the first arriving signal.
@@ -112,7 +119,9 @@ pub(crate) fn pick(
     }
     let times: Vec<f64> = picks.iter().map(|p| p.time).collect();
     let (velocity, residual) = line(distances, &times, center_frequency)?;
-    Ok(Pick { velocity, times, ratio, residual })
+    let shares = windows.iter().zip(&picks).map(|(window, p)| p.pressure.abs() / window.largest());
+    let prominence = shares.fold(f64::INFINITY, f64::min);
+    Ok(Pick { velocity, times, ratio, residual, prominence })
 }
 
 /// Velocity, m/s, of the line through picked times (s), and the largest distance of a time from it.

@@ -4,7 +4,7 @@ use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
 use osteon_study::{
-    Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods,
+    Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
     refinement, setups,
 };
 
@@ -27,6 +27,8 @@ const ACCURACY: OverDraws =
     OverDraws { name: "accuracy", realizations: accuracy::REALIZATIONS, table: accuracy::table };
 const METHODS: OverDraws =
     OverDraws { name: "methods", realizations: methods::REALIZATIONS, table: methods::table };
+const MODELS: OverDraws =
+    OverDraws { name: "models", realizations: models::REALIZATIONS, table: models::table };
 const REFINEMENT: OverDraws = OverDraws {
     name: "refinement",
     realizations: refinement::REALIZATIONS,
@@ -48,6 +50,7 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
         Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
         Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
+        Study::Models(arguments) => over_draws(&MODELS, arguments, isa),
         Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
         Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),

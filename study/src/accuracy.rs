@@ -1,8 +1,10 @@
 //! Errors of the exact method at default settings, and how well it estimates them.
 
+use osteon_common::case::{Bone, Setup};
 use osteon_common::quantile::quantile;
 use osteon_common::realization::PointError;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::{Failure, Isa, Solver, Workspace};
 
 use crate::Progress;
 use crate::difference::{Difference, Spread, difference};
@@ -43,30 +45,52 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError>
 }
 
 fn row(cell: &Cell) -> Vec<String> {
-    let settings = SolverSettings::default();
-    let setup = cell.setup(settings);
-    let default = cell.solver(settings);
-    let reference = cell.solver(SolverSettings { refinement: REFERENCE, ..settings });
-    let measured: Vec<Measured> = cell.each(|_, bone, workspace| {
-        let found = arrival(&default, bone, workspace);
-        let reference = arrival(&reference, bone, workspace);
-        Measured {
-            difference: difference(&setup, &found, &reference),
-            estimated_error: found.map_or(0.0, |found| found.estimated_error),
-        }
-    });
+    let both = Both::new(&cell.setup(SolverSettings::default()), cell.isa());
+    let measured: Vec<Measured> = cell.each(|_, bone, workspace| both.measured(bone, workspace));
     let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
     row.extend(summary(&measured));
     row
 }
 
+/// The exact method at default settings and at the reference's.
+pub(crate) struct Both {
+    setup: Setup,
+    default: Solver,
+    reference: Solver,
+}
+
+impl Both {
+    pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
+        let [default, reference] = [1.0, REFERENCE].map(|refinement| {
+            let solver = SolverSettings { refinement, ..setup.solver };
+            Solver::with_isa(&Setup { solver, ..*setup }, isa)
+        });
+        Self { setup: *setup, default, reference }
+    }
+
+    pub(crate) fn measured(
+        &self,
+        bone: &Result<Bone, Failure>,
+        workspace: &mut Workspace,
+    ) -> Measured {
+        let found = arrival(&self.default, bone, workspace);
+        let reference = arrival(&self.reference, bone, workspace);
+        Measured {
+            difference: difference(&self.setup, &found, &reference),
+            estimated_error: found.map_or(0.0, |found| found.estimated_error),
+        }
+    }
+}
+
 /// One draw.
-struct Measured {
+pub(crate) struct Measured {
     difference: Difference,
     estimated_error: f64,
 }
 
-fn summary(measured: &[Measured]) -> Vec<String> {
+/// Median, 99 % and largest error, share of different picks (%), and three quantiles of the
+/// estimated over the true error.
+pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
     let differences: Vec<_> = measured.iter().map(|draw| draw.difference).collect();
     let spread = Spread::of(&differences);
     let mut cells: Vec<_> = [0.5, 0.99, 1.0].map(|p| two_digits(spread.velocity(p))).into();
@@ -91,8 +115,6 @@ fn ratios(measured: &[Measured]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use osteon_solver::Isa;
-
     use super::*;
 
     #[test]

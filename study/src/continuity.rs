@@ -1,10 +1,11 @@
 //! How far a velocity jumps when the elasticity hardly changes.
 
-use osteon_common::case::Bone;
+use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::realization::PointError;
+use osteon_common::sampling;
 use osteon_common::settings::SolverSettings;
-use osteon_solver::Failure;
+use osteon_solver::{Failure, fastest_wave};
 
 use crate::Progress;
 use crate::difference::{Difference, Spread, difference};
@@ -27,6 +28,9 @@ const JUMP_MAX: f64 = 1e-5;
 /// keeps its extremum, how many such jumps are above 1e-5, and how many pairs change their
 /// extremum or the kind of their failure.
 ///
+/// Every second pair lies on an edge of the ladder of speeds that samplings are made for, where a
+/// jump of the method itself would be.
+///
 /// # Errors
 /// When there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
@@ -42,8 +46,12 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError>
         let setup = cell.setup(SolverSettings::default());
         let solver = cell.solver(setup.solver);
         let differences: Vec<Difference> = cell.each(|index, bone, workspace| {
+            let mut bone = bone.clone();
+            if let (Ok(bone), 1) = (&mut bone, index % 2) {
+                bone.density = density_on_edge(bone, &setup);
+            }
             let moved = bone.as_ref().map_err(Clone::clone).and_then(|bone| moved(bone, index));
-            let first = arrival(&solver, bone, workspace);
+            let first = arrival(&solver, &bone, workspace);
             difference(&setup, &arrival(&solver, &moved, workspace), &first)
         });
         let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
@@ -63,6 +71,16 @@ fn summary(differences: &[Difference]) -> Vec<String> {
         jumps.filter(|&jump| jump > JUMP_MAX).count().to_string(),
         spread.different_picks.to_string(),
     ]
+}
+
+/// The density, kg/m³, with which the bone's fastest wave is as fast as its rung of the ladder allows.
+fn density_on_edge(bone: &Bone, setup: &Setup) -> f64 {
+    let speed = fastest_wave(bone);
+    let Some(rung) = sampling::rung(setup, speed) else {
+        return bone.density;
+    };
+    let ratio = speed / sampling::rung_speed(setup, rung);
+    bone.density * ratio * ratio
 }
 
 /// The bone with each of its 21 entries changed by a share between ±[`CHANGE`] that follows from
@@ -102,6 +120,19 @@ mod tests {
                 assert!(from == 0.0 || to != from, "{i} {j}");
             }
         }
+    }
+
+    #[test]
+    fn a_bone_is_put_on_the_edge_of_its_rung() {
+        let setup = Setup::default();
+        let elasticity = OPTIMUM.constants().elasticity().unwrap();
+        let mut bone = Bone { density: OPTIMUM.density(), elasticity };
+        bone.density = density_on_edge(&bone, &setup);
+        let rung = |factor: f64| {
+            let bone = Bone { density: bone.density * factor, ..bone };
+            sampling::rung(&setup, fastest_wave(&bone)).unwrap()
+        };
+        assert_eq!(rung(1.0 - 1e-9), rung(1.0 + 1e-9) + 1);
     }
 
     #[test]

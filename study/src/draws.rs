@@ -55,6 +55,11 @@ impl Cell {
         setup
     }
 
+    /// What computes.
+    pub(crate) fn isa(&self) -> Isa {
+        self.draws.isa
+    }
+
     /// A solver with these settings.
     pub(crate) fn solver(&self, settings: SolverSettings) -> Solver {
         Solver::with_isa(&self.setup(settings), self.draws.isa)

@@ -14,6 +14,7 @@ mod draws;
 pub mod failures;
 mod generator;
 pub mod methods;
+pub mod models;
 pub mod refinement;
 pub mod setups;
 mod table;

@@ -6,7 +6,7 @@
 //! may be repeated.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::sampling::{self, Grade};
+use osteon_common::sampling::{self, Grade, RUNGS};
 
 use crate::exact::Exact;
 use crate::exact::look::{ExactWorkspace, Look, Rung};
@@ -77,7 +77,9 @@ impl Stages {
         } else {
             exact.fill_plate(&medium, &mut memory.exact.fast);
         }
-        let rung = exact.rung(if accurate { &exact.thorough } else { &exact.quick }, speed)?;
+        let ladder = if accurate { &exact.thorough } else { &exact.quick };
+        let index = sampling::rung(&exact.setup, speed).unwrap_or(RUNGS);
+        let rung = exact.rung(ladder, index, speed)?;
         let look = if accurate { &rung.whole } else { &rung.first };
         Ok(Filled { exact, rung, look, accurate, medium, speed, memory })
     }

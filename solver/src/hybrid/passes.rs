@@ -106,10 +106,11 @@ impl Passes<'_> {
 
     /// How fine a pass is; they are counted from 0.
     fn fineness(&self, pass: usize) -> f64 {
+        let thin = thinness(self.setup).sqrt();
         let over = if pass == 0 {
-            FIRST
+            FIRST * thin
         } else {
-            (2..=pass).fold(SECOND * thinness(self.setup).sqrt().sqrt(), |over, _| FINER * over)
+            (2..=pass).fold(SECOND * thin, |over, _| FINER * over)
         };
         over * self.setup.solver.refinement.sqrt()
     }
@@ -132,7 +133,7 @@ impl Passes<'_> {
         let refinement = self.setup.solver.refinement;
         let periods = self.setup.probe.center_frequency * change.shift;
         let thinness = thinness(self.setup);
-        refinement * estimate <= SMALL_ERROR * thinness * thinness
+        refinement * estimate <= SMALL_ERROR * thinness
             && refinement * periods <= SMALL_SHIFT
     }
 
@@ -300,6 +301,7 @@ mod tests {
             times: times.to_vec(),
             ratio: 1.0,
             residual: 0.0,
+            prominence: 1.0,
         };
         let change = Change::new(&pick(4004.0, [1.0, 2.0, 3.0]), &pick(4000.0, [1.5, 2.5, 3.5]));
         assert!((change.velocity - 1e-3).abs() < 1e-12);
