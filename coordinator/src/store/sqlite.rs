@@ -331,22 +331,24 @@ impl Store for SqliteStore {
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
         let ExpulsionRecord { number, worker, job, reason, at } = record;
-        let sql = "INSERT OR REPLACE INTO expulsion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+        let sql = "INSERT OR REPLACE INTO expulsion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
         let checksum = expulsion_checksum(record);
-        let values = params![number, host, process, job.0, reason, at, checksum];
+        let instance = worker.instance().cast_signed();
+        let values = params![number, host, process, job.0, reason, at, checksum, instance];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
 
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        let sql = "SELECT number, host, process, job, reason, at_ns, checksum FROM expulsion
+        let sql = "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
                    ORDER BY number";
         let read = |row: &Row<'_>| {
             let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);
+            let instance: i64 = row.get(7)?;
             let record = ExpulsionRecord {
                 number: row.get(0)?,
-                worker: WorkerName::new(&host, row.get(2)?),
+                worker: WorkerName::new(&host, row.get(2)?, instance.cast_unsigned()),
                 job: JobId(row.get(3)?),
                 reason: row.get(4)?,
                 at: Duration::from_nanos(row.get(5)?),

@@ -121,7 +121,7 @@ fn the_evaluations_of_an_expelled_worker_are_computed_again() {
     let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
         panic!("{effects:?}");
     };
-    let name = WorkerName::new("node", 3);
+    let name = WorkerName::new("node", 3, 0);
     assert_eq!(record.workers, BTreeSet::from([name]));
     rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
     read(&mut rig, &store, 2);
