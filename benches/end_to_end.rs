@@ -7,29 +7,17 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::process::Command;
+use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_osteon");
+mod service;
+
+use service::{PROGRAM, Service};
+
 /// The paper's optimum, N = 2747.
 const JOB: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/optimum.toml");
-/// How long a service may take to start.
-const START_LIMIT: Duration = Duration::from_secs(10);
-
-/// A process that ends with its owner.
-struct Service(Child);
-
-impl Drop for Service {
-    fn drop(&mut self) {
-        // It may have ended already; there is nobody to tell of anything else.
-        drop(self.0.kill());
-        drop(self.0.wait());
-    }
-}
-
 fn main() -> Result<()> {
     let full = std::env::args().any(|argument| argument == "--bench");
     let (turns, counts) = if full { (20, [1_000, 100_000]) } else { (1, [10, 20]) };
@@ -59,9 +47,8 @@ fn memory(counts: &[u32]) -> Result<()> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name).display().to_string();
     let url = format!("unix:{}", path("socket"));
-    let coordinator = service(&["coordinator", "--listen", &url, "--store", &path("store")])?;
-    wait_for(&folder.path().join("store/address"))?;
-    let worker = service(&["worker", "--coordinator", &url, "--threads", "2"])?;
+    let coordinator = Service::coordinator(&url, &folder.path().join("store"), &[])?;
+    let worker = Service::start(&["worker", "--coordinator", &url, "--threads", "2"])?;
     let example = fs::read_to_string(JOB)?;
     println!("\n| realizations | worker, resident | largest |");
     println!("|--:|--:|--:|");
@@ -86,24 +73,9 @@ fn run(arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
-fn service(arguments: &[&str]) -> Result<Service> {
-    let mut command = Command::new(PROGRAM);
-    command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
-    Ok(Service(command.spawn()?))
-}
-
-fn wait_for(path: &Path) -> Result<()> {
-    let start = Instant::now();
-    while !path.exists() {
-        ensure!(start.elapsed() < START_LIMIT, "{} does not appear", path.display());
-        thread::sleep(Duration::from_millis(10));
-    }
-    Ok(())
-}
-
 /// A size that the system reports of a process.
 fn status(service: &Service, key: &str) -> Result<String> {
-    let text = fs::read_to_string(format!("/proc/{}/status", service.0.id()))?;
+    let text = fs::read_to_string(format!("/proc/{}/status", service.id()))?;
     let line = text.lines().find_map(|line| line.strip_prefix(key));
     Ok(line.with_context(|| format!("no {key}"))?.trim().to_owned())
 }

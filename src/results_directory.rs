@@ -6,12 +6,13 @@
 //! cancelled job.
 
 use std::fs::{self, File, TryLockError};
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
 use osteon_common::{job_file, results_csv, results_json};
 
@@ -244,12 +245,36 @@ fn remove_if_there(path: &Path) -> anyhow::Result<()> {
     }
 }
 
+/// The text of `result.json` in `directory`.
+///
+/// # Errors
+/// When there is none, or it cannot be read.
+pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
+    let path = directory.join(RESULT);
+    let text = read_if_there(&path)?;
+    text.with_context(|| format!("cannot read {}: there is no such file", path.display()))
+}
+
+/// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
 fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
-    match fs::read_to_string(path) {
-        Ok(text) => Ok(Some(text)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(error).with_context(|| format!("cannot read {}", path.display()));
+        }
+    };
+    let cannot = || format!("cannot read {}", path.display());
+    let mut bytes = Vec::new();
+    let length = file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).with_context(cannot)?;
+    if length as u64 > FILE_BYTES_MAX {
+        bail!(
+            "{} is longer than {FILE_BYTES_MAX} bytes, and osteon writes no such file; remove it, \
+             or choose another directory",
+            path.display()
+        );
     }
+    Ok(Some(String::from_utf8(bytes).with_context(cannot)?))
 }
 
 /// 128 random bits in hexadecimal.

@@ -206,27 +206,24 @@ fn an_unreachable_coordinator_is_named_in_time() {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = format!("http://{}", listener.local_addr().unwrap());
     let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    for url in [format!("http://{free}"), silent, "unix:/nonexistent/socket".to_owned()] {
-        let arguments = [
-            &["jobs"] as &[&str],
-            &["submit", file.to_str().unwrap()],
-            &["identify", file.to_str().unwrap(), "--out", out.to_str().unwrap()],
-        ];
-        std::thread::scope(|scope| {
-            for arguments in arguments {
-                let url = &url;
-                scope.spawn(move || {
-                    let start = Instant::now();
-                    let finished = run(&[arguments, &["--coordinator", url]].concat());
-                    assert_eq!(finished.code, Some(1), "{finished:?}");
-                    assert!(finished.stderr.contains(url), "{finished:?}");
-                    assert_eq!(finished.stdout, "");
-                    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
-                });
-            }
-        });
-    }
-    assert!(!out.join("job.toml").exists());
+    let urls = [format!("http://{free}"), silent, "unix:/nonexistent/socket".to_owned()];
+    let (file, out) = (file.to_str().unwrap(), out.to_str().unwrap());
+    let commands = [&["jobs"] as &[&str], &["submit", file], &["identify", file, "--out", out]];
+    let each = urls.iter().flat_map(|url| commands.map(|arguments| (url, arguments)));
+    // All at once: each waits for as long as a client may.
+    std::thread::scope(|scope| {
+        for (url, arguments) in each {
+            scope.spawn(move || {
+                let start = Instant::now();
+                let finished = run(&[arguments, &["--coordinator", url]].concat());
+                assert_eq!(finished.code, Some(1), "{finished:?}");
+                assert!(finished.stderr.contains(url), "{finished:?}");
+                assert_eq!(finished.stdout, "");
+                assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+            });
+        }
+    });
+    assert!(!scratch.path("out").join("job.toml").exists());
 }
 
 #[test]

@@ -187,47 +187,14 @@ const EDITS: [Edit; 14] = [
     |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
 ];
 
+/// A file with some damage.
 fn text_of_a_file() -> impl Strategy<Value = String> {
-    let token = prop::sample::select(vec![
-        "nan",
-        "-inf",
-        "-1",
-        "0",
-        "1e308",
-        "5e-324",
-        "1e999",
-        "99999999999999999999",
-        "\"x\"",
-        "''",
-        "[]",
-        "[[]]",
-        "{}",
-        "{ a = 1 }",
-        "true",
-        "1979-05-27",
-        "[1, 2]",
-        "null",
-        "\"\u{fffd}\\u0000\"",
-        "}",
-        "=",
-    ]);
-    let base = prop::sample::select(vec![
+    let files = [
         include_str!("files/job.toml"),
         include_str!("files/case.toml"),
         include_str!("files/mandel.toml"),
-    ]);
-    (base, prop::collection::vec((any::<prop::sample::Index>(), token), 1..6)).prop_map(
-        |(base, edits)| {
-            let mut words: Vec<_> = base.split(' ').map(str::to_owned).collect();
-            for (index, token) in edits {
-                let at = index.index(words.len());
-                // What follows the word on its line and beyond stays.
-                let rest = words[at].find('\n').map_or("", |end| &words[at][end..]).to_owned();
-                words[at] = format!("{token}{rest}");
-            }
-            words.join(" ")
-        },
-    )
+    ];
+    osteon_fuzz::damaged_text(files.map(str::to_owned).to_vec())
 }
 
 fn no_panic(text: &str) {

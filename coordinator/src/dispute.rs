@@ -114,7 +114,7 @@ mod tests {
     fn vote(process: u32, velocity: f64) -> Vote {
         let right = Solved { outcome: Ok(1.0), estimated_error: 0.0 };
         let solved = vec![right, Solved { outcome: Ok(velocity), estimated_error: 0.0 }];
-        Vote { by: WorkerName::new("node", process), solved }
+        Vote { by: WorkerName::new("node", process, 0), solved }
     }
 
     /// The liars, once the answers of workers 1, 2, … are in.

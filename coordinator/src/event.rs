@@ -155,6 +155,8 @@ pub struct Hello {
     pub host: String,
     /// Process id, for people.
     pub process: u32,
+    /// A number that the process drew at its start, 0 if it told none.
+    pub instance: u64,
 }
 
 /// Names one record of a job.

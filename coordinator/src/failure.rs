@@ -81,7 +81,7 @@ mod tests {
         let (point, index) = (Point([1.0; 7]), 3);
         let answer = |process| {
             let solved = Solved { outcome: Ok(3900.0), estimated_error: 0.0 };
-            (WorkerName::new("node", process), solved)
+            (WorkerName::new("node", process, 0), solved)
         };
         let contradiction = Box::new(Contradiction { index, answers: [answer(1), answer(2)] });
         let replay = ReplayError { number: 1, found: Box::new([0.0; 7]), expected: None };

@@ -147,8 +147,8 @@ async fn forward(
 }
 
 fn introduce(hello: WorkerHello) -> Hello {
-    let WorkerHello { version, fingerprint, threads, host, process } = hello;
-    Hello { version, fingerprint, threads, host, process }
+    let WorkerHello { version, fingerprint, threads, host, process, instance } = hello;
+    Hello { version, fingerprint, threads, host, process, instance }
 }
 
 fn event(worker: WorkerId, message: AttachRequest) -> Event {

@@ -48,8 +48,10 @@ pub struct State {
     pub(crate) changed: BTreeSet<JobId>,
     /// When all active jobs were published last.
     pub(crate) published: Duration,
-    /// When old jobs were looked for last.
-    pub(crate) pruned: Duration,
+    /// When this life began.
+    pub(crate) started: Duration,
+    /// When old jobs were looked for last; `None` if they were not.
+    pub(crate) pruned: Option<Duration>,
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
     /// Workers that compute wrongly, in the order in which they were found.
     pub(crate) expelled: Vec<Expelled>,
@@ -229,7 +231,8 @@ impl State {
             last_served: None,
             changed: BTreeSet::new(),
             published: now,
-            pruned: Duration::ZERO,
+            started: now,
+            pruned: None,
             workers: BTreeMap::new(),
             expelled: Vec::new(),
             no_worker_since: now,

@@ -125,27 +125,30 @@ pub struct StoredJob {
 }
 
 /// Why the store did not do what it was asked.
+///
+/// A message is complete: it contains that of its cause, which is no source of it, so that nobody
+/// who prints the chain says it twice.
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// SQLite refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {error}", path.display())]
     Sqlite {
         /// The file.
         path: PathBuf,
         /// What it said.
-        source: rusqlite::Error,
+        error: rusqlite::Error,
     },
     /// The directory cannot be made.
-    #[error("cannot create {}: {source}; choose another directory", path.display())]
+    #[error("cannot create {}: {error}; choose another directory", path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The file that says who has the store open cannot be written.
     #[error(
-        "cannot write and lock {}: {source}; give the coordinator's user write permission to its \
+        "cannot write and lock {}: {error}; give the coordinator's user write permission to its \
          directory, or choose another one, on a disk that knows locks",
         path.display()
     )]
@@ -153,7 +156,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// Another process has it open.
     #[error(
@@ -167,16 +170,16 @@ pub enum StoreError {
         holder: String,
     },
     /// There is no room.
-    #[error("no room is left for {}: {source}; make room on its disk", path.display())]
+    #[error("no room is left for {}: {error}; make room on its disk", path.display())]
     Full {
         /// The file.
         path: PathBuf,
         /// What SQLite said.
-        source: rusqlite::Error,
+        error: rusqlite::Error,
     },
     /// The system fails to read or write it.
     #[error(
-        "{} cannot be read or written: {source}; see that its disk is sound and that no quota is \
+        "{} cannot be read or written: {error}; see that its disk is sound and that no quota is \
          used up",
         path.display()
     )]
@@ -184,11 +187,11 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
         /// What SQLite said.
-        source: rusqlite::Error,
+        error: rusqlite::Error,
     },
     /// It cannot be opened or written.
     #[error(
-        "{} cannot be written: {source}; give the coordinator's user write permission to it and \
+        "{} cannot be written: {error}; give the coordinator's user write permission to it and \
          its directory, or choose another directory",
         path.display()
     )]
@@ -196,11 +199,11 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
         /// What SQLite said.
-        source: rusqlite::Error,
+        error: rusqlite::Error,
     },
     /// SQLite cannot make sense of it.
     #[error(
-        "{} is damaged or no database: {source}; restore the file from a copy, or choose another \
+        "{} is damaged or no database: {error}; restore the file from a copy, or choose another \
          directory",
         path.display()
     )]
@@ -208,7 +211,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
         /// What SQLite said.
-        source: rusqlite::Error,
+        error: rusqlite::Error,
     },
     /// Another program's tables are in it.
     #[error(

@@ -1,21 +1,24 @@
-//! Who a worker is over all its stays: a process on a host.
+//! Who a worker is over all its stays: a process on a host, and a number that it drew.
 
 use std::fmt;
 use std::sync::Arc;
 
 /// A process on a host. A worker that attaches again has the same name; two stays with one name
-/// are one worker to those who compare answers.
+/// are one worker to those who compare answers. Two containers may have host and process in common:
+/// the number that each process drew at its start tells them apart.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerName {
     host: Arc<str>,
     process: u32,
+    instance: u64,
 }
 
 impl WorkerName {
-    /// The process `process` on `host`; control characters of the host are replaced.
-    pub fn new(host: &str, process: u32) -> Self {
+    /// The process `process` on `host` that drew `instance`, 0 if none; control characters of the
+    /// host are replaced.
+    pub fn new(host: &str, process: u32, instance: u64) -> Self {
         let shown = |c: char| if c.is_control() { '?' } else { c };
-        Self { host: host.chars().map(shown).collect::<String>().into(), process }
+        Self { host: host.chars().map(shown).collect::<String>().into(), process, instance }
     }
 
     /// Host name, as the worker told it.
@@ -26,6 +29,11 @@ impl WorkerName {
     /// Process id, as the worker told it.
     pub fn process(&self) -> u32 {
         self.process
+    }
+
+    /// The number that the process drew at its start; 0 if it told none.
+    pub fn instance(&self) -> u64 {
+        self.instance
     }
 }
 

@@ -8,15 +8,13 @@
 mod fake;
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::version;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Answer, Effect, Record};
-use osteon_coordinator::event::{Event, Hello, Request};
-use osteon_coordinator::ids::{JobId, Token, WorkerId};
+use osteon_coordinator::effect::{Answer, Effect};
+use osteon_coordinator::event::{Event, Request};
+use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::leftover;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
@@ -37,7 +35,9 @@ fn live(
     let restored = Restored::load(store).unwrap();
     let (mut state, effects) = State::restore(Config::default(), restored, now);
     let mut effects = VecDeque::from(effects);
-    for event in beginning(specification) {
+    let request = fake::submission(specification, "the one");
+    let submitted = Event::Requested { token: Token(1), request };
+    for event in [submitted, fake::attached(1)] {
         effects.extend(react(&mut state, event, now));
     }
     let mut left = writes;
@@ -47,23 +47,10 @@ fn live(
                 Event::Answered { worker, batch, solved: fake::solved(&work), elapsed_s: 0.1 }
             }
             Effect::Store(record) => {
-                match &record {
-                    Record::Job(record) => store.put_job(record),
-                    Record::Evaluation { record, is_last } => {
-                        store.put_evaluation(record, *is_last)
-                    }
-                    Record::End { end, summary } => store.finish_job(end, summary),
-                    Record::Expulsion(record) => store.put_expulsion(record),
-                }
-                .unwrap();
                 left -= 1;
-                let (job, key) = record.key();
-                Event::Stored { job, key }
+                fake::written(store, &record)
             }
-            Effect::Read { job, number } => {
-                let found = Ok(store.evaluation(job, number).unwrap());
-                Event::Read { job, number, found }
-            }
+            Effect::Read { job, number } => fake::read(store, job, number),
             _ => continue,
         };
         effects.extend(react(&mut state, event, now));
@@ -78,24 +65,6 @@ fn live(
         _ => None,
     });
     snapshot.unwrap()
-}
-
-fn beginning(specification: &JobSpecification) -> [Event; 2] {
-    let request = Request::Submit {
-        specification: Arc::new(specification.clone()),
-        request_id: "the one".to_owned(),
-        client: String::new(),
-        priority: 0,
-    };
-    let hello = Hello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 1,
-        host: String::new(),
-        process: 1,
-    };
-    let submitted = Event::Requested { token: Token(1), request };
-    [submitted, Event::Hello { worker: WorkerId(1), hello }]
 }
 
 /// The first life at `clocks[0]`, the others at the others.

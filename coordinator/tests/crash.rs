@@ -13,8 +13,8 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::version;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Effect, Record};
-use osteon_coordinator::event::{Event, Hello, Request};
+use osteon_coordinator::effect::Effect;
+use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
 use osteon_coordinator::leftover;
 use osteon_coordinator::reactor::{Restored, react};
@@ -166,25 +166,13 @@ fn live_with(
                 if death == Some(Death::Before(writes)) {
                     return false;
                 }
-                match &record {
-                    Record::Job(record) => store.put_job(record),
-                    Record::Evaluation { record, is_last } => {
-                        store.put_evaluation(record, *is_last)
-                    }
-                    Record::End { end, summary } => store.finish_job(end, summary),
-                    Record::Expulsion(record) => store.put_expulsion(record),
-                }
-                .unwrap();
+                let stored = fake::written(&mut store, &record);
                 if death == Some(Death::After(writes)) {
                     return false;
                 }
-                let (job, key) = record.key();
-                Event::Stored { job, key }
+                stored
             }
-            Effect::Read { job, number } => {
-                let found = Ok(store.evaluation(job, number).unwrap());
-                Event::Read { job, number, found }
-            }
+            Effect::Read { job, number } => fake::read(&mut store, job, number),
             _ => continue,
         };
         effects.extend(react(&mut state, event, Duration::ZERO));
@@ -195,23 +183,9 @@ fn live_with(
 /// The client does not know whether its first submission was accepted, and submits again; the
 /// workers attach.
 fn beginning(specification: &JobSpecification, crew: Crew) -> Vec<Event> {
-    let submit = Request::Submit {
-        specification: Arc::new(specification.clone()),
-        request_id: "the one".to_owned(),
-        client: String::new(),
-        priority: 0,
-    };
-    let hello = |process| Hello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 1,
-        host: String::new(),
-        process,
-    };
-    let attach =
-        |process: u32| Event::Hello { worker: WorkerId(process.into()), hello: hello(process) };
-    let submitted = Event::Requested { token: Token(1), request: submit };
-    [submitted].into_iter().chain((1..=crew.workers).map(attach)).collect()
+    let request = fake::submission(specification, "the one");
+    let submitted = Event::Requested { token: Token(1), request };
+    [submitted].into_iter().chain((1..=crew.workers).map(fake::attached)).collect()
 }
 
 /// What the store says of the only job there is, as text: NaN equals nothing.

@@ -10,7 +10,6 @@ use std::time::Duration;
 use osteon_common::limits::{
     BATCH_REALIZATIONS_MAX, FETCHES_AT_ONCE_MAX, READER_PATIENCE_S, SUBMISSIONS_AT_ONCE_MAX,
 };
-use osteon_common::version;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
 use osteon_proto::endpoint::{connect, jobs_client, workers_client};
@@ -106,12 +105,7 @@ async fn a_cancellation_frees_the_place_of_a_submission() {
 /// A worker that answers everything.
 async fn work(channel: Channel) {
     let (outbound, messages) = mpsc::channel(16);
-    let hello = WorkerHello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 2,
-        ..WorkerHello::default()
-    };
+    let hello = WorkerHello { threads: 2, ..fake::wire_hello(1) };
     outbound.send(AttachRequest { message: Some(Sent::Hello(hello)) }).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await.unwrap();
     let mut stream = attached.into_inner();

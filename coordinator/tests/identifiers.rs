@@ -7,12 +7,11 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
-use osteon_coordinator::event::{Event, Request};
+use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
@@ -24,12 +23,7 @@ use osteon_coordinator::store::sqlite::SqliteStore;
 fn next(store: &mut dyn Store) -> JobId {
     let restored = Restored::load(store).unwrap();
     let (mut state, _) = State::restore(Config::default(), restored, Duration::ZERO);
-    let request = Request::Submit {
-        specification: Arc::new(fake::propagation(10, 1)),
-        request_id: String::new(),
-        client: String::new(),
-        priority: 0,
-    };
+    let request = fake::submission(&fake::propagation(10, 1), "");
     let submitted = Event::Requested { token: Token(1), request };
     let effects = react(&mut state, submitted, Duration::ZERO);
     let [Effect::Store(Record::Job(record))] = effects.as_slice() else { panic!("{effects:?}") };

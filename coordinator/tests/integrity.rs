@@ -9,7 +9,6 @@ mod fake;
 use std::time::Duration;
 
 use osteon_common::results::Status as JobEnd;
-use osteon_common::version;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
@@ -19,7 +18,7 @@ use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
     AttachRequest, FetchRequest, GetRequest, JobState, ListExpelledRequest, PruneRequest,
-    SubmitRequest, WatchRequest, WorkerHello,
+    SubmitRequest, WatchRequest,
 };
 use osteon_proto::{batch, results, specification};
 use tokio::sync::mpsc;
@@ -38,13 +37,7 @@ async fn channel(coordinator: &Coordinator) -> Channel {
 /// Works in `process` until the stream ends. The liar is off by one bit now and then.
 async fn work(channel: Channel, process: u32) -> Result<(), Status> {
     let (outbound, messages) = mpsc::channel(16);
-    let hello = WorkerHello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 1,
-        host: "node".to_owned(),
-        process,
-    };
+    let hello = fake::wire_hello(process);
     outbound.send(AttachRequest { message: Some(Request::Hello(hello)) }).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await?;
     let mut stream = attached.into_inner();

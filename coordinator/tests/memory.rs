@@ -1,24 +1,21 @@
 //! Ended jobs take little memory: what they left is in the store.
 
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::Data;
-use osteon_common::version;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Effect, Record};
-use osteon_coordinator::event::{Event, Hello, Request};
-use osteon_coordinator::ids::{Token, WorkerId};
+use osteon_coordinator::effect::Effect;
+use osteon_coordinator::event::{Event, Request};
+use osteon_coordinator::ids::Token;
 use osteon_coordinator::reactor::react;
 use osteon_coordinator::state::State;
-use osteon_coordinator::store::Store as _;
 use osteon_coordinator::store::sqlite::SqliteStore;
 
 /// Memory of this process, bytes.
@@ -36,19 +33,7 @@ fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
             Effect::Send { worker, batch, work } => {
                 Event::Answered { worker, batch, solved: fake::solved(&work), elapsed_s: 0.01 }
             }
-            Effect::Store(record) => {
-                match &record {
-                    Record::Job(record) => store.put_job(record),
-                    Record::Evaluation { record, is_last } => {
-                        store.put_evaluation(record, *is_last)
-                    }
-                    Record::End { end, summary } => store.finish_job(end, summary),
-                    Record::Expulsion(_) => panic!("there is one worker, and it is honest"),
-                }
-                .unwrap();
-                let (job, key) = record.key();
-                Event::Stored { job, key }
-            }
+            Effect::Store(record) => fake::written(store, &record),
             _ => continue,
         };
         effects.extend(react(state, event, Duration::ZERO));
@@ -65,24 +50,11 @@ fn ended_jobs_take_little_memory() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(directory.path()).unwrap();
     let mut state = State::new(Config::default(), Duration::ZERO);
-    let hello = Hello {
-        version: version::VERSION.to_owned(),
-        fingerprint: version::fingerprint(),
-        threads: 1,
-        host: String::new(),
-        process: 1,
-    };
-    react(&mut state, Event::Hello { worker: WorkerId(1), hello }, Duration::ZERO);
+    react(&mut state, fake::attached(1), Duration::ZERO);
     let mut one_more = |seed| {
         let mut specification = fake::identification(REALIZATIONS, 2, seed);
         specification.data = Some(Data::Velocities([3900.0, 3901.0].repeat(50_000)));
-        let request = Request::Submit {
-            specification: Arc::new(specification),
-            request_id: String::new(),
-            client: String::new(),
-            priority: 0,
-        };
-        run(&mut state, &mut store, request);
+        run(&mut state, &mut store, fake::submission(&specification, ""));
         assert!(state.is_idle());
     };
     // The first ones find the room that the others use again.

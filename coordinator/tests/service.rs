@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
+#[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
 
 use std::time::Duration;
@@ -50,13 +51,7 @@ async fn channel(coordinator: &Coordinator) -> Channel {
 }
 
 fn hello(fingerprint: String) -> AttachRequest {
-    let hello = WorkerHello {
-        version: version::VERSION.to_owned(),
-        fingerprint,
-        threads: 2,
-        host: "here".to_owned(),
-        process: 1,
-    };
+    let hello = WorkerHello { fingerprint, threads: 2, ..fake::wire_hello(1) };
     AttachRequest { message: Some(Request::Hello(hello)) }
 }
 
@@ -305,8 +300,8 @@ impl Store for BrokenStore {
 
     fn put_evaluation(&mut self, _: &EvaluationRecord, _: bool) -> Result<(), StoreError> {
         assert!(!self.dies, "a store that this test breaks");
-        let source = std::io::Error::other("the disk is full");
-        Err(StoreError::Directory { path: "store".into(), source })
+        let error = std::io::Error::other("the disk is full");
+        Err(StoreError::Directory { path: "store".into(), error })
     }
 
     fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {

@@ -67,8 +67,7 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
 }
 
 fn best_point(directory: &Path) -> anyhow::Result<Point> {
+    let text = results_directory::result_of(directory)?;
     let path = directory.join("result.json");
-    let text = std::fs::read_to_string(&path)
-        .with_context(|| format!("cannot read {}", path.display()))?;
     results_json::best_point(&text).with_context(|| path.display().to_string())
 }

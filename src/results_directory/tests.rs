@@ -101,3 +101,24 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     assert!(!directory.store().exists());
     assert_ne!(directory.request_id().unwrap(), request);
 }
+
+#[test]
+fn a_file_that_no_run_has_written_is_not_read_to_its_end() {
+    let directory = tempfile::tempdir().unwrap();
+    for name in [JOB, RESULT, REQUEST] {
+        let path = directory.path().join(name);
+        // Sparse: it takes no room on the disk.
+        File::create(&path).unwrap().set_len(FILE_BYTES_MAX + 1).unwrap();
+        let refused = read_if_there(&path).unwrap_err().to_string();
+        assert!(refused.contains(name) && refused.contains("67108864 bytes"), "{refused}");
+        File::create(&path).unwrap().set_len(100).unwrap();
+        assert_eq!(read_if_there(&path).unwrap(), Some("\0".repeat(100)));
+    }
+    let result = directory.path().join(RESULT);
+    File::create(&result).unwrap().set_len(FILE_BYTES_MAX + 1).unwrap();
+    let refused = result_of(directory.path()).unwrap_err().to_string();
+    assert!(refused.contains("longer than"), "{refused}");
+    std::fs::remove_file(result).unwrap();
+    let missing = result_of(directory.path()).unwrap_err().to_string();
+    assert!(missing.contains(RESULT) && missing.contains("no such file"), "{missing}");
+}

@@ -1,6 +1,7 @@
 """A client of osteon in Python, made from its .proto files. docs/grpc.md explains it."""
 
 import array
+import time
 
 import grpc
 from google.rpc import error_details_pb2
@@ -45,13 +46,22 @@ def submit(jobs, specification, request_id):
     return jobs.Submit(request, timeout=30).job
 
 
-def watch(jobs, job, show):
-    """Shows each snapshot of a job until it has ended; the last one."""
-    last = None
-    for response in jobs.Watch(jobs_pb2.WatchRequest(job=job)):
-        last = response.snapshot
-        show(last)
-    return last
+def watch(jobs, job, show, patience=10.0):
+    """Shows each snapshot of a job once until it has ended; the last one. A stream that breaks is
+    taken up again after the last snapshot that was seen, for `patience` seconds."""
+    last, seen, heard = None, 0, time.monotonic()
+    while True:
+        try:
+            for response in jobs.Watch(jobs_pb2.WatchRequest(job=job, after=seen)):
+                last, heard = response.snapshot, time.monotonic()
+                seen = last.sequence
+                show(last)
+            return last
+        except grpc.RpcError as error:
+            gone = error.code() == grpc.StatusCode.UNAVAILABLE
+            if not gone or time.monotonic() - heard > patience:
+                raise
+            time.sleep(0.25)
 
 
 def fetch(jobs, job):

@@ -174,6 +174,12 @@ class Waiting(WithService):
         last = watch(self.jobs, self.job, lambda snapshot: None)
         self.assertEqual(last.status, jobs_pb2.JOB_STATUS_CANCELLED)
 
+    def test_a_stream_that_is_taken_up_again_repeats_nothing(self):
+        first = next(self.jobs.Watch(jobs_pb2.WatchRequest(job=self.job), timeout=DEADLINE)).snapshot
+        request = jobs_pb2.WatchRequest(job=self.job, after=first.sequence)
+        again = next(self.jobs.Watch(request, timeout=DEADLINE)).snapshot
+        self.assertGreater(again.sequence, first.sequence)
+
     def test_whoever_gives_up_leaves_the_job_alone(self):
         request = jobs_pb2.WatchRequest(job=self.job)
         stream = self.jobs.Watch(request, timeout=0.5)

@@ -74,6 +74,7 @@ pub async fn run(
             threads: config.threads,
             host: host_name(),
             process: std::process::id(),
+            instance: random(),
         }),
         cores: Cores::new(config.threads, config.isa)?,
         stops: BTreeMap::new(),
@@ -333,6 +334,12 @@ fn detached(why: Detached) -> &'static str {
         Detached::Overrun => "the coordinator sent too many batches, or one twice",
         Detached::Protocol => "the coordinator sent a message out of turn",
     }
+}
+
+/// A random number, not 0.
+fn random() -> u64 {
+    use std::hash::{BuildHasher as _, RandomState};
+    RandomState::new().hash_one(std::process::id()).max(1)
 }
 
 /// Name of this host, for people.

@@ -31,6 +31,8 @@ pub(crate) struct Identity {
     pub(crate) host: String,
     /// Process id, for people.
     pub(crate) process: u32,
+    /// Tells this process from one with the same host name and process id, in another container.
+    pub(crate) instance: u64,
 }
 
 /// One batch of one attachment. Batch numbers are unique for one life of a coordinator only, so
@@ -167,6 +169,7 @@ impl State {
             threads: self.identity.threads,
             host: self.identity.host.clone(),
             process: self.identity.process,
+            instance: self.identity.instance,
         })
     }
 

@@ -32,6 +32,7 @@ const TEST: Cargo = &["test", "--workspace"];
 const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon-solver", "--bench", "table"],
     &["bench", "--package", "osteon", "--bench", "end_to_end"],
+    &["bench", "--package", "osteon", "--bench", "dispatch"],
 ];
 
 /// Name, what it does, and how.

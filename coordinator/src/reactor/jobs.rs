@@ -59,7 +59,10 @@ pub(super) fn stored(
                 advance(state, id, now, effects);
             }
         }
-        (RecordKey::End, Stage::Finishing(_)) => ended(state, id, now, effects),
+        (RecordKey::End, Stage::Finishing(_)) => {
+            ended(state, id, now, effects);
+            return;
+        }
         // A report of a write that was repeated meanwhile.
         _ => {}
     }
@@ -295,11 +298,16 @@ fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
         return;
     };
     state.ended.insert(id, EndedJob::new(&record, end, sequence));
+    state.changed.remove(&id);
+    let Some(snapshot) = snapshot::of(state, id, now) else {
+        return;
+    };
     for token in tokens {
-        if let Some(snapshot) = snapshot::of(state, id, now) {
-            effects.push(Effect::Answer { token, answer: Answer::Snapshot(snapshot) });
-        }
+        let answer = Answer::Snapshot(snapshot.clone());
+        effects.push(Effect::Answer { token, answer });
     }
+    // At once, and not when the others are published: somebody waits for it.
+    effects.push(Effect::Publish { job: id, snapshot });
 }
 
 /// The end of a job whose client does not want it any more.

@@ -11,6 +11,9 @@ use super::Effects;
 
 /// How often it is looked for old jobs.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
+/// For so long after its start a coordinator forgets nothing unasked, unless jobs are kept for less:
+/// its clock may be far ahead of that of its earlier lives, and somebody has to see it.
+const GRACE: Duration = Duration::from_secs(3600);
 
 /// Forgets the jobs that `retention` does not keep; the answer comes when that is durable.
 pub(super) fn requested(
@@ -30,12 +33,29 @@ pub(super) fn requested(
 
 /// Forgets the jobs that have been ended for longer than the operator wants to keep them.
 pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
-    if state.config.keep_ended.is_none() || now.saturating_sub(state.pruned) < LOOK_EVERY {
+    let Some(keep_for) = state.config.keep_ended else {
+        return;
+    };
+    let is_first = state.pruned.is_none();
+    if state.pruned.is_some_and(|last| now.saturating_sub(last) < LOOK_EVERY) {
         return;
     }
-    state.pruned = now;
-    let retention = Retention { keep_for: state.config.keep_ended, keep_last: None };
+    state.pruned = Some(now);
+    let retention = Retention { keep_for: Some(keep_for), keep_last: None };
     let jobs = chosen(state, retention, now);
+    let grace = GRACE.min(keep_for).saturating_sub(now.saturating_sub(state.started));
+    // No job that ended in this life can be older than that yet.
+    if grace > Duration::ZERO {
+        if is_first && !jobs.is_empty() {
+            tracing::warn!(
+                jobs = jobs.len(),
+                in_s = grace.as_secs(),
+                "these ended jobs are older than --keep-ended by this machine's clock and will be \
+                 forgotten; stop the coordinator if the clock is wrong"
+            );
+        }
+        return;
+    }
     if !jobs.is_empty() {
         effects.push(Effect::Prune { token: None, jobs });
     }

@@ -137,6 +137,7 @@ fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
         threads,
         host: "node".to_owned(),
         process,
+        instance: 0,
     };
     Event::Hello { worker: WorkerId(worker), hello }
 }

@@ -34,7 +34,7 @@ pub(super) fn hello(
         worker,
         Worker {
             lease,
-            name: WorkerName::new(&hello.host, hello.process),
+            name: name(&hello),
             hello,
             heard: now,
             answered: now,
@@ -121,7 +121,7 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     let longest =
         [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
     let bytes = longest.unwrap_or(0);
-    let expulsion = state.expulsion(&WorkerName::new(&hello.host, hello.process));
+    let expulsion = state.expulsion(&name(hello));
     if state.draining {
         Err(CloseReason::Draining)
     } else if bytes > NAME_BYTES_MAX {
@@ -138,4 +138,8 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     } else {
         Ok(())
     }
+}
+
+fn name(hello: &Hello) -> WorkerName {
+    WorkerName::new(&hello.host, hello.process, hello.instance)
 }

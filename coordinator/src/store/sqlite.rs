@@ -29,7 +29,7 @@ mod summary;
 
 use columns::{
     JobColumns, end_checksum, evaluation, evaluation_checksum, expulsion_checksum, job_checksum,
-    nanoseconds, pack_errors, pack_outcomes, pack_workers,
+    nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 
 /// The number in the file's header, changed with the tables or not at all, that holds the highest
@@ -242,7 +242,7 @@ impl Store for SqliteStore {
         record: &EvaluationRecord,
         is_last: bool,
     ) -> Result<(), StoreError> {
-        let point: Vec<u8> = record.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let point = pack_point(record.point);
         let outcomes = pack_outcomes(&record.outcomes);
         let errors = record.estimated_error.map(pack_errors);
         let (job, number, workers) = (record.job, record.number, pack_workers(&record.workers));
@@ -331,22 +331,25 @@ impl Store for SqliteStore {
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
         let ExpulsionRecord { number, worker, job, reason, at } = record;
-        let sql = "INSERT OR REPLACE INTO expulsion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+        let sql = "INSERT OR REPLACE INTO expulsion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
         let checksum = expulsion_checksum(record);
-        let values = params![number, host, process, job.0, reason, at, checksum];
+        let instance = worker.instance().cast_signed();
+        let values = params![number, host, process, job.0, reason, at, checksum, instance];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
 
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        let sql = "SELECT number, host, process, job, reason, at_ns, checksum FROM expulsion
+        let sql =
+            "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
                    ORDER BY number";
         let read = |row: &Row<'_>| {
             let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);
+            let instance: i64 = row.get(7)?;
             let record = ExpulsionRecord {
                 number: row.get(0)?,
-                worker: WorkerName::new(&host, row.get(2)?),
+                worker: WorkerName::new(&host, row.get(2)?, instance.cast_unsigned()),
                 job: JobId(row.get(3)?),
                 reason: row.get(4)?,
                 at: Duration::from_nanos(row.get(5)?),
@@ -425,5 +428,7 @@ fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobColumns<'a> {
     }
 }
 
+#[cfg(test)]
+mod fuzz;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! A cheap stand-in for physics: moments that depend on the point as those of a bone do, and a
-//! failure now and then. Deterministic: a function of point, seed and index.
+//! failure now and then. Deterministic: a function of point, seed and index. And what stands around
+//! a coordinator that a test drives by hand: who submits, who works, what is written and read.
 
 use std::sync::Arc;
 
@@ -8,9 +9,14 @@ use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective,
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, JobResult};
-use osteon_common::version::VERSION;
+use osteon_common::version::{self, VERSION};
+use osteon_coordinator::effect::Record;
+use osteon_coordinator::event::{Event, Hello, Request};
+use osteon_coordinator::ids::{JobId, WorkerId};
 use osteon_coordinator::search::{Search as Driven, Step};
+use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
+use osteon_proto::v1::WorkerHello;
 
 /// Starts and bounds of the seven parameters.
 const RANGES: [(f64, f64, f64); 7] = [
@@ -52,6 +58,58 @@ pub(crate) fn propagation(realizations: u64, seed: u64) -> JobSpecification {
         data: None,
         ..identification(realizations, 1, seed)
     }
+}
+
+/// A client without a name submits a job, under a request id unless that is empty.
+pub(crate) fn submission(specification: &JobSpecification, request_id: &str) -> Request {
+    Request::Submit {
+        specification: Arc::new(specification.clone()),
+        request_id: request_id.to_owned(),
+        client: String::new(),
+        priority: 0,
+    }
+}
+
+/// A worker with one thread attaches; its stay has the number of its process.
+pub(crate) fn attached(process: u32) -> Event {
+    Event::Hello { worker: WorkerId(process.into()), hello: hello(process) }
+}
+
+/// What a worker with one thread says first.
+pub(crate) fn hello(process: u32) -> Hello {
+    let WorkerHello { version, fingerprint, threads, host, process, instance } =
+        wire_hello(process);
+    Hello { version, fingerprint, threads, host, process, instance }
+}
+
+/// The same as it is sent.
+pub(crate) fn wire_hello(process: u32) -> WorkerHello {
+    WorkerHello {
+        version: VERSION.to_owned(),
+        fingerprint: version::fingerprint(),
+        threads: 1,
+        host: "node".to_owned(),
+        process,
+        instance: mix(process.into()),
+    }
+}
+
+/// Puts a record into the store.
+pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
+    match record {
+        Record::Job(record) => store.put_job(record),
+        Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+        Record::End { end, summary } => store.finish_job(end, summary),
+        Record::Expulsion(record) => store.put_expulsion(record),
+    }
+    .unwrap();
+    let (job, key) = record.key();
+    Event::Stored { job, key }
+}
+
+/// Reads an evaluation from the store.
+pub(crate) fn read(store: &mut dyn Store, job: JobId, number: u64) -> Event {
+    Event::Read { job, number, found: Ok(store.evaluation(job, number).unwrap()) }
 }
 
 /// All realizations of a batch.

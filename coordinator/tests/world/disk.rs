@@ -6,6 +6,7 @@ use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::store::Store as _;
 
 use super::{Happening, World};
+use crate::fake;
 
 impl World {
     /// Looks at a record when the coordinator has decided on it.
@@ -48,34 +49,22 @@ impl World {
     }
 
     pub(super) fn write(&mut self, record: &Record) {
-        let (job, key) = record.key();
         let event = if self.refuses() {
+            let (job, key) = record.key();
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
-            self.put(record);
-            Event::Stored { job, key }
+            fake::written(&mut self.store, record)
         };
         self.within(5, Happening::Report(event));
     }
 
-    pub(super) fn put(&mut self, record: &Record) {
-        let store = &mut self.store;
-        match record {
-            Record::Job(record) => store.put_job(record),
-            Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
-            Record::End { end, summary } => store.finish_job(end, summary),
-            Record::Expulsion(record) => store.put_expulsion(record),
-        }
-        .unwrap();
-    }
-
     pub(super) fn read(&mut self, job: JobId, number: u64) {
-        let found = if self.refuses() {
-            Err("the cable is out".to_owned())
+        let event = if self.refuses() {
+            Event::Read { job, number, found: Err("the cable is out".to_owned()) }
         } else {
-            Ok(self.store.evaluation(job, number).unwrap())
+            fake::read(&mut self.store, job, number)
         };
-        self.within(5, Happening::Report(Event::Read { job, number, found }));
+        self.within(5, Happening::Report(event));
     }
 
     /// Somebody wants ended jobs forgotten, once every client has heard of its own.

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::version;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
@@ -356,12 +355,11 @@ impl World {
             let token = Token(self.number());
             self.submissions.insert(token, client);
             let Client { specification, request_id, .. } = &self.clients[client];
-            let request = Request::Submit {
-                specification: specification.clone(),
-                request_id: request_id.clone(),
-                client: format!("client {}", client % 2),
-                priority: client as u32,
-            };
+            let mut request = fake::submission(specification, request_id);
+            if let Request::Submit { client: name, priority, .. } = &mut request {
+                *name = format!("client {}", client % 2);
+                *priority = client as u32;
+            }
             // Until it hears of acceptance, a client asks again.
             self.react(Event::Requested { token, request });
             self.within(2000, Happening::Submit(client));
@@ -370,14 +368,9 @@ impl World {
 
     fn arrive(&mut self) {
         let worker = WorkerId(self.number());
-        let hello = Hello {
-            version: version::VERSION.to_owned(),
-            fingerprint: version::fingerprint(),
-            threads: 1 + self.draw(4) as u32,
-            host: "simulated".to_owned(),
-            process: self.process(),
-        };
-        let process = hello.process;
+        let threads = 1 + self.draw(4) as u32;
+        let process = self.process();
+        let hello = Hello { threads, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
     }
@@ -452,7 +445,7 @@ impl World {
             match happening {
                 Happening::Write(record) => {
                     if self.draw(2) == 0 {
-                        self.put(&record);
+                        fake::written(&mut self.store, &record);
                     }
                 }
                 Happening::Forget(_, jobs) => {

@@ -16,7 +16,7 @@ struct Recorder {
 
 impl Recorder {
     fn new() -> Self {
-        let identity = Identity { threads: 2, host: "host".to_owned(), process: 7 };
+        let identity = Identity { threads: 2, host: "host".to_owned(), process: 7, instance: 9 };
         Self { state: State::new(identity), now: Duration::ZERO, effects: Vec::new() }
     }
 
@@ -111,6 +111,7 @@ const DRAIN: Effect = Effect::Send(Request::Drain(v1::WorkerDrain {}));
 fn hello_says_who_it_is() {
     let Request::Hello(hello) = Recorder::new().state.attach() else { panic!("no hello") };
     assert_eq!((hello.threads, hello.host.as_str(), hello.process), (2, "host", 7));
+    assert_eq!(hello.instance, 9);
     assert_eq!(hello.fingerprint, version::fingerprint());
 }
 

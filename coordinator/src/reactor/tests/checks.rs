@@ -44,6 +44,22 @@ fn one_worker_alone_is_believed() {
 }
 
 #[test]
+fn two_containers_may_have_host_and_process_in_common() {
+    let of_instance = |worker, instance| {
+        let Event::Hello { worker, mut hello } = hello_of(worker, 1, 1) else { panic!("no hello") };
+        hello.instance = instance;
+        Event::Hello { worker, hello }
+    };
+    let mut rig = rig(1, 0);
+    rig.event(of_instance(1, 5));
+    // The same process once more, and one of another container.
+    rig.event(of_instance(2, 5));
+    rig.check(of_instance(3, 6), &["welcome 3, lease 3"]);
+    rig.check(answer(1, 1, 0, 1), &["send 3: batch 2 = 0+1"]);
+    rig.check(answer(3, 2, 0, 1), &["store job 1 evaluation 0"]);
+}
+
+#[test]
 fn a_lost_auditor_is_replaced_and_audits_without_anybody_are_given_up() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);

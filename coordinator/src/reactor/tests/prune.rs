@@ -70,3 +70,20 @@ fn old_jobs_are_forgotten_unasked() {
     rig.check_after(Duration::from_secs(59), &[]);
     rig.check_after(Duration::from_secs(1), &["prune 2"]);
 }
+
+#[test]
+fn a_clock_that_is_far_ahead_forgets_nothing_at_once() {
+    const DAY: Duration = Duration::from_secs(86_400);
+    for (keep, grace) in [(90 * DAY, 60 * MINUTE), (5 * MINUTE, 5 * MINUTE)] {
+        let mut rig = rig();
+        rig.state.config.keep_ended = Some(keep);
+        // The next life of the coordinator, on the same jobs.
+        rig.now += 3650 * DAY;
+        (rig.state.started, rig.state.pruned) = (rig.now, None);
+        rig.check_after(Duration::ZERO, &[]);
+        rig.check_after(grace - MINUTE, &[]);
+        rig.check_after(MINUTE, &["prune 1 2 3"]);
+        // Whoever asks for it gets it.
+        rig.check(prune(Some(keep), None), &["prune 1 2 3"]);
+    }
+}

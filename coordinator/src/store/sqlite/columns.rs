@@ -71,12 +71,17 @@ pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
     checksum(&fields)
 }
 
+/// Older formats had no instance: without one there is no field.
 pub(super) fn expulsion_checksum(record: &ExpulsionRecord) -> Vec<u8> {
     let ExpulsionRecord { number, worker, job, reason, at } = record;
     let numbers = [*number, job.0, nanoseconds(*at), worker.process().into()];
     let numbers = numbers.map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
     fields.extend([worker.host().as_bytes(), reason.as_bytes()]);
+    let instance = worker.instance().to_le_bytes();
+    if worker.instance() != 0 {
+        fields.push(&instance);
+    }
     checksum(&fields)
 }
 
@@ -155,22 +160,34 @@ fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
     rest.is_empty().then_some(EstimatedError { median, largest })
 }
 
+pub(super) fn pack_point(point: Point) -> Vec<u8> {
+    point.0.into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
 fn unpack(point: &[u8]) -> Option<Point> {
     let (values, rest) = point.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     rest.is_empty().then(|| values.try_into().ok().map(Point)).flatten()
 }
 
-/// A line for each worker: its process, a space, its host.
+/// A line for each worker: its process, a stroke and the number it drew in hexadecimal, if it drew
+/// one, a space, its host.
 pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
-    let line = |worker: &WorkerName| format!("{} {}", worker.process(), worker.host());
+    let line = |worker: &WorkerName| match worker.instance() {
+        0 => format!("{} {}", worker.process(), worker.host()),
+        drawn => format!("{}/{drawn:x} {}", worker.process(), worker.host()),
+    };
     workers.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
     let worker = |line: &str| {
         let (process, host) = line.split_once(' ')?;
-        Some(WorkerName::new(host, process.parse().ok()?))
+        let (process, instance) = match process.split_once('/') {
+            Some((process, drawn)) => (process, u64::from_str_radix(drawn, 16).ok()?),
+            None => (process, 0),
+        };
+        Some(WorkerName::new(host, process.parse().ok()?, instance))
     };
     packed.split('\n').filter(|line| !line.is_empty()).map(worker).collect()
 }

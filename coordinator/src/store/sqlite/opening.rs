@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, SCHEMA};
+use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, FROM_FORMAT_4, SCHEMA};
 use crate::store::StoreError;
 
 /// Format that this program writes.
-pub(super) const FORMAT: i64 = 4;
+pub(super) const FORMAT: i64 = 5;
 /// Oldest format that this program brings up to date.
 const FORMAT_OLDEST: i64 = 2;
 /// Name of the file in the store's directory.
@@ -36,7 +36,7 @@ pub(super) enum Journal {
 /// Opens the file in `directory`, making both if need be; the lock is held as long as the file.
 pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), StoreError> {
     fs::create_dir_all(directory)
-        .map_err(|source| StoreError::Directory { path: directory.to_owned(), source })?;
+        .map_err(|error| StoreError::Directory { path: directory.to_owned(), error })?;
     let path = directory.join(FILE);
     let lock = lock(directory, &path)?;
     let network = network_file_system(directory);
@@ -112,7 +112,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
     }
-    for (format, change) in [(2, FROM_FORMAT_2), (3, FROM_FORMAT_3)] {
+    for (format, change) in [(2, FROM_FORMAT_2), (3, FROM_FORMAT_3), (4, FROM_FORMAT_4)] {
         let found: i64 =
             transaction.query_row("SELECT version FROM format", [], |row| row.get(0))?;
         if found == format {
@@ -125,7 +125,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
 /// Takes the store for this process and writes there who that is.
 fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     let path = directory.join(LOCK);
-    let failed = |source| StoreError::Lock { path: path.clone(), source };
+    let failed = |error| StoreError::Lock { path: path.clone(), error };
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     let mut file = options.open(&path).map_err(failed)?;
@@ -193,27 +193,49 @@ fn network_kind(magic: u32) -> Option<&'static str> {
 }
 
 /// What SQLite's refusal means for whoever runs the coordinator.
-pub(super) fn refusal(path: &Path, source: rusqlite::Error) -> StoreError {
+pub(super) fn refusal(path: &Path, error: rusqlite::Error) -> StoreError {
     let path = path.to_owned();
-    match source.sqlite_error_code() {
+    match error.sqlite_error_code() {
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
             StoreError::InUse { path, holder: "another process".to_owned() }
         }
-        Some(ErrorCode::SystemIoFailure) => StoreError::Io { path, source },
-        Some(ErrorCode::DiskFull) => StoreError::Full { path, source },
+        Some(ErrorCode::SystemIoFailure) => StoreError::Io { path, error },
+        Some(ErrorCode::DiskFull) => StoreError::Full { path, error },
         Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => {
-            StoreError::NotWritable { path, source }
+            StoreError::NotWritable { path, error }
         }
         Some(ErrorCode::NotADatabase | ErrorCode::DatabaseCorrupt) => {
-            StoreError::Corrupt { path, source }
+            StoreError::Corrupt { path, error }
         }
-        _ => StoreError::Sqlite { path, source },
+        _ => StoreError::Sqlite { path, error },
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::error::Error as _;
+
+    use rusqlite::ffi;
+
     use super::*;
+
+    #[test]
+    fn a_refusal_tells_its_cause_once() {
+        for code in [
+            ffi::SQLITE_IOERR,
+            ffi::SQLITE_FULL,
+            ffi::SQLITE_READONLY,
+            ffi::SQLITE_CORRUPT,
+            ffi::SQLITE_MISUSE,
+        ] {
+            let cause = "what SQLite says".to_owned();
+            let cause = rusqlite::Error::SqliteFailure(ffi::Error::new(code), Some(cause));
+            let refusal = refusal(Path::new("osteon.db"), cause);
+            assert_eq!(refusal.to_string().matches("what SQLite says").count(), 1, "{refusal}");
+            // Who prints the chain adds nothing.
+            assert!(refusal.source().is_none(), "{refusal:?}");
+        }
+    }
 
     #[test]
     fn network_file_systems_are_known_by_their_numbers() {

@@ -19,7 +19,7 @@ pub(super) const SCHEMA: &str = "
         outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
         checksum BLOB NOT NULL,
         estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
-        workers TEXT,                    -- whose answers are in it: a line each, process and host
+        workers TEXT,                    -- whose answers are in it: a line each, PROCESS[/INSTANCE] HOST
         PRIMARY KEY (job, number)
     );
     CREATE TABLE ending (
@@ -48,7 +48,8 @@ pub(super) const SCHEMA: &str = "
         job INTEGER NOT NULL,            -- in which it was found
         reason TEXT NOT NULL,
         at_ns INTEGER NOT NULL,          -- since the Unix epoch
-        checksum BLOB NOT NULL
+        checksum BLOB NOT NULL,
+        instance INTEGER NOT NULL DEFAULT 0  -- the number it drew, as a signed one
     );
 ";
 
@@ -74,4 +75,11 @@ pub(super) const FROM_FORMAT_3: &str = "
         checksum BLOB NOT NULL
     );
     UPDATE format SET version = 4;
+";
+
+/// From format 4, which knew a worker by host and process alone. The checksum of a row without an
+/// instance is the same.
+pub(super) const FROM_FORMAT_4: &str = "
+    ALTER TABLE expulsion ADD COLUMN instance INTEGER NOT NULL DEFAULT 0;
+    UPDATE format SET version = 5;
 ";

@@ -12,7 +12,7 @@ use super::columns::checksum;
 use super::opening::{FILE, FORMAT, Journal, open_file};
 use super::*;
 
-fn job(id: u64) -> JobRecord {
+pub(super) fn job(id: u64) -> JobRecord {
     let mut parameters =
         [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed);
     parameters[1] = Range::Free { start: 17.717e9, lower: 12e9, upper: 25e9 };
@@ -36,7 +36,7 @@ fn job(id: u64) -> JobRecord {
     }
 }
 
-fn evaluation(job: u64, number: u64) -> EvaluationRecord {
+pub(super) fn evaluation(job: u64, number: u64) -> EvaluationRecord {
     EvaluationRecord {
         job: JobId(job),
         number,
@@ -46,12 +46,14 @@ fn evaluation(job: u64, number: u64) -> EvaluationRecord {
         estimated_error: (number != 1)
             .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
         workers: (0..number)
-            .map(|process| WorkerName::new("a node", u32::try_from(process).unwrap()))
+            .map(|process| {
+                WorkerName::new("a node", u32::try_from(process).unwrap(), process << 62)
+            })
             .collect(),
     }
 }
 
-fn end(job: u64) -> EndRecord {
+pub(super) fn end(job: u64) -> EndRecord {
     EndRecord {
         job: JobId(job),
         ending: Ending { status: Status::Failed, reason: Some("why".to_owned()) },
@@ -72,7 +74,7 @@ fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord
     Ok(all)
 }
 
-fn summary(job: u64) -> Summary {
+pub(super) fn summary(job: u64) -> Summary {
     let row = |number| osteon_common::results::Evaluation {
         number,
         point: evaluation(job, number).point,
@@ -115,7 +117,7 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.expulsions().unwrap(), [expulsion(1)]);
     // Process 0 has computed evaluation 1 of job 1, which has ended, and nobody else has.
     let ended_with = |store: &mut SqliteStore, host, process| {
-        store.ended_with(&WorkerName::new(host, process)).unwrap()
+        store.ended_with(&WorkerName::new(host, process, 0)).unwrap()
     };
     assert_eq!(ended_with(&mut store, "a node", 0), [JobId(1)]);
     for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
@@ -128,7 +130,7 @@ fn what_is_put_is_there_after_a_reopening() {
 fn expulsion(number: u64) -> ExpulsionRecord {
     ExpulsionRecord {
         number,
-        worker: WorkerName::new("a node", 7),
+        worker: WorkerName::new("a node", 7, u64::MAX),
         job: JobId(2),
         reason: "answered wrongly".to_owned(),
         at: Duration::from_secs(1_763_000_050),
@@ -263,8 +265,8 @@ fn a_second_coordinator_is_refused() {
 #[test]
 fn another_format_is_refused() {
     for (version, expected) in [
-        (1, "has format 1 of an older version of osteon, this program writes format 4; finish"),
-        (5, "has format 5, this program writes format 4; use a newer version of osteon"),
+        (1, "has format 1 of an older version of osteon, this program writes format 5; finish"),
+        (6, "has format 6, this program writes format 5; use a newer version of osteon"),
     ] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
@@ -321,6 +323,22 @@ const BACK_TO_FORMAT_2: &str = "
     ALTER TABLE evaluation DROP COLUMN estimated_error;
     UPDATE format SET version = 2;
 ";
+
+#[test]
+fn an_expulsion_of_format_4_is_one_without_an_instance() {
+    let mut record = expulsion(1);
+    record.worker = WorkerName::new("a node", 7, 0);
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_expulsion(&record).unwrap();
+    let back = "ALTER TABLE expulsion DROP COLUMN instance; UPDATE format SET version = 4;";
+    store.connection.execute_batch(back).unwrap();
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.expulsions().unwrap(), [record]);
+    store.put_expulsion(&expulsion(2)).unwrap();
+    assert_eq!(store.expulsions().unwrap()[1], expulsion(2));
+}
 
 #[test]
 fn files_of_older_formats_are_brought_up_to_date() {
