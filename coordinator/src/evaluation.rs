@@ -9,6 +9,7 @@ use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
 use crate::dispute::{self, Dispute, Vote};
+use crate::losses::{Loss, Losses};
 use crate::worker_name::WorkerName;
 
 /// Consecutive indices.
@@ -55,9 +56,9 @@ pub struct Evaluation {
     pub(crate) filled: u64,
     /// Indices to hand out, from the front.
     pub(crate) queue: VecDeque<Indices>,
-    /// Indices that were alone in a batch of a lost worker, with the number of workers that were
-    /// lost while they held nothing else; those that wait are in `quarantine`.
-    pub(crate) suspects: BTreeMap<u64, u32>,
+    /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
+    /// they held nothing else; those that wait are in `quarantine`.
+    pub(crate) suspects: BTreeMap<u64, Losses>,
     /// Suspects to hand out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
     /// Everybody whose answers fill slots.
@@ -126,13 +127,18 @@ impl Evaluation {
         self.queue.push_front(Indices { first: indices.first, count: half });
     }
 
-    /// Puts one index that was alone in a batch of a lost worker into quarantine; `alone` when
-    /// the worker held nothing else. Returns the number of workers lost while alone with it.
-    pub fn suspect(&mut self, index: u64, alone: bool) -> u32 {
-        let deaths = self.suspects.entry(index).or_default();
-        *deaths += u32::from(alone);
+    /// Puts one index that was alone in a batch of a lost worker into quarantine.
+    pub(crate) fn suspect(&mut self, index: u64, loss: &Loss) {
+        self.suspects.entry(index).or_default().add(loss);
         self.quarantine.push_back(index);
-        *deaths
+    }
+
+    /// A worker is back: nothing that it held is to blame.
+    pub(crate) fn forgive(&mut self, name: &WorkerName) {
+        let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.lost);
+        for losses in self.suspects.values_mut().chain(judged) {
+            losses.forgive(name);
+        }
     }
 
     /// Fills the empty slots of `indices` with the answer of `by`.

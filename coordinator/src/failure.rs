@@ -27,7 +27,7 @@ pub enum Failure {
     },
     /// Workers vanish over one realization.
     #[error(
-        "realization {index} was alone on three workers that vanished; to reproduce it, fix \
+        "realization {index} was alone on {workers} workers that vanished ({hosts}); to reproduce it, fix \
          [parameters] at {:?} (density, longitudinal_young_modulus, longitudinal_poisson_ratio, \
          longitudinal_shear_modulus, transverse_young_modulus, transverse_poisson_ratio, \
          dispersion) and run `osteon draw JOB.toml --index {index}`, then `osteon simulate`",
@@ -38,6 +38,10 @@ pub enum Failure {
         index: u64,
         /// The point.
         point: Point,
+        /// How many were lost.
+        workers: usize,
+        /// Their hosts.
+        hosts: String,
     },
     /// The stored evaluations are not those of the job's search.
     #[error(transparent)]
@@ -54,7 +58,7 @@ pub enum Failure {
 /// machines, and not in the job.
 pub fn lies_in_machines(reason: &str) -> bool {
     reason.starts_with("integrity error: ")
-        || reason.contains(" was alone on three workers that vanished")
+        || reason.contains(" workers that vanished")
         || reason.starts_with("stored evaluation ")
         || reason.starts_with("the store has no evaluation ")
 }
@@ -87,7 +91,7 @@ mod tests {
         let replay = ReplayError { number: 1, found: Box::new([0.0; 7]), expected: None };
         for failure in [
             Failure::Contradiction { contradiction, point },
-            Failure::LethalRealization { index, point },
+            Failure::LethalRealization { index, point, workers: 3, hosts: "a, b".to_owned() },
             Failure::Replay(replay),
             Failure::Missing { number: 2 },
         ] {

@@ -23,6 +23,7 @@ mod fetching;
 pub mod ids;
 pub mod leftover;
 pub mod listen;
+mod losses;
 mod observers;
 mod rate;
 pub mod reactor;

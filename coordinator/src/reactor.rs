@@ -16,6 +16,7 @@ mod prune;
 mod requests;
 mod reread;
 mod restore;
+mod suspects;
 mod ticks;
 mod workers;
 
@@ -46,7 +47,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         Event::Misbehaved { worker, reason } => {
             workers::close(state, worker, reason, now, &mut effects);
         }
-        Event::StreamEnded { worker } => workers::lost(state, worker, now, &mut effects),
+        Event::StreamEnded { worker } => workers::stream_ended(state, worker, now),
         Event::Stored { job, key } => jobs::stored(state, job, key, now, &mut effects),
         Event::StoreFailed { job, key, error } => {
             jobs::store_failed(state, job, key, error, now, &mut effects);

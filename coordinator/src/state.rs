@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::limits::WORKERS_MAX;
 use osteon_proto::batch::Work;
 use osteon_proto::specification;
 use prost::Message as _;
@@ -23,6 +24,9 @@ use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
+/// So many workers of a host that are lost in a row make it one that is given only what it cannot
+/// do much harm to.
+const LOST_IN_A_ROW_MAX: u32 = 3;
 /// Settled batches that are remembered for each worker, to compare late answers with.
 pub(crate) const SETTLED_MAX: usize = 16;
 
@@ -55,6 +59,9 @@ pub struct State {
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
     /// Workers that compute wrongly, in the order in which they were found.
     pub(crate) expelled: Vec<Expelled>,
+    /// How many workers of a host were lost in a row with what they held, none answering anything
+    /// in between.
+    pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
@@ -157,16 +164,29 @@ pub(crate) struct Trouble {
     pub(crate) error: String,
 }
 
+/// Workers of one host.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LostInARow {
+    /// How many.
+    pub(crate) count: u32,
+    /// When the last was lost.
+    pub(crate) last: Duration,
+}
+
 /// A stay of a worker.
 #[derive(Debug)]
 pub(crate) struct Worker {
     pub(crate) lease: LeaseId,
     pub(crate) name: WorkerName,
     pub(crate) hello: Hello,
+    /// Since when it is there.
+    pub(crate) attached: Duration,
     /// When its last message came.
     pub(crate) heard: Duration,
     /// When its last answer came, or it attached.
     pub(crate) answered: Duration,
+    /// It has answered something in this stay.
+    pub(crate) proven: bool,
     /// When the last sign of life was given to it.
     pub(crate) beat: Duration,
     /// Batches it holds, in the order they were sent.
@@ -235,6 +255,7 @@ impl State {
             pruned: None,
             workers: BTreeMap::new(),
             expelled: Vec::new(),
+            lost_in_a_row: BTreeMap::new(),
             no_worker_since: now,
             batches: BTreeMap::new(),
             next_job: 1,
@@ -303,6 +324,31 @@ impl State {
     pub(crate) fn expulsion(&self, name: &WorkerName) -> Option<&ExpulsionRecord> {
         let found = self.expelled.iter().find(|expelled| expelled.record.worker == *name);
         found.map(|expelled| &expelled.record)
+    }
+
+    /// Whether the workers of a host are lost over whatever they hold.
+    pub(crate) fn is_failing(&self, host: &str) -> bool {
+        self.lost_in_a_row.get(host).is_some_and(|lost| lost.count >= LOST_IN_A_ROW_MAX)
+    }
+
+    /// A worker of a host has answered.
+    pub(crate) fn prove(&mut self, worker: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&worker) {
+            worker.proven = true;
+            self.lost_in_a_row.remove(worker.name.host());
+        }
+    }
+
+    /// A worker of a host was lost with what it held.
+    pub(crate) fn count_loss(&mut self, host: &str, now: Duration) {
+        if self.lost_in_a_row.len() >= WORKERS_MAX && !self.lost_in_a_row.contains_key(host) {
+            self.lost_in_a_row.pop_first();
+        }
+        let lost = self.lost_in_a_row.entry(host.to_owned()).or_default();
+        *lost = LostInARow { count: lost.count.saturating_add(1), last: now };
+        if lost.count == LOST_IN_A_ROW_MAX {
+            tracing::warn!(%host, "the workers of this host vanish with whatever they hold");
+        }
     }
 
     /// Whether somebody that meets `of` takes batches.

@@ -131,11 +131,16 @@ fn hello(worker: u64, threads: u32) -> Event {
 
 /// A worker that runs in `process`.
 fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
+    hello_on("node", worker, process, threads)
+}
+
+/// A worker that runs in `process` on `host`.
+fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
     let hello = Hello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
         threads,
-        host: "node".to_owned(),
+        host: host.to_owned(),
         process,
         instance: 0,
     };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Effects, checks, expulsion, jobs, prune, workers};
+use super::{Effects, checks, expulsion, jobs, prune, suspects, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
@@ -16,6 +16,7 @@ pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     beat(state, now, effects);
     checks::give_up(state, now, effects);
     if !state.draining {
+        suspects::tick(state, now, effects);
         store_again(state, now, effects);
         expulsion::store_again(state, now, effects);
         prune::tick(state, now, effects);

@@ -29,6 +29,9 @@ const HOUR: Duration = Duration::from_secs(3600);
 /// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
 const LOST_ALONE_MAX: u32 = 2;
 
+/// Numbers of processes of the bad node are above this one.
+const BAD_PROCESSES: u32 = 1_000_000;
+
 /// How often what happened.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
@@ -62,6 +65,8 @@ pub(crate) struct Counts {
     pub(crate) repaired: u64,
     /// Jobs forgotten.
     pub(crate) pruned: u64,
+    /// Deaths of a node that dies over whatever it gets.
+    pub(crate) bad_deaths: u64,
 }
 
 impl Counts {
@@ -84,6 +89,7 @@ impl Counts {
         self.remembered += other.remembered;
         self.repaired += other.repaired;
         self.pruned += other.pruned;
+        self.bad_deaths += other.bad_deaths;
     }
 }
 
@@ -94,6 +100,8 @@ enum Happening {
     Submit(usize),
     /// A worker attaches.
     Arrive,
+    /// A worker attaches that dies over whatever it gets.
+    ArriveBad,
     /// A worker's message arrives.
     Message(WorkerId, Event),
     /// A worker answers a batch that is settled again, and differently.
@@ -135,6 +143,8 @@ struct Worker {
     process: u32,
     /// It computes nothing and says nothing, but its stream stands.
     stalled: bool,
+    /// It dies over whatever it gets.
+    bad: bool,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
 }
@@ -210,6 +220,7 @@ impl World {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
         let liars = liars::some(&mut draw);
+        let bad = draw(4) == 0;
         let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,
@@ -249,6 +260,9 @@ impl World {
         }
         if let Some(at) = drain {
             world.after(at, Happening::Drain);
+        }
+        if bad {
+            world.within(500, Happening::ArriveBad);
         }
         if let Some(at) = prune {
             world.after(at, Happening::Prune);
@@ -291,14 +305,17 @@ impl World {
             Happening::Tick => self.tick(),
             Happening::Submit(client) => self.submit(client),
             Happening::Arrive => self.arrive(),
+            Happening::ArriveBad => self.arrive_bad(),
             Happening::Message(worker, event) => {
                 if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
                     self.message(worker, event);
                 }
             }
             Happening::Break(worker) => {
-                if !self.workers.contains_key(&worker) {
-                } else if self.may_die(worker) {
+                let bad = self.workers.get(&worker).map(|worker| worker.bad);
+                self.counts.bad_deaths += u64::from(bad == Some(true));
+                if bad.is_none() {
+                } else if bad == Some(true) || self.may_die(worker) {
                     self.bury(worker);
                     self.react(Event::StreamEnded { worker });
                 } else {
@@ -375,6 +392,16 @@ impl World {
         self.react(Event::Hello { worker, hello });
     }
 
+    /// A process on a node that is not in order.
+    fn arrive_bad(&mut self) {
+        let number = self.number();
+        let (worker, process) = (WorkerId(number), BAD_PROCESSES + number as u32);
+        let hello = Hello { host: "bad".to_owned(), ..fake::hello(process) };
+        let known = Worker { process, bad: true, heard: self.now, ..Worker::default() };
+        self.workers.insert(worker, known);
+        self.react(Event::Hello { worker, hello });
+    }
+
     fn message(&mut self, worker: WorkerId, event: Event) {
         let known = self.workers.get_mut(&worker).unwrap();
         if let Event::Answered { batch, solved, .. } = &event {
@@ -410,9 +437,15 @@ impl World {
 
     /// A worker is gone; another comes in its place.
     fn bury(&mut self, worker: WorkerId) {
-        self.workers.remove(&worker);
+        let gone = self.workers.remove(&worker).unwrap();
         self.counts.lost += 1;
-        self.within(500, Happening::Arrive);
+        self.replace(&gone);
+    }
+
+    /// Another worker comes in the place of one that is gone.
+    fn replace(&mut self, gone: &Worker) {
+        let other = if gone.bad { Happening::ArriveBad } else { Happening::Arrive };
+        self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
     /// The coordinator has stopped by itself, and starts again.
@@ -463,10 +496,9 @@ impl World {
                 }
             }
         }
-        for _ in 0..self.workers.len() {
-            self.within(500, Happening::Arrive);
+        for gone in std::mem::take(&mut self.workers).values() {
+            self.replace(gone);
         }
-        self.workers.clear();
         self.answered_batches.clear();
         self.submissions.clear();
         self.cancellations.clear();
@@ -523,8 +555,13 @@ impl World {
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
         self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let known = self.workers.get_mut(&worker).unwrap();
+        let bad = known.bad;
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
+        if bad {
+            self.within(50, Happening::Break(worker));
+            return;
+        }
         let right = self.answer(worker, batch, &work);
         match self.draw(100) {
             0..3 => self.within(100, Happening::Break(worker)),
