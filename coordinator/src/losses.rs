@@ -67,6 +67,11 @@ impl Losses {
         self.0.retain(|loss| loss.worker != *name || loss.cause == Cause::Misbehaviour);
     }
 
+    /// Changes the times of all losses.
+    pub(crate) fn excuse(&mut self, excused: impl Fn(&mut Duration)) {
+        self.0.iter_mut().for_each(|loss| excused(&mut loss.at));
+    }
+
     /// Whether nobody was lost.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()

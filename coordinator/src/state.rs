@@ -50,6 +50,8 @@ pub struct State {
     pub(crate) last_served: Option<JobId>,
     /// Jobs that changed since they were published.
     pub(crate) changed: BTreeSet<JobId>,
+    /// When time was looked at last.
+    pub(crate) ticked: Duration,
     /// When all active jobs were published last.
     pub(crate) published: Duration,
     /// When this life began.
@@ -250,6 +252,7 @@ impl State {
             shares: Shares::default(),
             last_served: None,
             changed: BTreeSet::new(),
+            ticked: now,
             published: now,
             started: now,
             pruned: None,

@@ -65,6 +65,8 @@ pub(crate) struct Counts {
     pub(crate) repaired: u64,
     /// Jobs forgotten.
     pub(crate) pruned: u64,
+    /// Times in which the coordinator stood still.
+    pub(crate) pauses: u64,
     /// Deaths of a node that dies over whatever it gets.
     pub(crate) bad_deaths: u64,
 }
@@ -90,6 +92,7 @@ impl Counts {
         self.repaired += other.repaired;
         self.pruned += other.pruned;
         self.bad_deaths += other.bad_deaths;
+        self.pauses += other.pauses;
     }
 }
 
@@ -100,6 +103,12 @@ enum Happening {
     Submit(usize),
     /// A worker attaches.
     Arrive,
+    /// A process attaches again.
+    Return(u32),
+    /// The coordinator stands still.
+    Pause,
+    /// A worker does not wait for the coordinator any longer.
+    GiveUp(WorkerId),
     /// A worker attaches that dies over whatever it gets.
     ArriveBad,
     /// A worker's message arrives.
@@ -203,6 +212,7 @@ impl World {
             random % below
         };
         let config = Config {
+            heartbeat: Duration::from_millis(200),
             expiry: Duration::from_secs(1),
             active_jobs_max: 1 + draw(2) as usize,
             batch_target: Duration::from_millis(10 + draw(200)),
@@ -221,6 +231,7 @@ impl World {
         });
         let liars = liars::some(&mut draw);
         let bad = draw(4) == 0;
+        let pauses: Vec<u64> = (0..draw(4)).map(|_| draw(3000)).collect();
         let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,
@@ -260,6 +271,9 @@ impl World {
         }
         if let Some(at) = drain {
             world.after(at, Happening::Drain);
+        }
+        for at in pauses {
+            world.after(at, Happening::Pause);
         }
         if bad {
             world.within(500, Happening::ArriveBad);
@@ -306,6 +320,9 @@ impl World {
             Happening::Submit(client) => self.submit(client),
             Happening::Arrive => self.arrive(),
             Happening::ArriveBad => self.arrive_bad(),
+            Happening::Return(process) => self.attach(process),
+            Happening::Pause => self.pause(),
+            Happening::GiveUp(worker) => self.give_up(worker),
             Happening::Message(worker, event) => {
                 if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
                     self.message(worker, event);
@@ -384,12 +401,47 @@ impl World {
     }
 
     fn arrive(&mut self) {
+        let process = self.process();
+        self.attach(process);
+    }
+
+    fn attach(&mut self, process: u32) {
         let worker = WorkerId(self.number());
         let threads = 1 + self.draw(4) as u32;
-        let process = self.process();
         let hello = Hello { threads, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
+    }
+
+    /// The coordinator stands still for longer than silence may last. Whatever comes meanwhile it
+    /// finds when it goes on, after it has looked at the time. Some workers have given it up by
+    /// then, and attach again.
+    fn pause(&mut self) {
+        self.counts.pauses += 1;
+        let until = self.now + self.config.expiry + Duration::from_millis(1 + self.draw(3000));
+        let later = self.agenda.split_off(&(until, 0));
+        for ((_, number), happening) in std::mem::replace(&mut self.agenda, later) {
+            let number = if matches!(happening, Happening::Tick) { 0 } else { number };
+            self.agenda.insert((until, number), happening);
+        }
+        self.now = until;
+        let workers: Vec<(WorkerId, u32)> =
+            self.workers.iter().map(|(id, worker)| (*id, worker.process)).collect();
+        for (worker, process) in workers {
+            let known = self.workers.get_mut(&worker).unwrap();
+            known.heard = until;
+            if !known.bad && !self.expelled.contains(&process) && self.draw(2) == 0 {
+                self.after(1, Happening::GiveUp(worker));
+            }
+        }
+    }
+
+    /// A worker gives up a coordinator that was silent, and looks for it again.
+    fn give_up(&mut self, worker: WorkerId) {
+        if let Some(gone) = self.workers.remove(&worker) {
+            self.react(Event::StreamEnded { worker });
+            self.within(400, Happening::Return(gone.process));
+        }
     }
 
     /// A process on a node that is not in order.
@@ -489,6 +541,7 @@ impl World {
                 Happening::Message(..)
                 | Happening::Lie(..)
                 | Happening::Break(_)
+                | Happening::GiveUp(_)
                 | Happening::Read(..)
                 | Happening::Report(_) => {}
                 stays => {

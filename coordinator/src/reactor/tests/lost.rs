@@ -59,8 +59,7 @@ fn wait(rig: &mut Rig, time: Duration) -> Vec<String> {
     for worker in workers {
         rig.hear(worker);
     }
-    rig.now += time;
-    let mut effects = rig.event(Event::Tick);
+    let mut effects = rig.pass(time);
     effects.retain(|effect| effect.starts_with("store job 1 "));
     effects
 }
@@ -122,6 +121,24 @@ fn who_comes_back_in_time_did_not_die() {
     let batch = held(&rig, 5, JobId(1))[0].0;
     let effects = rig.event(answer(5, batch, 0, 1));
     assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
+}
+
+#[test]
+fn pauses_of_the_coordinator_are_no_deaths() {
+    let mut rig = deadly();
+    for (worker, host) in [(1, "a"), (2, "b"), (3, "c"), (4, "d")] {
+        die(&mut rig, host, worker);
+        // Its stream broke because the coordinator stood still; by now it is back.
+        rig.now += 2 * EXPIRY;
+        assert_eq!(rig.event(Event::Tick), ["publish 1", "publish 2"]);
+        rig.event(hello_on(host, 10 + worker, worker as u32, 1));
+        assert_eq!(rig.state.workers.len(), 1);
+        rig.event(Event::WorkerDrains { worker: WorkerId(10 + worker) });
+        rig.event(end_of_stream(10 + worker));
+    }
+    for _ in 0..5 {
+        assert_eq!(wait(&mut rig, EXPIRY), [""; 0]);
+    }
 }
 
 /// A sound worker on `host` is attached; on `bad` one process after another starts, answers
