@@ -39,6 +39,18 @@ pub(crate) struct Audit {
     pub(crate) lost: u32,
 }
 
+/// What the store has of an evaluation that is computed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) enum Before {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// Something that cannot be read.
+    Damaged,
+    /// Outcomes, some of them by a worker that was expelled.
+    Stored(Arc<[Outcome]>),
+}
+
 /// The realizations of one point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -48,8 +60,8 @@ pub struct Evaluation {
     pub(crate) round: u64,
     /// The point.
     pub point: Point,
-    /// What the store has of it, when it is computed again.
-    pub(crate) before: Option<Arc<[Outcome]>>,
+    /// What the store has of it.
+    pub(crate) before: Before,
     /// What became of each index.
     pub(crate) slots: Vec<Option<Solved>>,
     /// How many slots are filled.
@@ -81,7 +93,7 @@ impl Evaluation {
             number,
             round,
             point,
-            before: None,
+            before: Before::Nothing,
             slots: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
@@ -199,15 +211,18 @@ impl Evaluation {
             && self.disputes.is_empty()
     }
 
-    /// Whether the store has other outcomes of it than `outcomes`, or none.
+    /// Whether what the store has after it cannot be on its path: the store has other outcomes of it
+    /// than `outcomes`, or none.
     pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
         };
-        self.before
-            .as_ref()
-            .is_none_or(|before| !before.iter().map(bits).eq(outcomes.iter().map(bits)))
+        match &self.before {
+            Before::Nothing => true,
+            Before::Damaged => false,
+            Before::Stored(before) => !before.iter().map(bits).eq(outcomes.iter().map(bits)),
+        }
     }
 
     /// All outcomes in index order and the estimated errors of the successes, once it is settled.

@@ -89,6 +89,8 @@ pub(crate) struct Job {
     pub(crate) workers: BTreeSet<WorkerName>,
     /// What it was told is to be read again, when what is being stored is stored.
     pub(crate) rewind: bool,
+    /// An evaluation was damaged in the store, and computed again.
+    pub(crate) mended: bool,
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
@@ -399,6 +401,7 @@ impl Job {
             stored,
             workers: BTreeSet::new(),
             rewind: false,
+            mended: false,
             cancelled: false,
             rate: Rate::default(),
             sequence: sequence(0, now),

@@ -88,7 +88,7 @@ fn compute_again(state: &mut State, id: JobId, now: Duration, effects: &mut Effe
     let realizations = job.record.specification.monte_carlo.realizations;
     if let Stage::Computing(evaluation) = &mut job.stage {
         let mut fresh = Evaluation::new(evaluation.number, round, evaluation.point, realizations);
-        fresh.before = evaluation.before.take();
+        fresh.before = std::mem::take(&mut evaluation.before);
         *evaluation = fresh;
     }
 }

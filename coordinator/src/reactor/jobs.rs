@@ -181,6 +181,10 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
             begin(state, id, now, effects);
         }
         Stage::Waiting | Stage::Computing(_) => finish(state, id, cancelled(), now, effects),
+        // The store does not give what it would leave besides.
+        Stage::Rereading { .. } if job.trouble.is_some() => {
+            finish(state, id, cancelled(), now, effects);
+        }
         Stage::Accepting
         | Stage::Rereading { .. }
         | Stage::Storing { .. }
@@ -271,6 +275,7 @@ pub(super) fn finish(
     let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
+    job.trouble = None;
     leave(state, id, now, effects);
 }
 

@@ -65,6 +65,8 @@ pub(crate) struct Counts {
     pub(crate) repaired: u64,
     /// Jobs forgotten.
     pub(crate) pruned: u64,
+    /// Stored evaluations that were damaged.
+    pub(crate) damaged: u64,
     /// Times in which the coordinator stood still.
     pub(crate) pauses: u64,
     /// Deaths of a node that dies over whatever it gets.
@@ -93,6 +95,7 @@ impl Counts {
         self.pruned += other.pruned;
         self.bad_deaths += other.bad_deaths;
         self.pauses += other.pauses;
+        self.damaged += other.damaged;
     }
 }
 
@@ -178,6 +181,8 @@ pub(crate) struct World {
     expelled: BTreeSet<u32>,
     /// Seed, point and indices of batches that were answered in this life of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
+    /// Evaluations that were found damaged in the store.
+    damaged: BTreeSet<(JobId, u64)>,
     /// Jobs that end while somebody who lied in them is not found out.
     deceived: BTreeSet<JobId>,
     /// The last decision on the end of each job.
@@ -249,6 +254,7 @@ impl World {
             lies: BTreeSet::new(),
             expelled: BTreeSet::new(),
             answered_batches: BTreeSet::new(),
+            damaged: BTreeSet::new(),
             deceived: BTreeSet::new(),
             ends: BTreeMap::new(),
             processes: 0,
