@@ -166,6 +166,8 @@ pub(crate) struct Trouble {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
     pub(crate) error: String,
+    /// It is on its way again.
+    pub(crate) on_its_way: bool,
 }
 
 /// Workers of one host.

@@ -73,7 +73,14 @@ fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effect
             }
         }
         Stage::Storing { record, .. } => job.rewind |= told || record.workers.contains(name),
-        // What is on its way to the store as the end of a job has ended.
+        Stage::Finishing(_) if told => {
+            // What is on its way to the store as the end of a job has ended, unless it is refused.
+            let on_its_way = job.trouble.as_ref().is_none_or(|trouble| trouble.on_its_way);
+            job.rewind = true;
+            if !on_its_way {
+                jobs::reopen(state, id, now, effects);
+            }
+        }
         Stage::Accepting | Stage::Waiting | Stage::Rereading { .. } | Stage::Finishing(_) => {}
     }
 }

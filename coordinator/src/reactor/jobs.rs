@@ -12,7 +12,7 @@ use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Ending, Step};
+use crate::search::{Ending, Search, Step};
 use crate::snapshot;
 use crate::state::{EndedJob, Job, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
@@ -97,8 +97,11 @@ pub(super) fn store_failed(
         return;
     }
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
+    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
     state.changed.insert(id);
+    if job.rewind && matches!(job.stage, Stage::Finishing(_)) {
+        reopen(state, id, now, effects);
+    }
     despair_if_late(state, since, error, now, effects);
 }
 
@@ -277,6 +280,21 @@ pub(super) fn finish(
     job.stage = Stage::Finishing(record);
     job.trouble = None;
     leave(state, id, now, effects);
+}
+
+/// Takes back an end that is not durable and not on its way to be: its answers are not to be
+/// relied on. The job waits for its turn and reads its stored evaluations again.
+pub(super) fn reopen(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    let Some(job) = state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.trouble = None;
+    job.rewind = false;
+    job.workers.clear();
+    job.search = Search::new(job.record.specification.clone());
+    job.stage = Stage::Waiting;
+    state.waiting.push_back(id);
+    begin_waiting(state, now, effects);
 }
 
 /// Takes a job out of everything that concerns jobs under way.

@@ -109,7 +109,7 @@ fn read_failed(state: &mut State, id: JobId, error: String, now: Duration, effec
         return;
     }
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
+    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
     state.changed.insert(id);
     jobs::despair_if_late(state, since, error, now, effects);
 }

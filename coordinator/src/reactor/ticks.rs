@@ -83,14 +83,12 @@ fn beat(state: &mut State, now: Duration, effects: &mut Effects) {
 }
 
 fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
-    let retry_in = state.config.store_retry;
     for job in state.jobs.values_mut() {
         let Some(trouble) = &mut job.trouble else {
             continue;
         };
-        if now >= trouble.retry_at {
-            // A report of this write moves the time again.
-            trouble.retry_at = now + retry_in;
+        if now >= trouble.retry_at && !trouble.on_its_way {
+            trouble.on_its_way = true;
             jobs::store_again(job, effects);
         }
     }

@@ -240,3 +240,49 @@ fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on
     rig.check_after(Duration::from_secs(2), &[&expelled]);
     rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
 }
+
+/// A search of one evaluation, answered by process 2, whose end the store has refused.
+fn refused_end() -> Rig {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    rig.accept(propagation(1));
+    rig.event(hello_of(100, 2, 1));
+    rig.check(answer(100, 1, 0, 1), &["store job 1 evaluation 0"]);
+    let end = rig.event(stored(1, RecordKey::Evaluation(0)));
+    assert_eq!(end, ["store job 1 end: converged "]);
+    rig
+}
+
+fn not_stored(job: u64, key: RecordKey) -> Event {
+    Event::StoreFailed { job: JobId(job), key, error: "the disk is full".to_owned() }
+}
+
+#[test]
+fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
+    // Refused before the worker is found out.
+    let mut rig = refused_end();
+    rig.check(not_stored(1, RecordKey::End), &[]);
+    expose(&mut rig, 2);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    // Nothing is written meanwhile that is not so.
+    rig.check_after(Duration::from_secs(1), &[]);
+
+    // On its way by then, and refused after that.
+    for again in [false, true] {
+        let mut rig = refused_end();
+        if again {
+            rig.check(not_stored(1, RecordKey::End), &[]);
+            rig.check_after(Duration::from_secs(2), &["store job 1 end: converged "]);
+        }
+        let effects = expose(&mut rig, 2);
+        assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
+        rig.check(not_stored(1, RecordKey::End), &[]);
+        rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    }
+
+    // On its way, and durable: the log names it.
+    let mut rig = refused_end();
+    expose(&mut rig, 2);
+    rig.check(stored(1, RecordKey::End), &["publish 1"]);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &[]);
+}
