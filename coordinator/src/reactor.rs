@@ -31,6 +31,8 @@ type Effects = Vec<Effect>;
 /// Changes `state` by one event at `now`, and returns what is to be done.
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut effects = Vec::new();
+    // A sign of life frees nobody, and there are many of them.
+    let frees = !matches!(event, Event::Heartbeat { .. });
     match event {
         Event::Tick => ticks::tick(state, now, &mut effects),
         Event::Requested { token, request } => {
@@ -60,7 +62,9 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         }
         Event::Drain => workers::drain_all(state, now, &mut effects),
     }
-    dispatch::hand_out(state, now, &mut effects);
+    if frees {
+        dispatch::hand_out(state, now, &mut effects);
+    }
     if state.draining && state.unstored() == 0 {
         effects.push(Effect::Stop);
     }

@@ -67,6 +67,8 @@ pub struct State {
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
+    /// Batches that idle workers may have copies of, in the order they were sent.
+    pub(crate) copyable: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -265,6 +267,7 @@ impl State {
             lost_in_a_row: BTreeMap::new(),
             no_worker_since: now,
             batches: BTreeMap::new(),
+            copyable: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
@@ -366,6 +369,7 @@ impl State {
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
+        self.copyable.remove(&batch);
         if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
             match settled.purpose {
                 Purpose::Fill => {}
@@ -385,8 +389,9 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        if let Some(twin) = settled.twin.and_then(|twin| self.batches.get_mut(&twin)) {
+        if let Some((id, twin)) = settled.twin.and_then(|id| Some((id, self.batches.get_mut(&id)?))) {
             twin.twin = None;
+            self.copyable.insert(id);
         }
         Some(settled)
     }

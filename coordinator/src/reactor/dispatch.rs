@@ -34,8 +34,13 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
         return;
     }
     let kept = suspects::hand_out(state, now, effects);
-    while hand_one(state, &kept, now, effects) {}
+    while work_waits(state) && hand_one(state, &kept, now, effects) {}
     copy_slowest(state, now, effects);
+}
+
+/// Whether there is anything to hand out but suspects.
+fn work_waits(state: &State) -> bool {
+    next_job(state).is_some() || checks::any_wait(state)
 }
 
 /// Gives the first worker that may have something what it may have; whether there is one. Those
@@ -167,39 +172,33 @@ fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
     if threads > 0.0 { rates / threads } else { 1.0 }
 }
 
-/// Gives each idle worker a copy of the batch that is out longest elsewhere. Batches younger than
-/// half the target time are about to be answered and are not worth a copy.
+/// Gives each idle worker a copy of the batch that is out longest. Batches younger than half the
+/// target time are about to be answered and are not worth a copy.
 fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
+    let patience = state.config.batch_target / 2;
+    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
     let idle = |worker: &Worker| !worker.draining && worker.in_flight.is_empty();
+    let is_old = |state: &State, id: &BatchId| state.batches.get(id).is_some_and(old);
+    if !state.copyable.first().is_some_and(|slowest| is_old(state, slowest)) {
+        return;
+    }
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {
-        let Some(slowest) = slowest_elsewhere(state, worker, now) else {
-            continue;
+        let Some(slowest) = state.copyable.first().copied().filter(|id| is_old(state, id)) else {
+            return;
         };
         let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
-            continue;
+            return;
         };
         let copy = send(state, worker, assignment, Purpose::Fill, now, effects);
         for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
-            if let Some(batch) = one.and_then(|one| state.batches.get_mut(&one)) {
+            if let Some((id, batch)) = one.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
                 batch.twin = other;
+                state.copyable.remove(&id);
             }
         }
     }
-}
-
-fn slowest_elsewhere(state: &State, worker: WorkerId, now: Duration) -> Option<BatchId> {
-    let patience = state.config.batch_target / 2;
-    let worth_a_copy = |batch: &Batch| {
-        batch.worker != worker
-            && batch.purpose == Purpose::Fill
-            && batch.twin.is_none()
-            && !batch.exclusive
-            && now.saturating_sub(batch.sent) >= patience
-    };
-    let candidates = state.batches.iter().filter(|(_, batch)| worth_a_copy(batch));
-    candidates.min_by_key(|(id, batch)| (batch.sent, **id)).map(|(id, _)| *id)
 }
 
 /// Sends a batch to a worker; its number, if its evaluation is under way.
@@ -224,6 +223,9 @@ pub(super) fn send(
         exclusive: false,
     };
     state.batches.insert(id, batch);
+    if purpose == Purpose::Fill {
+        state.copyable.insert(id);
+    }
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }

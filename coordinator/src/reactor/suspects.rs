@@ -87,8 +87,9 @@ fn send(
     let indices = Indices { first: index, count: 1 };
     let assignment = Assignment { job, round: evaluation.round, indices };
     let batch = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
-    if let Some(batch) = batch.and_then(|batch| state.batches.get_mut(&batch)) {
+    if let Some((id, batch)) = batch.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
         batch.exclusive = true;
+        state.copyable.remove(&id);
     }
 }
 

@@ -42,7 +42,7 @@ impl World {
                     self.counts.replaced += u64::from(!same);
                     self.counts.confirmed += u64::from(same);
                     // Of what is damaged nobody knows what it was.
-                    let damaged = self.damaged.remove(&(record.job, record.number));
+                    let damaged = self.damaged.contains(&(record.job, record.number));
                     assert!(damaged || *is_last != same, "{record:?}");
                 }
             }
@@ -55,6 +55,9 @@ impl World {
             let (job, key) = record.key();
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
+            if let Record::Evaluation { record, .. } = record {
+                self.damaged.remove(&(record.job, record.number));
+            }
             fake::written(&mut self.store, record)
         };
         self.within(5, Happening::Report(event));
@@ -64,7 +67,7 @@ impl World {
         let event = if self.refuses() {
             let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
             Event::Read { job, number, found }
-        } else if self.draw(20) == 0 {
+        } else if self.draw(10) == 0 {
             self.counts.damaged += 1;
             self.damaged.insert((job, number));
             Event::Read { job, number, found: Err(Unread::Damaged) }

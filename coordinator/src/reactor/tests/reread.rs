@@ -250,6 +250,7 @@ fn refused_end() -> Rig {
     rig.check(answer(100, 1, 0, 1), &["store job 1 evaluation 0"]);
     let end = rig.event(stored(1, RecordKey::Evaluation(0)));
     assert_eq!(end, ["store job 1 end: converged "]);
+    rig.event(end_of_stream(100));
     rig
 }
 
