@@ -6,6 +6,8 @@ use osteon_common::limits::{
     ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX,
 };
 
+use crate::audit::AuditKey;
+
 /// Fraction of the batches that a second worker computes too, unless an operator chooses otherwise.
 pub const AUDIT_FRACTION: f64 = 0.01;
 
@@ -23,6 +25,8 @@ pub struct Config {
     pub batch_target: Duration,
     /// Fraction of the batches that a second worker computes too, 0 to 1.
     pub audit_fraction: f64,
+    /// Decides which; a running coordinator draws its own.
+    pub audit_key: AuditKey,
     /// Ended jobs are forgotten after this long; `None`: when a client wants it.
     pub keep_ended: Option<Duration>,
     /// How often time is looked at; also the shortest interval between two snapshots.
@@ -54,6 +58,7 @@ impl Default for Config {
             answer_timeout: Duration::from_secs(600),
             batch_target: Duration::from_millis(200),
             audit_fraction: AUDIT_FRACTION,
+            audit_key: AuditKey::default(),
             keep_ended: None,
             tick: Duration::from_millis(100),
             active_jobs_max: ACTIVE_JOBS_MAX,

@@ -9,7 +9,7 @@
 mod accept;
 pub mod access;
 mod access_layer;
-mod audit;
+pub mod audit;
 pub mod config;
 mod core_task;
 pub mod dispute;

@@ -20,13 +20,13 @@ const LOST_MAX: u32 = 3;
 /// Has a batch that `by` has just answered computed a second time, if it is chosen and there is
 /// somebody else.
 pub(super) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
-    let fraction = state.config.audit_fraction;
+    let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
     if !state.takes_batches(|name| name != by) {
         return;
     }
     let Assignment { job, indices, .. } = *assignment;
     if let Some(evaluation) = state.attempt_mut(assignment)
-        && audit::is_chosen(job, evaluation.number, indices.first, fraction)
+        && audit::is_chosen(&key, job, evaluation.number, indices.first, fraction)
     {
         evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
     }

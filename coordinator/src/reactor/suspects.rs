@@ -9,6 +9,12 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use osteon_common::case::Case;
+use osteon_common::case_file;
+use osteon_common::job::JobSpecification;
+use osteon_common::parameters::Point;
+use osteon_common::realization::Ensemble;
+
 use super::{Effects, dispatch, jobs};
 use crate::evaluation::{Evaluation, Indices};
 use crate::failure::Failure;
@@ -121,8 +127,17 @@ fn lethal(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let hopeless = |(_, losses): &(u64, &Losses)| hopeless(state, losses, |_| true, now);
     let (index, losses) = waiting.into_iter().find(hopeless)?;
     let hosts = losses.hosts().into_iter().collect::<Vec<_>>().join(", ");
-    let point = evaluation.point;
-    Some(Failure::LethalRealization { index, point, workers: losses.count(), hosts })
+    let specification = &state.jobs.get(&job)?.record.specification;
+    let case = case_file(specification, &evaluation.point, index);
+    Some(Failure::LethalRealization { index, workers: losses.count(), hosts, case })
+}
+
+/// A realization as a complete case file. What is no elasticity is never solved, and kills nobody.
+fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
+    let ensemble = Ensemble::new(point, specification.monte_carlo.seed).ok();
+    let bone = ensemble.and_then(|ensemble| ensemble.bone(index).ok());
+    let case = bone.map(|bone| Case { setup: specification.setup, bone });
+    case.map_or_else(String::new, |case| case_file::to_toml(&case))
 }
 
 /// Whether enough workers were lost over something that those in `of` may have, and have stayed

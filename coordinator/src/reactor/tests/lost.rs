@@ -1,5 +1,10 @@
 //! Batches of lost workers.
 
+use osteon_common::case::Case;
+use osteon_common::case_file;
+use osteon_common::document::Format;
+use osteon_common::realization::Ensemble;
+
 use super::*;
 use crate::state::Assignment;
 
@@ -200,8 +205,12 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
     assert!(reason.contains("was alone on 10 workers that vanished (bad)"), "{reason}");
     // Ten deaths in a row are no matter of seconds.
     assert!(rig.now > 5 * EXPIRY, "{:?}", rig.now);
-    assert!(reason.contains("osteon draw JOB.toml --index 0"), "{reason}");
-    assert!(reason.contains("1598.8, 17717000000.0, 0.3816"), "{reason}");
+    // The case file is complete, and the realization to the bit.
+    let (_, text) = reason.split_once('\n').unwrap();
+    let Case { setup, bone } = case_file::parse(text, Format::Toml).unwrap();
+    let specification = propagation(1);
+    let ensemble = Ensemble::new(&specification.start(), specification.monte_carlo.seed).unwrap();
+    assert_eq!((setup, bone), (specification.setup, ensemble.bone(0).unwrap()));
 }
 
 #[test]
