@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_common::limits::{
-    ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX,
-};
+use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX};
 
 use crate::audit::AuditKey;
 

@@ -389,7 +389,8 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        if let Some((id, twin)) = settled.twin.and_then(|id| Some((id, self.batches.get_mut(&id)?))) {
+        if let Some((id, twin)) = settled.twin.and_then(|id| Some((id, self.batches.get_mut(&id)?)))
+        {
             twin.twin = None;
             self.copyable.insert(id);
         }

@@ -217,8 +217,8 @@ fn has_room(state: &State, id: JobId) -> bool {
     };
     let beyond = if state.shares.jobs(&job.record.client) == 0 { 2 } else { 1 };
     let active = state.active.iter().map(realizations).sum::<u64>();
-    let fits = active == 0
-        || active + realizations(&id) <= beyond * state.config.active_realizations_max;
+    let fits =
+        active == 0 || active + realizations(&id) <= beyond * state.config.active_realizations_max;
     fits && (state.active.len() as u64) < beyond * state.config.active_jobs_max as u64
 }
 

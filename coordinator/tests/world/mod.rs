@@ -20,84 +20,18 @@ use osteon_proto::batch::Work;
 use crate::fake;
 
 mod check;
+mod counts;
 mod disk;
+mod faults;
 mod liars;
+
+pub(crate) use counts::Counts;
 
 const TICK: Duration = Duration::from_millis(100);
 /// No schedule takes longer than this, in its own time.
 const HOUR: Duration = Duration::from_secs(3600);
 /// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
 const LOST_ALONE_MAX: u32 = 2;
-
-/// Numbers of processes of the bad node are above this one.
-const BAD_PROCESSES: u32 = 1_000_000;
-
-/// How often what happened.
-#[derive(Debug, Default)]
-pub(crate) struct Counts {
-    pub(crate) lost: u64,
-    pub(crate) revoked: u64,
-    pub(crate) closed: u64,
-    pub(crate) late: u64,
-    pub(crate) restarts: u64,
-    pub(crate) refusals: u64,
-    /// Clean ends of the coordinator.
-    pub(crate) stops: u64,
-    /// Jobs that were cancelled before their end.
-    pub(crate) cancelled: u64,
-    /// Jobs that failed because two answers differed.
-    pub(crate) exposed: u64,
-    /// Times without any write.
-    pub(crate) outages: u64,
-    /// Batches of which somebody has answered every realization before.
-    pub(crate) checked: u64,
-    /// Wrong answers.
-    pub(crate) lies: u64,
-    /// Workers expelled.
-    pub(crate) expelled: u64,
-    /// Stored evaluations that were replaced by others.
-    pub(crate) replaced: u64,
-    /// Stored evaluations that were computed again and found the same.
-    pub(crate) confirmed: u64,
-    /// Restarts with expelled workers in the store.
-    pub(crate) remembered: u64,
-    /// Jobs that ended right although somebody had lied in them.
-    pub(crate) repaired: u64,
-    /// Jobs forgotten.
-    pub(crate) pruned: u64,
-    /// Stored evaluations that were damaged.
-    pub(crate) damaged: u64,
-    /// Times in which the coordinator stood still.
-    pub(crate) pauses: u64,
-    /// Deaths of a node that dies over whatever it gets.
-    pub(crate) bad_deaths: u64,
-}
-
-impl Counts {
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.lost += other.lost;
-        self.revoked += other.revoked;
-        self.closed += other.closed;
-        self.late += other.late;
-        self.restarts += other.restarts;
-        self.refusals += other.refusals;
-        self.stops += other.stops;
-        self.cancelled += other.cancelled;
-        self.exposed += other.exposed;
-        self.outages += other.outages;
-        self.checked += other.checked;
-        self.lies += other.lies;
-        self.expelled += other.expelled;
-        self.replaced += other.replaced;
-        self.confirmed += other.confirmed;
-        self.remembered += other.remembered;
-        self.repaired += other.repaired;
-        self.pruned += other.pruned;
-        self.bad_deaths += other.bad_deaths;
-        self.pauses += other.pauses;
-        self.damaged += other.damaged;
-    }
-}
 
 /// Something that will happen.
 enum Happening {
@@ -228,15 +162,12 @@ impl World {
         let clients = clients(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
-        let drain = (draw(3) == 0).then(|| draw(3000));
         // Long: a client has given up by then, and so have many programs.
         let outage = (draw(8) == 0).then(|| (draw(1000), 10_000 + draw(60_000)));
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
         let liars = liars::some(&mut draw);
-        let bad = draw(4) == 0;
-        let pauses: Vec<u64> = (0..draw(4)).map(|_| draw(3000)).collect();
         let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,
@@ -275,15 +206,7 @@ impl World {
         for at in restarts {
             world.after(at, Happening::Restart);
         }
-        if let Some(at) = drain {
-            world.after(at, Happening::Drain);
-        }
-        for at in pauses {
-            world.after(at, Happening::Pause);
-        }
-        if bad {
-            world.within(500, Happening::ArriveBad);
-        }
+        world.plan_faults();
         if let Some(at) = prune {
             world.after(at, Happening::Prune);
         }
@@ -416,47 +339,6 @@ impl World {
         let threads = 1 + self.draw(4) as u32;
         let hello = Hello { threads, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
-        self.react(Event::Hello { worker, hello });
-    }
-
-    /// The coordinator stands still for longer than silence may last. Whatever comes meanwhile it
-    /// finds when it goes on, after it has looked at the time. Some workers have given it up by
-    /// then, and attach again.
-    fn pause(&mut self) {
-        self.counts.pauses += 1;
-        let until = self.now + self.config.expiry + Duration::from_millis(1 + self.draw(3000));
-        let later = self.agenda.split_off(&(until, 0));
-        for ((_, number), happening) in std::mem::replace(&mut self.agenda, later) {
-            let number = if matches!(happening, Happening::Tick) { 0 } else { number };
-            self.agenda.insert((until, number), happening);
-        }
-        self.now = until;
-        let workers: Vec<(WorkerId, u32)> =
-            self.workers.iter().map(|(id, worker)| (*id, worker.process)).collect();
-        for (worker, process) in workers {
-            let known = self.workers.get_mut(&worker).unwrap();
-            known.heard = until;
-            if !known.bad && !self.expelled.contains(&process) && self.draw(2) == 0 {
-                self.after(1, Happening::GiveUp(worker));
-            }
-        }
-    }
-
-    /// A worker gives up a coordinator that was silent, and looks for it again.
-    fn give_up(&mut self, worker: WorkerId) {
-        if let Some(gone) = self.workers.remove(&worker) {
-            self.react(Event::StreamEnded { worker });
-            self.within(400, Happening::Return(gone.process));
-        }
-    }
-
-    /// A process on a node that is not in order.
-    fn arrive_bad(&mut self) {
-        let number = self.number();
-        let (worker, process) = (WorkerId(number), BAD_PROCESSES + number as u32);
-        let hello = Hello { host: "bad".to_owned(), ..fake::hello(process) };
-        let known = Worker { process, bad: true, heard: self.now, ..Worker::default() };
-        self.workers.insert(worker, known);
         self.react(Event::Hello { worker, hello });
     }
 

@@ -57,7 +57,10 @@ fn what_waits_is_bounded_in_bytes() {
         let mut specification = identification(1);
         specification.data = Some(Data::Velocities(vec![3900.0; velocities]));
         let (specification, client) = (Arc::new(specification), client.to_owned());
-        request(0, Request::Submit { specification, request_id: String::new(), client, priority: 0 })
+        request(
+            0,
+            Request::Submit { specification, request_id: String::new(), client, priority: 0 },
+        )
     };
     let mut rig = Rig::new();
     rig.state.config.jobs_bytes_max = 400_000;
