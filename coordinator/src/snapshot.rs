@@ -160,7 +160,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
 fn unfit_hosts(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
     let named = |(host, lost): (&String, &LostInARow)| {
-        format!("the last {} workers of {host} vanished with what they held", lost.count)
+        format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
     };
     failing.map(named).take(UNFIT_SHOWN_MAX).collect::<Vec<_>>().join(", ")
 }

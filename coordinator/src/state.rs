@@ -26,7 +26,9 @@ use crate::worker_name::WorkerName;
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
 /// So many workers of a host that are lost in a row make it one that is given only what it cannot
 /// do much harm to.
-const LOST_IN_A_ROW_MAX: u32 = 3;
+const LOST_IN_A_ROW_MAX: usize = 3;
+/// So many of them are remembered.
+const LOST_SHOWN_MAX: usize = 99;
 /// Settled batches that are remembered for each worker, to compare late answers with.
 pub(crate) const SETTLED_MAX: usize = 16;
 
@@ -173,10 +175,10 @@ pub(crate) struct Trouble {
 }
 
 /// Workers of one host.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct LostInARow {
-    /// How many.
-    pub(crate) count: u32,
+    /// Which, the newest.
+    pub(crate) workers: VecDeque<WorkerName>,
     /// When the last was lost.
     pub(crate) last: Duration,
 }
@@ -338,7 +340,7 @@ impl State {
 
     /// Whether the workers of a host are lost over whatever they hold.
     pub(crate) fn is_failing(&self, host: &str) -> bool {
-        self.lost_in_a_row.get(host).is_some_and(|lost| lost.count >= LOST_IN_A_ROW_MAX)
+        self.lost_in_a_row.get(host).is_some_and(|lost| lost.workers.len() >= LOST_IN_A_ROW_MAX)
     }
 
     /// A worker of a host has answered.
@@ -350,13 +352,18 @@ impl State {
     }
 
     /// A worker of a host was lost with what it held.
-    pub(crate) fn count_loss(&mut self, host: &str, now: Duration) {
+    pub(crate) fn count_loss(&mut self, name: &WorkerName, now: Duration) {
+        let host = name.host();
         if self.lost_in_a_row.len() >= WORKERS_MAX && !self.lost_in_a_row.contains_key(host) {
             self.lost_in_a_row.pop_first();
         }
         let lost = self.lost_in_a_row.entry(host.to_owned()).or_default();
-        *lost = LostInARow { count: lost.count.saturating_add(1), last: now };
-        if lost.count == LOST_IN_A_ROW_MAX {
+        lost.last = now;
+        lost.workers.push_back(name.clone());
+        if lost.workers.len() > LOST_SHOWN_MAX {
+            lost.workers.pop_front();
+        }
+        if lost.workers.len() == LOST_IN_A_ROW_MAX {
             tracing::warn!(%host, "the workers of this host vanish with whatever they hold");
         }
     }

@@ -101,6 +101,9 @@ fn send(
 
 /// A worker is back: nothing that it held is to blame for its absence.
 pub(super) fn forgive(state: &mut State, name: &WorkerName) {
+    if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
+        lost.workers.retain(|lost| lost != name);
+    }
     for job in state.jobs.values_mut() {
         if let Stage::Computing(evaluation) = &mut job.stage {
             evaluation.forgive(name);

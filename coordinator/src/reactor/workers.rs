@@ -110,7 +110,7 @@ fn lost(state: &mut State, worker: WorkerId, cause: Cause, now: Duration) {
         "a worker is gone; what it held goes to others");
     let cause = if gone.draining { Cause::Announced } else { cause };
     if cause != Cause::Announced && !gone.in_flight.is_empty() {
-        state.count_loss(gone.name.host(), now);
+        state.count_loss(&gone.name, now);
     }
     let alone = gone.in_flight.len() == 1;
     let loss = Loss { worker: gone.name, cause, at: now, alone, proven: gone.proven };

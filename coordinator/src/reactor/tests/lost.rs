@@ -146,6 +146,20 @@ fn pauses_of_the_coordinator_are_no_deaths() {
     }
 }
 
+#[test]
+fn a_host_whose_workers_come_back_is_in_order() {
+    let mut rig = deadly();
+    for worker in 1..9 {
+        // One process: it is back each time. Another would not be.
+        rig.event(hello_on("a", worker, 1, 1));
+        rig.event(hello_on("b", 10 + worker, worker as u32, 1));
+        rig.event(end_of_stream(worker));
+        rig.event(end_of_stream(10 + worker));
+        assert!(!rig.state.is_failing("a"), "{worker}");
+        assert_eq!(rig.state.is_failing("b"), worker >= 3, "{worker}");
+    }
+}
+
 /// A sound worker on `host` is attached; on `bad` one process after another starts, answers
 /// something if it `works`, and dies.
 fn check_bad_node(host: &str, bad: &str, works: bool) {
