@@ -125,11 +125,12 @@ pub(super) fn store_failed(
     }
 }
 
-/// Writes expulsions again whose time has come.
+/// Writes refused expulsions again whose time has come.
 pub(super) fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
     let retry_in = state.config.store_retry;
     for expelled in &mut state.expelled {
-        if expelled.store_at.is_some_and(|at| now >= at) {
+        // What is on its way is reported; a second time it may still be on its way at the end.
+        if expelled.refused && expelled.store_at.is_some_and(|at| now >= at) {
             expelled.store_at = Some(now + retry_in);
             expelled.refused = false;
             effects.push(Effect::Store(Record::Expulsion(expelled.record.clone())));
