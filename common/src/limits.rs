@@ -38,6 +38,12 @@ pub const WORKER_THREADS_MAX: u32 = 4096;
 pub const WORKERS_MAX: usize = 4096;
 /// Most jobs that wait or run at a time.
 pub const JOBS_MAX: usize = 10_000;
+/// Most bytes that the specifications of jobs that wait or run take together.
+pub const JOBS_BYTES_MAX: u64 = 1 << 30;
+/// One client's jobs may take this part of that.
+pub const JOBS_BYTES_CLIENT_DIVISOR: u64 = 4;
+/// Most realizations of the jobs that are computed at a time: some 50 bytes each.
+pub const ACTIVE_REALIZATIONS_MAX: u64 = 2 * REALIZATIONS_MAX;
 /// Most jobs that are computed at a time, unless an operator chooses otherwise.
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.

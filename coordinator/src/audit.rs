@@ -1,12 +1,41 @@
 //! Which batches are computed twice, by different workers.
 
+use std::fmt;
+
+use tokio_rustls::rustls::crypto::ring;
+
 use crate::ids::JobId;
 
-/// Whether a batch of `job` is audited that begins at index `first` of evaluation `number`. A
-/// function of these alone: whoever computes it cannot know, since no worker learns the numbers
-/// of jobs and evaluations, and a restart chooses the same.
-pub(crate) fn is_chosen(job: JobId, number: u64, first: u64, fraction: f64) -> bool {
-    let mut hasher = blake3::Hasher::new();
+/// What decides which batches are computed twice: a secret of a running coordinator, since a worker
+/// that knew it could lie where nobody looks. It changes no result.
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
+pub struct AuditKey([u8; 32]);
+
+impl AuditKey {
+    /// A key that nobody knows; `None` if the operating system gives no random numbers.
+    pub(crate) fn random() -> Option<Self> {
+        let mut key = [0; 32];
+        ring::default_provider().secure_random.fill(&mut key).ok()?;
+        Some(Self(key))
+    }
+}
+
+impl fmt::Debug for AuditKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("AuditKey(secret)")
+    }
+}
+
+/// Whether a batch of `job` is audited that begins at index `first` of evaluation `number`: a
+/// function of these and the key.
+pub(crate) fn is_chosen(
+    key: &AuditKey,
+    job: JobId,
+    number: u64,
+    first: u64,
+    fraction: f64,
+) -> bool {
+    let mut hasher = blake3::Hasher::new_keyed(&key.0);
     for part in [job.0, number, first] {
         hasher.update(&part.to_le_bytes());
     }
@@ -26,9 +55,27 @@ mod tests {
         for (fraction, least, most) in
             [(0.0, 0, 0), (0.01, 70, 130), (0.5, 4800, 5200), (1.0, 10_000, 10_000)]
         {
-            let batches = (0..10_000).filter(|i| is_chosen(JobId(i % 7), i % 90, i * 16, fraction));
-            let chosen = batches.count();
+            let chosen = chosen(&AuditKey([7; 32]), fraction).len();
             assert!((least..=most).contains(&chosen), "{chosen} at {fraction}");
         }
+    }
+
+    /// Which of many batches are chosen.
+    fn chosen(key: &AuditKey, fraction: f64) -> Vec<u64> {
+        let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
+        (0..10_000).filter(of).collect()
+    }
+
+    #[test]
+    fn who_does_not_know_the_key_does_not_know_the_choice() {
+        let keys = [AuditKey::default(), AuditKey::random().unwrap(), AuditKey::random().unwrap()];
+        assert_ne!(keys[1], keys[2]);
+        let [known, one, other] = keys.map(|key| chosen(&key, 0.5));
+        for (one, other) in [(&known, &one), (&known, &other), (&one, &other)] {
+            let both = one.iter().filter(|i| other.contains(i)).count();
+            // A quarter of 10,000, with a standard deviation of 43.
+            assert!((2200..2800).contains(&both), "{both}");
+        }
+        assert_eq!(format!("{:?}", keys[1]), "AuditKey(secret)");
     }
 }

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use osteon_common::limits::{ACTIVE_JOBS_MAX, CALL_S_MAX};
+use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX};
+
+use crate::audit::AuditKey;
 
 /// Fraction of the batches that a second worker computes too, unless an operator chooses otherwise.
 pub const AUDIT_FRACTION: f64 = 0.01;
@@ -21,12 +23,20 @@ pub struct Config {
     pub batch_target: Duration,
     /// Fraction of the batches that a second worker computes too, 0 to 1.
     pub audit_fraction: f64,
+    /// Decides which; a running coordinator draws its own.
+    pub audit_key: AuditKey,
     /// Ended jobs are forgotten after this long; `None`: when a client wants it.
     pub keep_ended: Option<Duration>,
     /// How often time is looked at; also the shortest interval between two snapshots.
     pub tick: Duration,
     /// Most jobs that are computed at a time; the others wait in the order of their acceptance.
     pub active_jobs_max: usize,
+    /// Most realizations that the evaluations of these have together. A job finds room beyond it if
+    /// nothing else is computed.
+    pub active_realizations_max: u64,
+    /// Most bytes that the specifications of jobs that have not ended take together; those of one
+    /// client a quarter.
+    pub jobs_bytes_max: u64,
     /// How long a failed write to the store waits before it is tried again.
     pub store_retry: Duration,
     /// When the store has refused a record for this long, [`crate::Coordinator::failed`] says so;
@@ -46,9 +56,12 @@ impl Default for Config {
             answer_timeout: Duration::from_secs(600),
             batch_target: Duration::from_millis(200),
             audit_fraction: AUDIT_FRACTION,
+            audit_key: AuditKey::default(),
             keep_ended: None,
             tick: Duration::from_millis(100),
             active_jobs_max: ACTIVE_JOBS_MAX,
+            active_realizations_max: ACTIVE_REALIZATIONS_MAX,
+            jobs_bytes_max: JOBS_BYTES_MAX,
             store_retry: Duration::from_secs(2),
             store_patience: None,
             call_timeout: Duration::from_secs(CALL_S_MAX),

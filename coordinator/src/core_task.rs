@@ -8,7 +8,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::config::Config;
 use crate::effect::{Answer, CloseReason, Effect, Refusal};
-use crate::event::{Event, Hello, Request};
+use crate::event::{Event, Hello, Request, Unread};
 use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
 use crate::reactor::react;
@@ -174,7 +174,7 @@ impl Core {
                 }
                 Effect::Read { job, number } => {
                     if let Err(refused) = self.commands.try_send(Command::Read { job, number }) {
-                        let found = Err(refused.to_string());
+                        let found = Err(Unread::Refused { error: refused.to_string() });
                         followups.push_back(Event::Read { job, number, found });
                     }
                 }

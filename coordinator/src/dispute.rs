@@ -6,6 +6,7 @@ use osteon_common::outcome::{Solved, encode};
 
 use crate::evaluation::Indices;
 use crate::ids::BatchId;
+use crate::losses::Losses;
 use crate::worker_name::WorkerName;
 
 /// Different answers to the same indices, undecided.
@@ -20,7 +21,7 @@ pub struct Dispute {
     /// Batch of the worker that is to decide.
     pub judge: Option<BatchId>,
     /// Workers that were lost over it.
-    pub lost: u32,
+    pub(crate) lost: Losses,
 }
 
 /// What one worker says.
@@ -53,7 +54,7 @@ pub(crate) struct Verdict {
 impl Dispute {
     /// A dispute between two workers whose answers differ.
     pub(crate) fn new(indices: Indices, votes: [Vote; 2], since: Duration) -> Self {
-        Self { indices, votes: votes.into(), since, judge: None, lost: 0 }
+        Self { indices, votes: votes.into(), since, judge: None, lost: Losses::default() }
     }
 
     /// Whether `name` is one of those whose answers differ.

@@ -179,6 +179,22 @@ pub enum Refusal {
         /// Most jobs allowed.
         limit: usize,
     },
+    /// The jobs that wait or run are too large together.
+    #[error(
+        "the specifications of {whose} jobs that wait or run take {held} bytes, with this one's \
+         {more} more than the {limit} allowed; submit again when some have ended, or with fewer \
+         measured velocities"
+    )]
+    TooMuchQueued {
+        /// `this client's` or `all`.
+        whose: &'static str,
+        /// What they take already.
+        held: u64,
+        /// What the refused one would take.
+        more: u64,
+        /// Most allowed.
+        limit: u64,
+    },
     /// The job has not ended.
     #[error("job {job} has not ended; wait for it with `osteon watch {job}`")]
     NotEnded {

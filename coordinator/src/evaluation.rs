@@ -9,6 +9,7 @@ use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
 use crate::dispute::{self, Dispute, Vote};
+use crate::losses::{Loss, Losses};
 use crate::worker_name::WorkerName;
 
 /// Consecutive indices.
@@ -38,6 +39,18 @@ pub(crate) struct Audit {
     pub(crate) lost: u32,
 }
 
+/// What the store has of an evaluation that is computed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) enum Before {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// Something that cannot be read.
+    Damaged,
+    /// Outcomes, some of them by a worker that was expelled.
+    Stored(Arc<[Outcome]>),
+}
+
 /// The realizations of one point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -47,17 +60,17 @@ pub struct Evaluation {
     pub(crate) round: u64,
     /// The point.
     pub point: Point,
-    /// What the store has of it, when it is computed again.
-    pub(crate) before: Option<Arc<[Outcome]>>,
+    /// What the store has of it.
+    pub(crate) before: Before,
     /// What became of each index.
     pub(crate) slots: Vec<Option<Solved>>,
     /// How many slots are filled.
     pub(crate) filled: u64,
     /// Indices to hand out, from the front.
     pub(crate) queue: VecDeque<Indices>,
-    /// Indices that were alone in a batch of a lost worker, with the number of workers that were
-    /// lost while they held nothing else; those that wait are in `quarantine`.
-    pub(crate) suspects: BTreeMap<u64, u32>,
+    /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
+    /// they held nothing else; those that wait are in `quarantine`.
+    pub(crate) suspects: BTreeMap<u64, Losses>,
     /// Suspects to hand out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
     /// Everybody whose answers fill slots.
@@ -80,7 +93,7 @@ impl Evaluation {
             number,
             round,
             point,
-            before: None,
+            before: Before::Nothing,
             slots: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
@@ -126,13 +139,18 @@ impl Evaluation {
         self.queue.push_front(Indices { first: indices.first, count: half });
     }
 
-    /// Puts one index that was alone in a batch of a lost worker into quarantine; `alone` when
-    /// the worker held nothing else. Returns the number of workers lost while alone with it.
-    pub fn suspect(&mut self, index: u64, alone: bool) -> u32 {
-        let deaths = self.suspects.entry(index).or_default();
-        *deaths += u32::from(alone);
+    /// Puts one index that was alone in a batch of a lost worker into quarantine.
+    pub(crate) fn suspect(&mut self, index: u64, loss: &Loss) {
+        self.suspects.entry(index).or_default().add(loss);
         self.quarantine.push_back(index);
-        *deaths
+    }
+
+    /// A worker is back: nothing that it held is to blame.
+    pub(crate) fn forgive(&mut self, name: &WorkerName) {
+        let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.lost);
+        for losses in self.suspects.values_mut().chain(judged) {
+            losses.forgive(name);
+        }
     }
 
     /// Fills the empty slots of `indices` with the answer of `by`.
@@ -193,15 +211,18 @@ impl Evaluation {
             && self.disputes.is_empty()
     }
 
-    /// Whether the store has other outcomes of it than `outcomes`, or none.
+    /// Whether what the store has after it cannot be on its path: the store has other outcomes of it
+    /// than `outcomes`, or none.
     pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
         };
-        self.before
-            .as_ref()
-            .is_none_or(|before| !before.iter().map(bits).eq(outcomes.iter().map(bits)))
+        match &self.before {
+            Before::Nothing => true,
+            Before::Damaged => false,
+            Before::Stored(before) => !before.iter().map(bits).eq(outcomes.iter().map(bits)),
+        }
     }
 
     /// All outcomes in index order and the estimated errors of the successes, once it is settled.

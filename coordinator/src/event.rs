@@ -84,8 +84,8 @@ pub enum Event {
         job: JobId,
         /// Number of the evaluation.
         number: u64,
-        /// What the store has, or why it cannot be read, for people.
-        found: Result<Option<EvaluationRecord>, String>,
+        /// What the store has, or why it was not read.
+        found: Result<Option<EvaluationRecord>, Unread>,
     },
     /// Ended jobs are forgotten, or cannot be.
     Pruned {
@@ -98,6 +98,18 @@ pub enum Event {
     },
     /// The coordinator is to stop.
     Drain,
+}
+
+/// Why an evaluation was not read from the store.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unread {
+    /// It may be read another time.
+    Refused {
+        /// Why, for people.
+        error: String,
+    },
+    /// What is stored of it is damaged, and stays so.
+    Damaged,
 }
 
 /// What a client wants.

@@ -27,17 +27,19 @@ pub enum Failure {
     },
     /// Workers vanish over one realization.
     #[error(
-        "realization {index} was alone on three workers that vanished; to reproduce it, fix \
-         [parameters] at {:?} (density, longitudinal_young_modulus, longitudinal_poisson_ratio, \
-         longitudinal_shear_modulus, transverse_young_modulus, transverse_poisson_ratio, \
-         dispersion) and run `osteon draw JOB.toml --index {index}`, then `osteon simulate`",
-        point.0
+        "realization {index} was alone on {workers} workers that vanished ({hosts}); to reproduce \
+         it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
+         {case}"
     )]
     LethalRealization {
         /// Index of the realization.
         index: u64,
-        /// The point.
-        point: Point,
+        /// How many were lost.
+        workers: usize,
+        /// Their hosts.
+        hosts: String,
+        /// The realization, as a case file.
+        case: String,
     },
     /// The stored evaluations are not those of the job's search.
     #[error(transparent)]
@@ -54,7 +56,7 @@ pub enum Failure {
 /// machines, and not in the job.
 pub fn lies_in_machines(reason: &str) -> bool {
     reason.starts_with("integrity error: ")
-        || reason.contains(" was alone on three workers that vanished")
+        || reason.contains(" workers that vanished")
         || reason.starts_with("stored evaluation ")
         || reason.starts_with("the store has no evaluation ")
 }
@@ -87,7 +89,12 @@ mod tests {
         let replay = ReplayError { number: 1, found: Box::new([0.0; 7]), expected: None };
         for failure in [
             Failure::Contradiction { contradiction, point },
-            Failure::LethalRealization { index, point },
+            Failure::LethalRealization {
+                index,
+                workers: 3,
+                hosts: "a, b".to_owned(),
+                case: "[bone]".to_owned(),
+            },
             Failure::Replay(replay),
             Failure::Missing { number: 2 },
         ] {

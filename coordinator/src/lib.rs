@@ -9,7 +9,7 @@
 mod accept;
 pub mod access;
 mod access_layer;
-mod audit;
+pub mod audit;
 pub mod config;
 mod core_task;
 pub mod dispute;
@@ -23,6 +23,7 @@ mod fetching;
 pub mod ids;
 pub mod leftover;
 pub mod listen;
+mod losses;
 mod observers;
 mod rate;
 pub mod reactor;

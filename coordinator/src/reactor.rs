@@ -16,6 +16,7 @@ mod prune;
 mod requests;
 mod reread;
 mod restore;
+mod suspects;
 mod ticks;
 mod workers;
 
@@ -30,6 +31,8 @@ type Effects = Vec<Effect>;
 /// Changes `state` by one event at `now`, and returns what is to be done.
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut effects = Vec::new();
+    // A sign of life frees nobody, and there are many of them.
+    let frees = !matches!(event, Event::Heartbeat { .. });
     match event {
         Event::Tick => ticks::tick(state, now, &mut effects),
         Event::Requested { token, request } => {
@@ -46,7 +49,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         Event::Misbehaved { worker, reason } => {
             workers::close(state, worker, reason, now, &mut effects);
         }
-        Event::StreamEnded { worker } => workers::lost(state, worker, now, &mut effects),
+        Event::StreamEnded { worker } => workers::stream_ended(state, worker, now),
         Event::Stored { job, key } => jobs::stored(state, job, key, now, &mut effects),
         Event::StoreFailed { job, key, error } => {
             jobs::store_failed(state, job, key, error, now, &mut effects);
@@ -59,7 +62,9 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         }
         Event::Drain => workers::drain_all(state, now, &mut effects),
     }
-    dispatch::hand_out(state, now, &mut effects);
+    if frees {
+        dispatch::hand_out(state, now, &mut effects);
+    }
     if state.draining && state.unstored() == 0 {
         effects.push(Effect::Stop);
     }

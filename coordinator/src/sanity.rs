@@ -25,6 +25,9 @@ pub enum Insane {
     /// Two copies of a batch do not name each other.
     #[error("batch {0} and its copy do not match")]
     Twin(BatchId),
+    /// Not exactly those batches may be copied of which there is one and that are no suspects.
+    #[error("the list of batches that may be copied is wrong")]
+    Copyable,
     /// A batch of an evaluation that is not under way.
     #[error("batch {0} belongs to no evaluation under way")]
     Stray(BatchId),
@@ -170,6 +173,12 @@ fn check_workers(state: &State) -> Result<(), Insane> {
 }
 
 fn check_batches(state: &State) -> Result<(), Insane> {
+    let copyable =
+        |batch: &Batch| batch.purpose == Purpose::Fill && batch.twin.is_none() && !batch.exclusive;
+    let expected = state.batches.iter().filter(|(_, batch)| copyable(batch)).map(|(id, _)| id);
+    if !state.copyable.iter().eq(expected) {
+        return Err(Insane::Copyable);
+    }
     for (&id, batch) in &state.batches {
         let worker = state.workers.get(&batch.worker);
         let held = worker.map_or(0, |w| w.in_flight.iter().filter(|held| **held == id).count());

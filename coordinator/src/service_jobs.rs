@@ -265,7 +265,9 @@ fn refused(refusal: &Refusal) -> Status {
     match refusal {
         Refusal::NoJob { job } => status::no_job(job.to_string(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
-        Refusal::TooManyJobs { .. } => status::resource_exhausted(message, RETRY),
+        Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
+            status::resource_exhausted(message, RETRY)
+        }
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
         Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => {
             Status::unavailable(message)
@@ -293,6 +295,11 @@ mod tests {
         let taken = Refusal::RequestIdTaken { request_id: "a".to_owned(), job };
         for (refusal, code, retry) in [
             (Refusal::TooManyJobs { limit: 5 }, Code::ResourceExhausted, Some(RETRY)),
+            (
+                Refusal::TooMuchQueued { whose: "all", held: 5, more: 2, limit: 6 },
+                Code::ResourceExhausted,
+                Some(RETRY),
+            ),
             (Refusal::NoJob { job }, Code::NotFound, None),
             (taken, Code::AlreadyExists, None),
             (Refusal::NotEnded { job }, Code::FailedPrecondition, None),

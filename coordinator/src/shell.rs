@@ -18,6 +18,7 @@ use tower::layer::util::{Identity, Stack};
 use crate::accept;
 use crate::access::Policy;
 use crate::access_layer::AccessLayer;
+use crate::audit::AuditKey;
 use crate::config::Config;
 use crate::core_task::{Clock, Core, Message};
 use crate::failing::{Failed, Failing, Guard};
@@ -57,6 +58,9 @@ pub enum StartError {
         /// How.
         source: tokio::task::JoinError,
     },
+    /// No secret can be drawn.
+    #[error("the operating system gives no random numbers")]
+    NoRandomness,
     /// The description of the services cannot be read.
     #[error("the services' description for gRPC reflection cannot be read")]
     Reflection {
@@ -90,6 +94,8 @@ pub async fn start(
     let load = move || Restored::load(store.as_mut()).map(|restored| (store, restored));
     let loaded = tokio::task::spawn_blocking(load).await;
     let (store, restored) = loaded.map_err(|source| StartError::Interrupted { source })??;
+    let audit_key = AuditKey::random().ok_or(StartError::NoRandomness)?;
+    let config = Config { audit_key, ..config };
     let clock = Clock::new();
     let (state, effects) = State::restore(config, restored, clock.now());
 

@@ -7,10 +7,12 @@ use osteon_proto::specification::kind_to_message;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
-use crate::state::{EndedJob, Job, Stage, State, max_evaluations};
+use crate::state::{EndedJob, Job, LostInARow, Stage, State, max_evaluations};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Most hosts that are named whose workers vanish.
+const UNFIT_SHOWN_MAX: usize = 3;
 
 /// How `id` stands at `now`; `None` if no client can know of it.
 pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
@@ -106,7 +108,12 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     if state.draining {
         return "the coordinator is shutting down".to_owned();
     }
+    let unfit = unfit_hosts(state);
     match &job.stage {
+        Stage::Computing(evaluation) if !evaluation.quarantine.is_empty() && !unfit.is_empty() => {
+            let count = evaluation.quarantine.len();
+            format!("a sound worker for {count} realizations over which others vanished; {unfit}")
+        }
         Stage::Waiting => format!(
             "its turn: {} jobs run and {} wait {}",
             state.active.len(),
@@ -142,8 +149,18 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
                 None => format!("a worker that takes batches {}", since(job.progressed)),
             }
         }
+        Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
         Stage::Accepting | Stage::Computing(_) | Stage::Storing { .. } | Stage::Finishing(_) => {
             String::new()
         }
     }
+}
+
+/// The hosts whose workers vanish with whatever they hold, in words; empty if there is none.
+fn unfit_hosts(state: &State) -> String {
+    let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
+    let named = |(host, lost): (&String, &LostInARow)| {
+        format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
+    };
+    failing.map(named).take(UNFIT_SHOWN_MAX).collect::<Vec<_>>().join(", ")
 }

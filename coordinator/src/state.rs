@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::limits::WORKERS_MAX;
 use osteon_proto::batch::Work;
 use osteon_proto::specification;
 use prost::Message as _;
@@ -23,6 +24,11 @@ use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
+/// So many workers of a host that are lost in a row make it one that is given only what it cannot
+/// do much harm to.
+const LOST_IN_A_ROW_MAX: usize = 3;
+/// So many of them are remembered.
+const LOST_SHOWN_MAX: usize = 99;
 /// Settled batches that are remembered for each worker, to compare late answers with.
 pub(crate) const SETTLED_MAX: usize = 16;
 
@@ -46,6 +52,8 @@ pub struct State {
     pub(crate) last_served: Option<JobId>,
     /// Jobs that changed since they were published.
     pub(crate) changed: BTreeSet<JobId>,
+    /// When time was looked at last.
+    pub(crate) ticked: Duration,
     /// When all active jobs were published last.
     pub(crate) published: Duration,
     /// When this life began.
@@ -55,9 +63,14 @@ pub struct State {
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
     /// Workers that compute wrongly, in the order in which they were found.
     pub(crate) expelled: Vec<Expelled>,
+    /// How many workers of a host were lost in a row with what they held, none answering anything
+    /// in between.
+    pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
+    /// Batches that idle workers may have copies of, in the order they were sent.
+    pub(crate) copyable: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -80,6 +93,8 @@ pub(crate) struct Job {
     pub(crate) workers: BTreeSet<WorkerName>,
     /// What it was told is to be read again, when what is being stored is stored.
     pub(crate) rewind: bool,
+    /// An evaluation was damaged in the store, and computed again.
+    pub(crate) mended: bool,
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
@@ -155,6 +170,17 @@ pub(crate) struct Trouble {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
     pub(crate) error: String,
+    /// It is on its way again.
+    pub(crate) on_its_way: bool,
+}
+
+/// Workers of one host.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LostInARow {
+    /// Which, the newest.
+    pub(crate) workers: VecDeque<WorkerName>,
+    /// When the last was lost.
+    pub(crate) last: Duration,
 }
 
 /// A stay of a worker.
@@ -163,10 +189,14 @@ pub(crate) struct Worker {
     pub(crate) lease: LeaseId,
     pub(crate) name: WorkerName,
     pub(crate) hello: Hello,
+    /// Since when it is there.
+    pub(crate) attached: Duration,
     /// When its last message came.
     pub(crate) heard: Duration,
     /// When its last answer came, or it attached.
     pub(crate) answered: Duration,
+    /// It has answered something in this stay.
+    pub(crate) proven: bool,
     /// When the last sign of life was given to it.
     pub(crate) beat: Duration,
     /// Batches it holds, in the order they were sent.
@@ -230,13 +260,16 @@ impl State {
             shares: Shares::default(),
             last_served: None,
             changed: BTreeSet::new(),
+            ticked: now,
             published: now,
             started: now,
             pruned: None,
             workers: BTreeMap::new(),
             expelled: Vec::new(),
+            lost_in_a_row: BTreeMap::new(),
             no_worker_since: now,
             batches: BTreeMap::new(),
+            copyable: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
@@ -305,6 +338,36 @@ impl State {
         found.map(|expelled| &expelled.record)
     }
 
+    /// Whether the workers of a host are lost over whatever they hold.
+    pub(crate) fn is_failing(&self, host: &str) -> bool {
+        self.lost_in_a_row.get(host).is_some_and(|lost| lost.workers.len() >= LOST_IN_A_ROW_MAX)
+    }
+
+    /// A worker of a host has answered.
+    pub(crate) fn prove(&mut self, worker: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&worker) {
+            worker.proven = true;
+            self.lost_in_a_row.remove(worker.name.host());
+        }
+    }
+
+    /// A worker of a host was lost with what it held.
+    pub(crate) fn count_loss(&mut self, name: &WorkerName, now: Duration) {
+        let host = name.host();
+        if self.lost_in_a_row.len() >= WORKERS_MAX && !self.lost_in_a_row.contains_key(host) {
+            self.lost_in_a_row.pop_first();
+        }
+        let lost = self.lost_in_a_row.entry(host.to_owned()).or_default();
+        lost.last = now;
+        lost.workers.push_back(name.clone());
+        if lost.workers.len() > LOST_SHOWN_MAX {
+            lost.workers.pop_front();
+        }
+        if lost.workers.len() == LOST_IN_A_ROW_MAX {
+            tracing::warn!(%host, "the workers of this host vanish with whatever they hold");
+        }
+    }
+
     /// Whether somebody that meets `of` takes batches.
     pub(crate) fn takes_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
         !self.draining && self.workers.values().any(|worker| !worker.draining && of(&worker.name))
@@ -313,6 +376,7 @@ impl State {
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
+        self.copyable.remove(&batch);
         if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
             match settled.purpose {
                 Purpose::Fill => {}
@@ -332,8 +396,10 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        if let Some(twin) = settled.twin.and_then(|twin| self.batches.get_mut(&twin)) {
+        if let Some((id, twin)) = settled.twin.and_then(|id| Some((id, self.batches.get_mut(&id)?)))
+        {
             twin.twin = None;
+            self.copyable.insert(id);
         }
         Some(settled)
     }
@@ -350,6 +416,7 @@ impl Job {
             stored,
             workers: BTreeSet::new(),
             rewind: false,
+            mended: false,
             cancelled: false,
             rate: Rate::default(),
             sequence: sequence(0, now),

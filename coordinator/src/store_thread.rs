@@ -8,7 +8,7 @@ use osteon_common::limits::JOBS_MAX;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::effect::Record;
-use crate::event::Event;
+use crate::event::{Event, Unread};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
 use crate::leftover::{Leftover, ReadError, Reading};
@@ -67,7 +67,7 @@ pub(crate) fn serve(
             // Nobody listens any more when the coordinator has stopped.
             Some(Command::Put(record)) => drop(events.blocking_send(put(store, &record))),
             Some(Command::Read { job, number }) => {
-                let found = store.evaluation(job, number).map_err(|error| error.to_string());
+                let found = store.evaluation(job, number).map_err(|error| unread(job, error));
                 drop(events.blocking_send(Event::Read { job, number, found }));
             }
             Some(Command::Prune { token, jobs }) => {
@@ -88,6 +88,20 @@ pub(crate) fn serve(
             Ok(None) => readings.push_back((reading, reply)),
             Ok(Some(leftover)) => drop(reply.send(Ok(leftover))),
             Err(error) => drop(reply.send(Err(error))),
+        }
+    }
+}
+
+/// Why an evaluation was not read: what is damaged is not read another time either.
+fn unread(job: JobId, error: StoreError) -> Unread {
+    match error {
+        StoreError::Damaged { .. } | StoreError::Corrupt { .. } => {
+            tracing::error!(%job, %error, "a stored evaluation is damaged; it is computed again");
+            Unread::Damaged
+        }
+        _ => {
+            tracing::warn!(%job, %error, "a stored evaluation cannot be read; it is tried again");
+            Unread::Refused { error: error.to_string() }
         }
     }
 }

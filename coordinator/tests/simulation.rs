@@ -1,7 +1,7 @@
 //! Coordinator, workers and store in one thread under a false clock. One seed decides order,
 //! delays, deaths, stalls, answers that come late, twice, malformed or contradict each other,
-//! refusals and long outages of the store, cancellations, clean stops and restarts of the
-//! coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
+//! a node that dies over whatever it gets, refusals, damage and long outages of the store, cancellations,
+//! pauses, clean stops and restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
 //! cancelled, or failed because of a contradiction, what the loop has found by then.
 //!
 //! `OSTEON_SIMULATION_SEED=N` runs one seed, for a look at a failure.
@@ -51,6 +51,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }
         let world::Counts { stops, cancelled, outages, expelled, pruned, lies, .. } = seen;
+        let world::Counts { bad_deaths, pauses, damaged, .. } = seen;
         for (name, count) in [
             ("clean stops", stops),
             ("jobs cancelled", cancelled),
@@ -58,6 +59,9 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("wrong answers", lies),
             ("workers expelled", expelled),
             ("jobs forgotten", pruned),
+            ("deaths on a bad node", bad_deaths),
+            ("pauses of the coordinator", pauses),
+            ("damaged evaluations", damaged),
         ] {
             assert!(count > SCHEDULES / 20, "{name}: {count}");
         }

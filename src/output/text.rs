@@ -111,7 +111,8 @@ fn progress(snapshot: &JobSnapshot) -> String {
     let mut text = describe(snapshot);
     if !snapshot.reason.is_empty() {
         text.push_str("; ");
-        text.push_str(&snapshot.reason);
+        // A case file may follow.
+        text.push_str(snapshot.reason.lines().next().unwrap_or_default());
     }
     text
 }

@@ -6,14 +6,12 @@ use osteon_common::outcome::Solved;
 
 use super::{Effects, checks, jobs, workers};
 use crate::effect::{CloseReason, Effect};
-use crate::failure::Failure;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
+use crate::losses::{Cause, Loss};
 use crate::state::{Assignment, Batch, Purpose, State};
 use crate::worker_name::WorkerName;
 
-/// Workers that must be lost while alone with a realization before it fails its job.
-pub(crate) const LOST_ALONE_MAX: u32 = 3;
 /// Weight of the newest measurement in a worker's rate.
 const RATE_WEIGHT: f64 = 0.5;
 /// A shorter computing time than this is not believed, s.
@@ -48,6 +46,7 @@ pub(super) fn answered(
         workers::close(state, worker, reason, now, effects);
         return;
     }
+    state.prove(worker);
     match purpose {
         Some(Purpose::Fill) => {
             if let Some(held) = state.settle(batch) {
@@ -89,42 +88,31 @@ pub(super) fn revoke_all(state: &mut State, job: JobId, now: Duration, effects: 
     }
 }
 
-/// Hands the indices of a lost worker's batch back, unless a copy of it lives. `alone` says that
-/// the worker held nothing else, `leaving` that it had announced its end.
-pub(super) fn orphaned(
-    state: &mut State,
-    batch: BatchId,
-    alone: bool,
-    leaving: bool,
-    now: Duration,
-    effects: &mut Effects,
-) {
+/// Hands the indices of a lost worker's batch back, unless a copy of it lives.
+pub(super) fn orphaned(state: &mut State, batch: BatchId, loss: &Loss) {
     let assignment = state.batches.get(&batch).map(|batch| (batch.purpose, batch.assignment));
-    if let Some((Purpose::Judge, assignment)) = assignment
-        && !leaving
-    {
-        checks::judge_lost(state, &assignment, batch);
+    if let Some((Purpose::Judge, assignment)) = assignment {
+        checks::judge_lost(state, &assignment, batch, loss);
     }
     let Some(settled) = state.settle(batch) else {
         return;
     };
     if settled.purpose != Purpose::Fill {
-        checks::orphaned(state, &settled, leaving);
+        checks::orphaned(state, &settled, loss);
         return;
     }
     let Batch { assignment, twin, .. } = settled;
     let Some(evaluation) = state.attempt_mut(&assignment) else {
         return;
     };
+    let indices = assignment.indices;
     if twin.is_some() {
         return;
     }
-    let Assignment { job, indices, .. } = assignment;
-    if indices.count > 1 || leaving {
+    if indices.count > 1 || loss.cause == Cause::Announced {
         evaluation.put_back_in_halves(indices);
-    } else if evaluation.suspect(indices.first, alone) >= LOST_ALONE_MAX {
-        let (index, point) = (indices.first, evaluation.point);
-        jobs::fail(state, job, &Failure::LethalRealization { index, point }, now, effects);
+    } else {
+        evaluation.suspect(indices.first, loss);
     }
 }
 

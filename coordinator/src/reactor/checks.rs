@@ -4,28 +4,29 @@ use std::time::Duration;
 
 use osteon_common::outcome::Solved;
 
-use super::{Effects, dispatch, expulsion, jobs};
+use super::{Effects, dispatch, expulsion, jobs, suspects};
 use crate::audit;
 use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
 use crate::evaluation::{Audit, Evaluation};
 use crate::failure::{Failure, shown};
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{Assignment, Batch, Purpose, Stage, State};
+use crate::losses::{Cause, Loss};
+use crate::state::{Assignment, Batch, Purpose, Stage, State, Worker};
 use crate::worker_name::WorkerName;
 
-/// Workers that may be lost over one check before it is given up.
+/// Workers that may be lost over one audit before it is given up.
 const LOST_MAX: u32 = 3;
 
 /// Has a batch that `by` has just answered computed a second time, if it is chosen and there is
 /// somebody else.
 pub(super) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
-    let fraction = state.config.audit_fraction;
+    let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
     if !state.takes_batches(|name| name != by) {
         return;
     }
     let Assignment { job, indices, .. } = *assignment;
     if let Some(evaluation) = state.attempt_mut(assignment)
-        && audit::is_chosen(job, evaluation.number, indices.first, fraction)
+        && audit::is_chosen(&key, job, evaluation.number, indices.first, fraction)
     {
         evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
     }
@@ -54,20 +55,13 @@ pub(super) fn hand_check(
     };
     let active: Vec<JobId> = state.active.iter().copied().collect();
     for job in active {
+        if let Some(at) = to_judge(state, job, worker) {
+            return hand_dispute(state, job, at, worker, now, effects);
+        }
         let Some(evaluation) = state.evaluation_mut(job) else {
             continue;
         };
         let round = evaluation.round;
-        let open = |dispute: &Dispute| dispute.judge.is_none() && !dispute.involves(&name);
-        if let Some(at) = evaluation.disputes.iter().position(open) {
-            let indices = evaluation.disputes[at].indices;
-            let assignment = Assignment { job, round, indices };
-            let batch = dispatch::send(state, worker, assignment, Purpose::Judge, now, effects);
-            if let Some(evaluation) = state.evaluation_mut(job) {
-                evaluation.disputes[at].judge = batch;
-            }
-            return batch.is_some();
-        }
         let of_others = |audit: &Audit| audit.by != name;
         let at = evaluation.audits.iter().position(of_others);
         if let Some(audit) = at.and_then(|at| evaluation.audits.remove(at)) {
@@ -79,6 +73,43 @@ pub(super) fn hand_check(
         }
     }
     false
+}
+
+/// The first dispute of a job that this worker is to decide: of those that may, nobody can be
+/// expected to do better.
+fn to_judge(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
+    let Stage::Computing(evaluation) = &state.jobs.get(&job)?.stage else {
+        return None;
+    };
+    let worker = state.workers.get(&worker)?;
+    let is_for = |dispute: &Dispute| {
+        let standing = |worker: &Worker| suspects::standing(state, worker, &dispute.lost);
+        let may = |worker: &&Worker| !worker.draining && !dispute.involves(&worker.name);
+        let best = state.workers.values().filter(may).map(standing).min();
+        dispute.judge.is_none() && may(&worker) && best == Some(standing(worker))
+    };
+    evaluation.disputes.iter().position(is_for)
+}
+
+/// Has a worker decide a dispute.
+fn hand_dispute(
+    state: &mut State,
+    job: JobId,
+    at: usize,
+    worker: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) -> bool {
+    let Some(evaluation) = state.evaluation_mut(job) else {
+        return false;
+    };
+    let (round, indices) = (evaluation.round, evaluation.disputes[at].indices);
+    let assignment = Assignment { job, round, indices };
+    let batch = dispatch::send(state, worker, assignment, Purpose::Judge, now, effects);
+    if let Some(evaluation) = state.evaluation_mut(job) {
+        evaluation.disputes[at].judge = batch;
+    }
+    batch.is_some()
 }
 
 /// Compares an answer with what is known of its indices.
@@ -154,8 +185,8 @@ fn execute(state: &mut State, job: JobId, verdict: Verdict, now: Duration, effec
 }
 
 /// A worker that had something to check is lost: another does it, up to a point.
-pub(super) fn orphaned(state: &mut State, batch: &Batch, leaving: bool) {
-    let blame = u32::from(!leaving);
+pub(super) fn orphaned(state: &mut State, batch: &Batch, loss: &Loss) {
+    let blame = u32::from(loss.cause != Cause::Announced);
     let Assignment { indices, .. } = batch.assignment;
     let Purpose::Audit { lost } = batch.purpose else {
         return;
@@ -169,11 +200,11 @@ pub(super) fn orphaned(state: &mut State, batch: &Batch, leaving: bool) {
 }
 
 /// A worker that was to decide is lost.
-pub(super) fn judge_lost(state: &mut State, assignment: &Assignment, batch: BatchId) {
+pub(super) fn judge_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &Loss) {
     if let Some(evaluation) = state.attempt_mut(assignment)
         && let Some(dispute) = evaluation.disputes.iter_mut().find(|it| it.judge == Some(batch))
     {
-        dispute.lost += 1;
+        dispute.lost.add(loss);
     }
 }
 
@@ -216,7 +247,9 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
         let nobody = !state.takes_batches(|name| !dispute.involves(name));
-        dispute.judge.is_none() && (dispute.lost >= LOST_MAX || (nobody && !patient))
+        let others = |name: &WorkerName| !dispute.involves(name);
+        let lethal = suspects::hopeless(state, &dispute.lost, others, now);
+        dispute.judge.is_none() && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.contradiction()?);

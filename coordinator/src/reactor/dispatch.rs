@@ -6,16 +6,16 @@
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
 //! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
-//! longest. While a realization waits to be computed alone, one worker is not refilled.
+//! longest. Whom a realization waits for that is to be computed alone is not refilled.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::{Effects, checks};
+use super::{Effects, checks, suspects};
 use crate::effect::Effect;
-use crate::evaluation::Indices;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Job, Purpose, Stage, State, Worker};
@@ -33,72 +33,47 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     if state.draining {
         return;
     }
-    while hand_one(state, now, effects) {}
+    let kept = suspects::hand_out(state, now, effects);
+    while work_waits(state) && hand_one(state, &kept, now, effects) {}
     copy_slowest(state, now, effects);
 }
 
-/// Gives the first worker that may have something what it may have; whether there is one.
-fn hand_one(state: &mut State, now: Duration, effects: &mut Effects) -> bool {
-    let mut free = free_workers(state);
+/// Whether there is anything to hand out but suspects.
+fn work_waits(state: &State) -> bool {
+    next_job(state).is_some() || checks::any_wait(state)
+}
+
+/// Gives the first worker that may have something what it may have; whether there is one. Those
+/// in `kept` are not refilled.
+fn hand_one(
+    state: &mut State,
+    kept: &BTreeSet<WorkerId>,
+    now: Duration,
+    effects: &mut Effects,
+) -> bool {
+    let mut free = free_workers(state, kept);
     if !checks::any_wait(state) {
         // What one of them may not have, no other may.
         free.truncate(1);
     }
     free.into_iter().any(|worker| {
-        hand_suspect(state, worker, now, effects)
-            || checks::hand_check(state, worker, now, effects)
-            || hand_batch(state, worker, now, effects)
+        checks::hand_check(state, worker, now, effects) || hand_batch(state, worker, now, effects)
     })
 }
 
 /// The workers with credit, those that hold least first; of equal ones the first.
-fn free_workers(state: &State) -> Vec<WorkerId> {
+fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
     let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
     let free = state
         .workers
         .iter()
-        .filter(|(_, worker)| !worker.draining && !worker.in_flight.iter().any(exclusive))
+        .filter(|(id, worker)| !worker.draining && !kept.contains(id))
+        .filter(|(_, worker)| !worker.in_flight.iter().any(exclusive))
         .map(|(id, worker)| (worker.in_flight.len(), *id));
     let mut free: Vec<(usize, WorkerId)> = free.collect();
     free.sort_unstable();
-    // Suspects go to a worker that holds nothing: the next to be so is not refilled until then.
-    if free.first().is_some_and(|least| least.0 > 0) && suspects_wait(state) {
-        free.remove(0);
-    }
     let free = free.into_iter().filter(|(held, _)| *held < BATCHES_IN_FLIGHT_MAX);
     free.map(|(_, worker)| worker).collect()
-}
-
-/// Whether a realization that was alone on a lost worker is to be handed out.
-fn suspects_wait(state: &State) -> bool {
-    state.active.iter().any(|id| match state.jobs.get(id).map(|job| &job.stage) {
-        Some(Stage::Computing(evaluation)) => !evaluation.quarantine.is_empty(),
-        _ => false,
-    })
-}
-
-/// Gives an idle worker a realization that was alone on a lost worker, and nothing else.
-fn hand_suspect(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) -> bool {
-    if state.workers.get(&worker).is_none_or(|worker| !worker.in_flight.is_empty()) {
-        return false;
-    }
-    let active: Vec<JobId> = state.active.iter().copied().collect();
-    for job in active {
-        let Some(evaluation) = state.evaluation_mut(job) else {
-            continue;
-        };
-        let round = evaluation.round;
-        if let Some(index) = evaluation.quarantine.pop_front() {
-            let indices = Indices { first: index, count: 1 };
-            let assignment = Assignment { job, round, indices };
-            let batch = send(state, worker, assignment, Purpose::Fill, now, effects);
-            if let Some(batch) = batch.and_then(|batch| state.batches.get_mut(&batch)) {
-                batch.exclusive = true;
-            }
-            return true;
-        }
-    }
-    false
 }
 
 /// Gives a worker a batch of the job whose turn it is.
@@ -131,7 +106,7 @@ fn hand_batch(state: &mut State, worker: WorkerId, now: Duration, effects: &mut 
 
 /// Of the active jobs with work: of the client that has had least computing time those with the
 /// highest priority, and of these the first after the one that was served last, in a circle.
-fn next_job(state: &State) -> Option<JobId> {
+pub(super) fn next_job(state: &State) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
         let job = state.jobs.get(id)?;
         match &job.stage {
@@ -197,39 +172,33 @@ fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
     if threads > 0.0 { rates / threads } else { 1.0 }
 }
 
-/// Gives each idle worker a copy of the batch that is out longest elsewhere. Batches younger than
-/// half the target time are about to be answered and are not worth a copy.
+/// Gives each idle worker a copy of the batch that is out longest. Batches younger than half the
+/// target time are about to be answered and are not worth a copy.
 fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
+    let patience = state.config.batch_target / 2;
+    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
     let idle = |worker: &Worker| !worker.draining && worker.in_flight.is_empty();
+    let is_old = |state: &State, id: &BatchId| state.batches.get(id).is_some_and(old);
+    if !state.copyable.first().is_some_and(|slowest| is_old(state, slowest)) {
+        return;
+    }
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {
-        let Some(slowest) = slowest_elsewhere(state, worker, now) else {
-            continue;
+        let Some(slowest) = state.copyable.first().copied().filter(|id| is_old(state, id)) else {
+            return;
         };
         let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
-            continue;
+            return;
         };
         let copy = send(state, worker, assignment, Purpose::Fill, now, effects);
         for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
-            if let Some(batch) = one.and_then(|one| state.batches.get_mut(&one)) {
+            if let Some((id, batch)) = one.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
                 batch.twin = other;
+                state.copyable.remove(&id);
             }
         }
     }
-}
-
-fn slowest_elsewhere(state: &State, worker: WorkerId, now: Duration) -> Option<BatchId> {
-    let patience = state.config.batch_target / 2;
-    let worth_a_copy = |batch: &Batch| {
-        batch.worker != worker
-            && batch.purpose == Purpose::Fill
-            && batch.twin.is_none()
-            && !batch.exclusive
-            && now.saturating_sub(batch.sent) >= patience
-    };
-    let candidates = state.batches.iter().filter(|(_, batch)| worth_a_copy(batch));
-    candidates.min_by_key(|(id, batch)| (batch.sent, **id)).map(|(id, _)| *id)
 }
 
 /// Sends a batch to a worker; its number, if its evaluation is under way.
@@ -254,6 +223,9 @@ pub(super) fn send(
         exclusive: false,
     };
     state.batches.insert(id, batch);
+    if purpose == Purpose::Fill {
+        state.copyable.insert(id);
+    }
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }

@@ -73,7 +73,14 @@ fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effect
             }
         }
         Stage::Storing { record, .. } => job.rewind |= told || record.workers.contains(name),
-        // What is on its way to the store as the end of a job has ended.
+        Stage::Finishing(_) if told => {
+            // What is on its way to the store as the end of a job has ended, unless it is refused.
+            let on_its_way = job.trouble.as_ref().is_none_or(|trouble| trouble.on_its_way);
+            job.rewind = true;
+            if !on_its_way {
+                jobs::reopen(state, id, now, effects);
+            }
+        }
         Stage::Accepting | Stage::Waiting | Stage::Rereading { .. } | Stage::Finishing(_) => {}
     }
 }
@@ -88,7 +95,7 @@ fn compute_again(state: &mut State, id: JobId, now: Duration, effects: &mut Effe
     let realizations = job.record.specification.monte_carlo.realizations;
     if let Stage::Computing(evaluation) = &mut job.stage {
         let mut fresh = Evaluation::new(evaluation.number, round, evaluation.point, realizations);
-        fresh.before = evaluation.before.take();
+        fresh.before = std::mem::take(&mut evaluation.before);
         *evaluation = fresh;
     }
 }
@@ -118,11 +125,12 @@ pub(super) fn store_failed(
     }
 }
 
-/// Writes expulsions again whose time has come.
+/// Writes refused expulsions again whose time has come.
 pub(super) fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
     let retry_in = state.config.store_retry;
     for expelled in &mut state.expelled {
-        if expelled.store_at.is_some_and(|at| now >= at) {
+        // What is on its way is reported; a second time it may still be on its way at the end.
+        if expelled.refused && expelled.store_at.is_some_and(|at| now >= at) {
             expelled.store_at = Some(now + retry_in);
             expelled.refused = false;
             effects.push(Effect::Store(Record::Expulsion(expelled.record.clone())));

@@ -12,7 +12,7 @@ use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Ending, Step};
+use crate::search::{Ending, Search, Step};
 use crate::snapshot;
 use crate::state::{EndedJob, Job, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
@@ -40,8 +40,7 @@ pub(super) fn stored(
             for token in std::mem::take(&mut job.tokens) {
                 effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
             }
-            let client = job.record.client.clone();
-            if has_room(state, &client) {
+            if has_room(state, id) {
                 begin_waiting(state, now, effects);
             }
         }
@@ -97,8 +96,11 @@ pub(super) fn store_failed(
         return;
     }
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
+    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
     state.changed.insert(id);
+    if job.rewind && matches!(job.stage, Stage::Finishing(_)) {
+        reopen(state, id, now, effects);
+    }
     despair_if_late(state, since, error, now, effects);
 }
 
@@ -181,6 +183,10 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
             begin(state, id, now, effects);
         }
         Stage::Waiting | Stage::Computing(_) => finish(state, id, cancelled(), now, effects),
+        // The store does not give what it would leave besides.
+        Stage::Rereading { .. } if job.trouble.is_some() => {
+            finish(state, id, cancelled(), now, effects);
+        }
         Stage::Accepting
         | Stage::Rereading { .. }
         | Stage::Storing { .. }
@@ -193,31 +199,37 @@ pub(super) fn cancel(state: &mut State, id: JobId, now: Duration, effects: &mut 
 /// beyond the usual, so that no other client keeps it waiting.
 pub(super) fn begin_waiting(state: &mut State, now: Duration, effects: &mut Effects) {
     while !state.waiting.is_empty() && !state.draining {
-        let Some((id, client)) = next_waiting(state) else {
+        let Some(id) = next_waiting(state).filter(|job| has_room(state, *job)) else {
             return;
         };
-        if !has_room(state, &client) {
-            return;
-        }
         begin(state, id, now, effects);
     }
 }
 
-/// Whether a job of `client` may begin.
-fn has_room(state: &State, client: &str) -> bool {
-    let most = state.config.active_jobs_max;
-    let active = state.active.len();
-    active < most || (active < 2 * most && state.shares.jobs(client) == 0)
+/// Whether a waiting job may begin: there is room for its evaluation, and a place.
+fn has_room(state: &State, id: JobId) -> bool {
+    let realizations = |id: &JobId| {
+        let job = state.jobs.get(id);
+        job.map_or(0, |job| job.record.specification.monte_carlo.realizations)
+    };
+    let Some(job) = state.jobs.get(&id) else {
+        return false;
+    };
+    let beyond = if state.shares.jobs(&job.record.client) == 0 { 2 } else { 1 };
+    let active = state.active.iter().map(realizations).sum::<u64>();
+    let fits =
+        active == 0 || active + realizations(&id) <= beyond * state.config.active_realizations_max;
+    fits && (state.active.len() as u64) < beyond * state.config.active_jobs_max as u64
 }
 
-/// The job that begins next, with its client.
-fn next_waiting(state: &State) -> Option<(JobId, String)> {
+/// The job that begins next.
+fn next_waiting(state: &State) -> Option<JobId> {
     let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
     let rank = |(id, job): &(JobId, &Job)| {
         let JobRecord { client, priority, .. } = &job.record;
         (state.shares.jobs(client), Reverse(*priority), *id)
     };
-    waiting.min_by_key(rank).map(|(id, job)| (id, job.record.client.clone()))
+    waiting.min_by_key(rank).map(|(id, _)| id)
 }
 
 /// Begins a waiting job.
@@ -271,7 +283,23 @@ pub(super) fn finish(
     let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
+    job.trouble = None;
     leave(state, id, now, effects);
+}
+
+/// Takes back an end that is not durable and not on its way to be: its answers are not to be
+/// relied on. The job waits for its turn and reads its stored evaluations again.
+pub(super) fn reopen(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    let Some(job) = state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.trouble = None;
+    job.rewind = false;
+    job.workers.clear();
+    job.search = Search::new(job.record.specification.clone());
+    job.stage = Stage::Waiting;
+    state.waiting.push_back(id);
+    begin_waiting(state, now, effects);
 }
 
 /// Takes a job out of everything that concerns jobs under way.

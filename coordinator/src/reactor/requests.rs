@@ -4,8 +4,8 @@ use std::ops::Bound;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::JobSpecification;
-use osteon_common::limits::JOBS_MAX;
+use osteon_common::job::{Data, JobSpecification};
+use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
 use super::{Effects, jobs, prune};
@@ -75,6 +75,7 @@ fn submit(
     if state.unfinished() >= JOBS_MAX {
         return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
     }
+    find_room(state, &client, bytes(&specification))?;
     let id = JobId(state.next_job);
     state.next_job += 1;
     if !request_id.is_empty() {
@@ -89,6 +90,33 @@ fn submit(
     job.tokens.push(token);
     state.jobs.insert(id, job);
     Ok(None)
+}
+
+/// Whether a specification of so many bytes finds room beside those of the jobs that have not ended.
+fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
+    let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
+        let records = state.jobs.values().map(|job| &job.record);
+        records.filter(|it| whose(&it.client)).map(|it| bytes(&it.specification)).sum()
+    };
+    let limit = state.config.jobs_bytes_max;
+    for (whose, held, limit) in [
+        ("this client's", of(&|name| name == client), limit / JOBS_BYTES_CLIENT_DIVISOR),
+        ("all", of(&|_| true), limit),
+    ] {
+        if held + more > limit {
+            return Err(Refusal::TooMuchQueued { whose, held, more, limit });
+        }
+    }
+    Ok(())
+}
+
+/// Memory that a specification takes, about.
+fn bytes(specification: &JobSpecification) -> u64 {
+    let velocities = match &specification.data {
+        Some(Data::Velocities(velocities)) => size_of_val(velocities.as_slice()),
+        Some(Data::Moments { .. }) | None => 0,
+    };
+    (size_of::<JobSpecification>() + velocities) as u64
 }
 
 fn resubmit(

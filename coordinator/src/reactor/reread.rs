@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use super::{Effects, batches, jobs};
 use crate::effect::Effect;
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Before, Evaluation};
+use crate::event::Unread;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::Search;
+use crate::search::{Search, Step};
 use crate::state::{Expelled, Stage, State, Trouble};
 use crate::store::EvaluationRecord;
 
@@ -46,7 +47,7 @@ pub(super) fn read(
     state: &mut State,
     id: JobId,
     number: u64,
-    found: Result<Option<EvaluationRecord>, String>,
+    found: Result<Option<EvaluationRecord>, Unread>,
     now: Duration,
     effects: &mut Effects,
 ) {
@@ -64,18 +65,51 @@ pub(super) fn read(
             told(state, id, record, now, effects);
         }
         Ok(None) => jobs::fail(state, id, &Failure::Missing { number }, now, effects),
-        Err(error) => read_failed(state, id, error, now, effects),
+        Err(Unread::Refused { error }) => read_failed(state, id, error, now, effects),
+        Err(Unread::Damaged) => mend(state, id, now, effects),
     }
 }
 
-/// The store cannot be read: it is tried again, for as long as it takes.
+/// Has an evaluation computed again whose record is damaged. A point's outcomes are the same each
+/// time, so what is stored after it is on the same path, or is found not to be.
+fn mend(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
+    let round = state.round();
+    let Some(job) = state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.trouble = None;
+    job.progressed = now;
+    state.changed.insert(id);
+    if job.cancelled {
+        jobs::finish(state, id, jobs::cancelled(), now, effects);
+        return;
+    }
+    match job.search.ask() {
+        Step::Evaluate(point) => {
+            let realizations = job.record.specification.monte_carlo.realizations;
+            let number = job.search.evaluations();
+            let mut evaluation = Evaluation::new(number, round, point, realizations);
+            evaluation.before = Before::Damaged;
+            job.stage = Stage::Computing(evaluation);
+            job.mended = true;
+        }
+        Step::Done(ending) => jobs::finish(state, id, ending, now, effects),
+    }
+}
+
+/// The store cannot be read: it is tried again, for as long as it takes, unless nobody waits for it.
 fn read_failed(state: &mut State, id: JobId, error: String, now: Duration, effects: &mut Effects) {
     let retry_at = now + state.config.store_retry;
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
+    if job.cancelled {
+        // What is told so far is all that can be known.
+        jobs::finish(state, id, jobs::cancelled(), now, effects);
+        return;
+    }
     let since = job.trouble.as_ref().map_or(now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone() });
+    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
     state.changed.insert(id);
     jobs::despair_if_late(state, since, error, now, effects);
 }
@@ -101,7 +135,7 @@ fn told(
         match job.search.expects(point) {
             Ok(()) => {
                 let mut evaluation = Evaluation::new(number, round, point, realizations);
-                evaluation.before = Some(outcomes);
+                evaluation.before = Before::Stored(outcomes);
                 job.stage = Stage::Computing(evaluation);
             }
             Err(error) => jobs::fail(state, id, &error.into(), now, effects),
@@ -113,6 +147,11 @@ fn told(
         match job.search.retell(point, outcomes, estimated_error) {
             Ok(()) => {
                 job.workers.extend(workers);
+                jobs::advance(state, id, now, effects);
+            }
+            Err(_) if job.mended => {
+                // What was damaged had been computed wrongly, and this comes of it.
+                job.stored = number;
                 jobs::advance(state, id, now, effects);
             }
             Err(error) => jobs::fail(state, id, &error.into(), now, effects),

@@ -25,6 +25,9 @@ mod prune;
 mod reread;
 mod workers;
 
+/// A minute.
+const MINUTE: Duration = Duration::from_secs(60);
+
 /// A coordinator with a clock that the test moves.
 struct Rig {
     state: State,
@@ -75,10 +78,24 @@ impl Rig {
     /// Lets time pass and asserts what a tick then brings about, snapshots and signs of life aside.
     #[track_caller]
     fn check_after(&mut self, time: Duration, expected: &[&str]) {
-        self.now += time;
-        let mut effects = self.event(Event::Tick);
+        let mut effects = self.pass(time);
         effects.retain(|effect| !effect.starts_with("publish") && !effect.starts_with("beat"));
         assert_eq!(effects, expected);
+    }
+
+    /// Lets time pass, looking at it as often as a coordinator that does not stand still; at once
+    /// if it is long.
+    fn pass(&mut self, time: Duration) -> Vec<String> {
+        let end = self.now + time;
+        let step = if time > MINUTE / 2 { time } else { self.state.config.heartbeat };
+        let mut effects = Vec::new();
+        while self.now + step < end {
+            self.now += step;
+            effects.extend(self.event(Event::Tick));
+        }
+        self.now = end;
+        effects.extend(self.event(Event::Tick));
+        effects
     }
 
     /// A worker is heard of.
@@ -131,11 +148,16 @@ fn hello(worker: u64, threads: u32) -> Event {
 
 /// A worker that runs in `process`.
 fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
+    hello_on("node", worker, process, threads)
+}
+
+/// A worker that runs in `process` on `host`.
+fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
     let hello = Hello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
         threads,
-        host: "node".to_owned(),
+        host: host.to_owned(),
         process,
         instance: 0,
     };

@@ -2,25 +2,52 @@
 
 use std::time::Duration;
 
-use super::{Effects, checks, expulsion, jobs, prune, workers};
+use super::{Effects, checks, expulsion, jobs, prune, suspects, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
-use crate::state::{State, Worker, sequence};
+use crate::state::{Stage, State, Worker, sequence};
 
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
+    excuse(state, now);
     expire(state, now, effects);
     beat(state, now, effects);
     checks::give_up(state, now, effects);
     if !state.draining {
+        suspects::tick(state, now, effects);
         store_again(state, now, effects);
         expulsion::store_again(state, now, effects);
         prune::tick(state, now, effects);
     }
     publish(state, now, effects);
+}
+
+/// Takes time in which this process did not run out of all that silence is measured by: what came
+/// meanwhile is not read yet.
+fn excuse(state: &mut State, now: Duration) {
+    let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
+    if gap <= state.config.heartbeat {
+        return;
+    }
+    tracing::warn!(?gap, "the coordinator stood still; nobody is blamed for it");
+    let excused = |since: &mut Duration| *since = (*since + gap).min(now);
+    for worker in state.workers.values_mut() {
+        excused(&mut worker.heard);
+        excused(&mut worker.answered);
+    }
+    state.batches.values_mut().for_each(|batch| excused(&mut batch.sent));
+    for job in state.jobs.values_mut() {
+        if let Stage::Computing(evaluation) = &mut job.stage {
+            evaluation.suspects.values_mut().for_each(|losses| losses.excuse(excused));
+            for dispute in &mut evaluation.disputes {
+                excused(&mut dispute.since);
+                dispute.lost.excuse(excused);
+            }
+        }
+    }
 }
 
 fn expire(state: &mut State, now: Duration, effects: &mut Effects) {
@@ -56,14 +83,12 @@ fn beat(state: &mut State, now: Duration, effects: &mut Effects) {
 }
 
 fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
-    let retry_in = state.config.store_retry;
     for job in state.jobs.values_mut() {
         let Some(trouble) = &mut job.trouble else {
             continue;
         };
-        if now >= trouble.retry_at {
-            // A report of this write moves the time again.
-            trouble.retry_at = now + retry_in;
+        if now >= trouble.retry_at && !trouble.on_its_way {
+            trouble.on_its_way = true;
             jobs::store_again(job, effects);
         }
     }

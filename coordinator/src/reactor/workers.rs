@@ -6,10 +6,11 @@ use std::time::Duration;
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
-use super::{Effects, batches};
+use super::{Effects, batches, suspects};
 use crate::effect::{CloseReason, Effect};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
+use crate::losses::{Cause, Loss};
 use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
 
@@ -30,14 +31,18 @@ pub(super) fn hello(
     }
     let lease = LeaseId(state.next_lease);
     state.next_lease += 1;
+    let name = name(&hello);
+    suspects::forgive(state, &name);
     state.workers.insert(
         worker,
         Worker {
             lease,
-            name: name(&hello),
+            name,
             hello,
+            attached: now,
             heard: now,
             answered: now,
+            proven: false,
             beat: now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
@@ -83,12 +88,18 @@ pub(super) fn close(
     now: Duration,
     effects: &mut Effects,
 ) {
+    let cause = cause(&reason);
     effects.push(Effect::Close { worker, reason });
-    lost(state, worker, now, effects);
+    lost(state, worker, cause, now);
+}
+
+/// The stream of a worker ended; what it held goes to others.
+pub(super) fn stream_ended(state: &mut State, worker: WorkerId, now: Duration) {
+    lost(state, worker, Cause::StreamBroke, now);
 }
 
 /// Forgets a worker; what it held goes to others. Later events of it mean nothing.
-pub(super) fn lost(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
+fn lost(state: &mut State, worker: WorkerId, cause: Cause, now: Duration) {
     let Some(gone) = state.workers.remove(&worker) else {
         return;
     };
@@ -97,9 +108,33 @@ pub(super) fn lost(state: &mut State, worker: WorkerId, now: Duration, effects: 
     }
     tracing::info!(%worker, name = %gone.name, batches = gone.in_flight.len(),
         "a worker is gone; what it held goes to others");
+    let cause = if gone.draining { Cause::Announced } else { cause };
+    if cause != Cause::Announced && !gone.in_flight.is_empty() {
+        state.count_loss(&gone.name, now);
+    }
     let alone = gone.in_flight.len() == 1;
+    let loss = Loss { worker: gone.name, cause, at: now, alone, proven: gone.proven };
     for batch in gone.in_flight {
-        batches::orphaned(state, batch, alone, gone.draining, now, effects);
+        batches::orphaned(state, batch, &loss);
+    }
+}
+
+/// What the reason for which a stream is closed says about its worker.
+fn cause(reason: &CloseReason) -> Cause {
+    match reason {
+        CloseReason::Drained | CloseReason::Draining | CloseReason::Expelled { .. } => {
+            Cause::Announced
+        }
+        CloseReason::Expired { .. } => Cause::Silence,
+        CloseReason::Unanswering { .. }
+        | CloseReason::NotReading
+        | CloseReason::Malformed(_)
+        | CloseReason::WrongCount { .. }
+        | CloseReason::SecondHello
+        | CloseReason::FingerprintDiffers { .. }
+        | CloseReason::Threads { .. }
+        | CloseReason::NameTooLong { .. }
+        | CloseReason::TooManyWorkers { .. } => Cause::Misbehaviour,
     }
 }
 

@@ -163,7 +163,10 @@ const AUTO_VACUUM_INCREMENTAL: i64 = 2;
 impl Store for SqliteStore {
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.read_jobs("true", [], &mut |record| {
-            let end = self.end(record.job)?;
+            let end = match self.end(record.job) {
+                Err(error @ StoreError::Damaged { .. }) => Some(damaged_end(&record, &error)),
+                read => read?,
+            };
             let evaluations = if end.is_some() { 0 } else { self.evaluations(record.job)? };
             visit(StoredJob { record, end, evaluations });
             Ok(())
@@ -383,6 +386,15 @@ impl Store for SqliteStore {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))
     }
+}
+
+/// What is shown of a job whose end is damaged: one such row must not keep all others from being
+/// served. Nothing is written: a copy of the file may have it.
+fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
+    tracing::error!(%error, "a job is shown as failed; the others are served");
+    let ending = Ending { status: Status::Failed, reason: Some(error.to_string()) };
+    let version = "unknown".to_owned();
+    EndRecord { version, ..EndRecord::new(record.job, ending, record.accepted, 0, None) }
 }
 
 /// The job of a row, and its identifier; `None` if it is damaged.

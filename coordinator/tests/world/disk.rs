@@ -1,7 +1,7 @@
 //! The store: writes that come late, fail, or are lost with the coordinator.
 
 use osteon_coordinator::effect::Record;
-use osteon_coordinator::event::{Event, Request, Retention};
+use osteon_coordinator::event::{Event, Request, Retention, Unread};
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::store::Store as _;
 
@@ -41,7 +41,9 @@ impl World {
                     let same = before.outcomes == record.outcomes;
                     self.counts.replaced += u64::from(!same);
                     self.counts.confirmed += u64::from(same);
-                    assert_eq!(*is_last, !same);
+                    // Of what is damaged nobody knows what it was.
+                    let damaged = self.damaged.contains(&(record.job, record.number));
+                    assert!(damaged || *is_last != same, "{record:?}");
                 }
             }
             Record::Job(_) => {}
@@ -53,6 +55,9 @@ impl World {
             let (job, key) = record.key();
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
+            if let Record::Evaluation { record, .. } = record {
+                self.damaged.remove(&(record.job, record.number));
+            }
             fake::written(&mut self.store, record)
         };
         self.within(5, Happening::Report(event));
@@ -60,7 +65,12 @@ impl World {
 
     pub(super) fn read(&mut self, job: JobId, number: u64) {
         let event = if self.refuses() {
-            Event::Read { job, number, found: Err("the cable is out".to_owned()) }
+            let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+            Event::Read { job, number, found }
+        } else if self.draw(10) == 0 {
+            self.counts.damaged += 1;
+            self.damaged.insert((job, number));
+            Event::Read { job, number, found: Err(Unread::Damaged) }
         } else {
             fake::read(&mut self.store, job, number)
         };

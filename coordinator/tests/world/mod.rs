@@ -20,72 +20,18 @@ use osteon_proto::batch::Work;
 use crate::fake;
 
 mod check;
+mod counts;
 mod disk;
+mod faults;
 mod liars;
+
+pub(crate) use counts::Counts;
 
 const TICK: Duration = Duration::from_millis(100);
 /// No schedule takes longer than this, in its own time.
 const HOUR: Duration = Duration::from_secs(3600);
 /// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
 const LOST_ALONE_MAX: u32 = 2;
-
-/// How often what happened.
-#[derive(Debug, Default)]
-pub(crate) struct Counts {
-    pub(crate) lost: u64,
-    pub(crate) revoked: u64,
-    pub(crate) closed: u64,
-    pub(crate) late: u64,
-    pub(crate) restarts: u64,
-    pub(crate) refusals: u64,
-    /// Clean ends of the coordinator.
-    pub(crate) stops: u64,
-    /// Jobs that were cancelled before their end.
-    pub(crate) cancelled: u64,
-    /// Jobs that failed because two answers differed.
-    pub(crate) exposed: u64,
-    /// Times without any write.
-    pub(crate) outages: u64,
-    /// Batches of which somebody has answered every realization before.
-    pub(crate) checked: u64,
-    /// Wrong answers.
-    pub(crate) lies: u64,
-    /// Workers expelled.
-    pub(crate) expelled: u64,
-    /// Stored evaluations that were replaced by others.
-    pub(crate) replaced: u64,
-    /// Stored evaluations that were computed again and found the same.
-    pub(crate) confirmed: u64,
-    /// Restarts with expelled workers in the store.
-    pub(crate) remembered: u64,
-    /// Jobs that ended right although somebody had lied in them.
-    pub(crate) repaired: u64,
-    /// Jobs forgotten.
-    pub(crate) pruned: u64,
-}
-
-impl Counts {
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.lost += other.lost;
-        self.revoked += other.revoked;
-        self.closed += other.closed;
-        self.late += other.late;
-        self.restarts += other.restarts;
-        self.refusals += other.refusals;
-        self.stops += other.stops;
-        self.cancelled += other.cancelled;
-        self.exposed += other.exposed;
-        self.outages += other.outages;
-        self.checked += other.checked;
-        self.lies += other.lies;
-        self.expelled += other.expelled;
-        self.replaced += other.replaced;
-        self.confirmed += other.confirmed;
-        self.remembered += other.remembered;
-        self.repaired += other.repaired;
-        self.pruned += other.pruned;
-    }
-}
 
 /// Something that will happen.
 enum Happening {
@@ -94,6 +40,14 @@ enum Happening {
     Submit(usize),
     /// A worker attaches.
     Arrive,
+    /// A process attaches again.
+    Return(u32),
+    /// The coordinator stands still.
+    Pause,
+    /// A worker does not wait for the coordinator any longer.
+    GiveUp(WorkerId),
+    /// A worker attaches that dies over whatever it gets.
+    ArriveBad,
     /// A worker's message arrives.
     Message(WorkerId, Event),
     /// A worker answers a batch that is settled again, and differently.
@@ -135,6 +89,8 @@ struct Worker {
     process: u32,
     /// It computes nothing and says nothing, but its stream stands.
     stalled: bool,
+    /// It dies over whatever it gets.
+    bad: bool,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
 }
@@ -159,6 +115,8 @@ pub(crate) struct World {
     expelled: BTreeSet<u32>,
     /// Seed, point and indices of batches that were answered in this life of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
+    /// Evaluations that were found damaged in the store.
+    damaged: BTreeSet<(JobId, u64)>,
     /// Jobs that end while somebody who lied in them is not found out.
     deceived: BTreeSet<JobId>,
     /// The last decision on the end of each job.
@@ -193,6 +151,7 @@ impl World {
             random % below
         };
         let config = Config {
+            heartbeat: Duration::from_millis(200),
             expiry: Duration::from_secs(1),
             active_jobs_max: 1 + draw(2) as usize,
             batch_target: Duration::from_millis(10 + draw(200)),
@@ -203,7 +162,6 @@ impl World {
         let clients = clients(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
-        let drain = (draw(3) == 0).then(|| draw(3000));
         // Long: a client has given up by then, and so have many programs.
         let outage = (draw(8) == 0).then(|| (draw(1000), 10_000 + draw(60_000)));
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
@@ -227,6 +185,7 @@ impl World {
             lies: BTreeSet::new(),
             expelled: BTreeSet::new(),
             answered_batches: BTreeSet::new(),
+            damaged: BTreeSet::new(),
             deceived: BTreeSet::new(),
             ends: BTreeMap::new(),
             processes: 0,
@@ -247,9 +206,7 @@ impl World {
         for at in restarts {
             world.after(at, Happening::Restart);
         }
-        if let Some(at) = drain {
-            world.after(at, Happening::Drain);
-        }
+        world.plan_faults();
         if let Some(at) = prune {
             world.after(at, Happening::Prune);
         }
@@ -291,14 +248,20 @@ impl World {
             Happening::Tick => self.tick(),
             Happening::Submit(client) => self.submit(client),
             Happening::Arrive => self.arrive(),
+            Happening::ArriveBad => self.arrive_bad(),
+            Happening::Return(process) => self.attach(process),
+            Happening::Pause => self.pause(),
+            Happening::GiveUp(worker) => self.give_up(worker),
             Happening::Message(worker, event) => {
                 if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
                     self.message(worker, event);
                 }
             }
             Happening::Break(worker) => {
-                if !self.workers.contains_key(&worker) {
-                } else if self.may_die(worker) {
+                let bad = self.workers.get(&worker).map(|worker| worker.bad);
+                self.counts.bad_deaths += u64::from(bad == Some(true));
+                if bad.is_none() {
+                } else if bad == Some(true) || self.may_die(worker) {
                     self.bury(worker);
                     self.react(Event::StreamEnded { worker });
                 } else {
@@ -367,9 +330,13 @@ impl World {
     }
 
     fn arrive(&mut self) {
+        let process = self.process();
+        self.attach(process);
+    }
+
+    fn attach(&mut self, process: u32) {
         let worker = WorkerId(self.number());
         let threads = 1 + self.draw(4) as u32;
-        let process = self.process();
         let hello = Hello { threads, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
@@ -410,9 +377,15 @@ impl World {
 
     /// A worker is gone; another comes in its place.
     fn bury(&mut self, worker: WorkerId) {
-        self.workers.remove(&worker);
+        let gone = self.workers.remove(&worker).unwrap();
         self.counts.lost += 1;
-        self.within(500, Happening::Arrive);
+        self.replace(&gone);
+    }
+
+    /// Another worker comes in the place of one that is gone.
+    fn replace(&mut self, gone: &Worker) {
+        let other = if gone.bad { Happening::ArriveBad } else { Happening::Arrive };
+        self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
     /// The coordinator has stopped by itself, and starts again.
@@ -456,6 +429,7 @@ impl World {
                 Happening::Message(..)
                 | Happening::Lie(..)
                 | Happening::Break(_)
+                | Happening::GiveUp(_)
                 | Happening::Read(..)
                 | Happening::Report(_) => {}
                 stays => {
@@ -463,10 +437,9 @@ impl World {
                 }
             }
         }
-        for _ in 0..self.workers.len() {
-            self.within(500, Happening::Arrive);
+        for gone in std::mem::take(&mut self.workers).values() {
+            self.replace(gone);
         }
-        self.workers.clear();
         self.answered_batches.clear();
         self.submissions.clear();
         self.cancellations.clear();
@@ -523,8 +496,13 @@ impl World {
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
         self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let known = self.workers.get_mut(&worker).unwrap();
+        let bad = known.bad;
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
+        if bad {
+            self.within(50, Happening::Break(worker));
+            return;
+        }
         let right = self.answer(worker, batch, &work);
         match self.draw(100) {
             0..3 => self.within(100, Happening::Break(worker)),

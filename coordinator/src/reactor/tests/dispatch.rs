@@ -116,6 +116,17 @@ fn an_idle_worker_gets_a_copy_of_the_slowest_batch() {
 }
 
 #[test]
+fn a_sign_of_life_hands_out_nothing() {
+    let mut rig = with_idle_worker();
+    rig.now += Duration::from_millis(1);
+    // Thousands of workers give one every two seconds; a copy is due, and waits for the next tick.
+    for worker in [1, 2] {
+        rig.hear(worker);
+    }
+    rig.check_after(Duration::ZERO, &["send 2: batch 3 = 0+1"]);
+}
+
+#[test]
 fn a_copy_outlives_its_original_and_the_other_way_round() {
     let mut rig = with_idle_worker();
     rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);

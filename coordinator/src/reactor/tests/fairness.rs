@@ -34,6 +34,65 @@ impl Rig {
 }
 
 #[test]
+fn large_evaluations_wait_for_room() {
+    let mut rig = Rig::new();
+    rig.state.config.active_jobs_max = 8;
+    rig.state.config.active_realizations_max = 100;
+    // Alone, a job of any size finds room.
+    let large = rig.accept_of("a", 0, 150);
+    let second = rig.accept_of("a", 0, 1);
+    let other = rig.accept_of("b", 0, 50);
+    let later = rig.accept_of("c", 0, 1);
+    let active = |rig: &Rig| rig.state.active.iter().copied().collect::<Vec<_>>();
+    assert_eq!(active(&rig), [large, other]);
+    rig.event(request(1, Request::Cancel(other)));
+    assert_eq!(active(&rig), [large, later]);
+    rig.event(request(2, Request::Cancel(large)));
+    assert_eq!(active(&rig), [second, later]);
+}
+
+#[test]
+fn what_waits_is_bounded_in_bytes() {
+    let of = |client: &str, velocities: usize| {
+        let mut specification = identification(1);
+        specification.data = Some(Data::Velocities(vec![3900.0; velocities]));
+        let (specification, client) = (Arc::new(specification), client.to_owned());
+        request(
+            0,
+            Request::Submit { specification, request_id: String::new(), client, priority: 0 },
+        )
+    };
+    let mut rig = Rig::new();
+    rig.state.config.jobs_bytes_max = 400_000;
+    let mut accepted = |client, velocities| {
+        let effects = rig.event(of(client, velocities));
+        if effects[0].starts_with("answer 0: the specifications of ") {
+            return effects[0].split(' ').nth(6).map(str::to_owned);
+        }
+        assert!(effects[0].starts_with("store job "), "{effects:?}");
+        None
+    };
+    let whose = |word: &str| Some(word.to_owned());
+    assert_eq!(accepted("a", 6000), None);
+    assert_eq!(accepted("a", 6000), None);
+    // A quarter for each client.
+    assert_eq!(accepted("a", 6000), whose("client's"));
+    assert_eq!(accepted("a", 1), None);
+    for client in ["b", "c", "d"] {
+        assert_eq!(accepted(client, 12_000), None, "{client}");
+    }
+    // A quarter is free, but not enough for that.
+    assert_eq!(accepted("e", 12_000), whose("jobs"));
+    // What has ended makes room.
+    let job = rig.state.jobs.keys().next_back().copied().unwrap();
+    rig.event(stored(job.0, RecordKey::Job));
+    rig.event(request(1, Request::Cancel(job)));
+    rig.event(stored(job.0, RecordKey::End));
+    let effects = rig.event(of("e", 12_000));
+    assert!(effects[0].starts_with("store job "), "{effects:?}");
+}
+
+#[test]
 fn a_client_with_one_job_gets_as_much_as_one_with_many() {
     let mut rig = Rig::new();
     rig.state.config.active_jobs_max = 8;

@@ -1,6 +1,12 @@
 //! Batches of lost workers.
 
+use osteon_common::case::Case;
+use osteon_common::case_file;
+use osteon_common::document::Format;
+use osteon_common::realization::Ensemble;
+
 use super::*;
+use crate::state::Assignment;
 
 #[test]
 fn the_batches_of_a_lost_worker_are_retried_in_halves() {
@@ -16,32 +22,209 @@ fn the_batches_of_a_lost_worker_are_retried_in_halves() {
     rig.check(answer(2, 5, 0, 4), &["send 2: batch 7 = 16+8"]);
 }
 
+/// A rig with job 1, of one realization, and job 2 of so many that there is always work.
+fn deadly() -> Rig {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    rig.accept(propagation(1));
+    rig.accept(propagation(1_000_000));
+    rig
+}
+
+/// Answers what a worker holds, and what it gets for that, a few times; never for job 1.
+fn work(rig: &mut Rig, worker: u64) -> Vec<String> {
+    let mut effects = Vec::new();
+    for _ in 0..4 {
+        for (batch, Assignment { indices, .. }) in held(rig, worker, JobId(2)) {
+            effects.extend(rig.event(answer(worker, batch, indices.first, indices.count)));
+        }
+    }
+    effects
+}
+
+/// What a worker holds of a job.
+fn held(rig: &Rig, worker: u64, job: JobId) -> Vec<(u64, Assignment)> {
+    let of_worker = rig.state.batches.iter().filter(|(_, it)| it.worker == WorkerId(worker));
+    let batches = of_worker.map(|(id, batch)| (id.0, batch.assignment));
+    batches.filter(|(_, assignment)| assignment.job == job).collect()
+}
+
+/// A process that is there for the first time works on a host, and dies as soon as it holds
+/// realization 0 of job 1 and nothing else.
+fn die(rig: &mut Rig, host: &str, worker: u64) {
+    rig.event(hello_on(host, worker, worker as u32, 1));
+    work(rig, worker);
+    assert_eq!(held(rig, worker, JobId(1)).len(), 1, "{worker}");
+    assert_eq!(rig.event(end_of_stream(worker)), [""; 0]);
+}
+
+/// Lets time pass in which every worker is heard of; what happens then to job 1.
+fn wait(rig: &mut Rig, time: Duration) -> Vec<String> {
+    let workers: Vec<u64> = rig.state.workers.keys().map(|worker| worker.0).collect();
+    for worker in workers {
+        rig.hear(worker);
+    }
+    let mut effects = rig.pass(time);
+    effects.retain(|effect| effect.starts_with("store job 1 "));
+    effects
+}
+
+const EXPIRY: Duration = Duration::from_secs(10);
+
+/// Workers on these hosts die over realization 0, the first together with other batches.
+fn check_deaths(hosts: &[&str], expected: Option<&str>) {
+    let mut rig = deadly();
+    for (worker, host) in (1..).zip(hosts) {
+        die(&mut rig, host, worker);
+    }
+    // They may come back.
+    assert_eq!(wait(&mut rig, EXPIRY - Duration::from_millis(1)), [""; 0]);
+    let effects = wait(&mut rig, Duration::from_millis(1));
+    let reason = effects.first().and_then(|it| it.strip_prefix("store job 1 end: failed "));
+    let start = reason.map(|reason| reason.split_once(';').unwrap().0);
+    assert_eq!(start, expected, "{hosts:?}");
+}
+
 #[test]
 fn a_realization_that_was_alone_on_three_lost_workers_fails_its_job() {
-    let mut rig = Rig::with(2, &[1]);
-    // Held together with another: both are suspects, neither is blamed.
-    rig.check(end_of_stream(1), &[]);
-    for worker in 2..4 {
-        // A suspect is alone on its worker.
-        let batch = worker + 1;
-        let (welcome, send) = (
-            format!("welcome {worker}, lease {worker}"),
-            format!("send {worker}: batch {batch} = {}+1", worker % 2),
-        );
-        rig.check(hello(worker, 8), &[&welcome, &send]);
-        rig.check(end_of_stream(worker), &[]);
+    check_deaths(&["a", "b", "c"], None);
+    let expected = "realization 0 was alone on 3 workers that vanished (b, c, d)";
+    check_deaths(&["a", "b", "c", "d"], Some(expected));
+    // With one host only, three processes that had worked.
+    let expected = "realization 0 was alone on 3 workers that vanished (a)";
+    check_deaths(&["a"; 4], Some(expected));
+}
+
+#[test]
+fn while_another_host_is_there_it_is_tried() {
+    let mut rig = deadly();
+    for worker in 1..=4 {
+        die(&mut rig, "a", worker);
     }
-    // Index 0 and index 1 have each been alone on one lost worker; 0 answers, 1 goes on killing.
-    rig.check(hello(4, 8), &["welcome 4, lease 4", "send 4: batch 5 = 0+1"]);
-    rig.check(answer(4, 5, 0, 1), &["send 4: batch 6 = 1+1"]);
-    rig.check(end_of_stream(4), &[]);
-    rig.check(hello(5, 8), &["welcome 5, lease 5", "send 5: batch 7 = 1+1"]);
-    let effects = rig.event(end_of_stream(5));
-    assert_eq!(effects.len(), 1, "{effects:?}");
-    let reason = &effects[0];
-    assert!(reason.starts_with("store job 1 end: failed realization 1 was alone on three"));
-    assert!(reason.contains("osteon draw JOB.toml --index 1"), "{reason}");
-    assert!(reason.contains("1598.8, 17717000000.0, 0.3816"), "{reason}");
+    rig.event(hello_on("b", 5, 5, 1));
+    assert_eq!(wait(&mut rig, EXPIRY), [""; 0]);
+    work(&mut rig, 5);
+    let batch = held(&rig, 5, JobId(1))[0].0;
+    let effects = rig.event(answer(5, batch, 0, 1));
+    assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
+}
+
+#[test]
+fn who_comes_back_in_time_did_not_die() {
+    let mut rig = deadly();
+    for (worker, host) in [(1, "a"), (2, "b"), (3, "c"), (4, "d")] {
+        die(&mut rig, host, worker);
+    }
+    assert_eq!(wait(&mut rig, EXPIRY - Duration::from_millis(1)), [""; 0]);
+    // The process of worker 3 is back.
+    rig.event(hello_on("c", 5, 3, 1));
+    for _ in 0..5 {
+        assert_eq!(wait(&mut rig, Duration::from_secs(5)), [""; 0]);
+    }
+    // Its word is as good as another's.
+    work(&mut rig, 5);
+    let batch = held(&rig, 5, JobId(1))[0].0;
+    let effects = rig.event(answer(5, batch, 0, 1));
+    assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
+}
+
+#[test]
+fn pauses_of_the_coordinator_are_no_deaths() {
+    let mut rig = deadly();
+    for (worker, host) in [(1, "a"), (2, "b"), (3, "c"), (4, "d")] {
+        die(&mut rig, host, worker);
+        // Its stream broke because the coordinator stood still; by now it is back.
+        rig.now += 2 * EXPIRY;
+        assert_eq!(rig.event(Event::Tick), ["publish 1", "publish 2"]);
+        rig.event(hello_on(host, 10 + worker, worker as u32, 1));
+        assert_eq!(rig.state.workers.len(), 1);
+        rig.event(Event::WorkerDrains { worker: WorkerId(10 + worker) });
+        rig.event(end_of_stream(10 + worker));
+    }
+    for _ in 0..5 {
+        assert_eq!(wait(&mut rig, EXPIRY), [""; 0]);
+    }
+}
+
+#[test]
+fn a_host_whose_workers_come_back_is_in_order() {
+    let mut rig = deadly();
+    for worker in 1..9 {
+        // One process: it is back each time. Another would not be.
+        rig.event(hello_on("a", worker, 1, 1));
+        rig.event(hello_on("b", 10 + worker, worker as u32, 1));
+        rig.event(end_of_stream(worker));
+        rig.event(end_of_stream(10 + worker));
+        assert!(!rig.state.is_failing("a"), "{worker}");
+        assert_eq!(rig.state.is_failing("b"), worker >= 3, "{worker}");
+    }
+}
+
+/// A sound worker on `host` is attached; on `bad` one process after another starts, answers
+/// something if it `works`, and dies.
+fn check_bad_node(host: &str, bad: &str, works: bool) {
+    let mut rig = deadly();
+    rig.event(hello_on(bad, 1, 1, 1));
+    rig.event(hello_on(host, 2, 2, 1));
+    rig.event(end_of_stream(1));
+    for worker in 3..60 {
+        rig.event(hello_on(bad, worker, worker as u32, 1));
+        if works {
+            work(&mut rig, worker);
+        }
+        assert_eq!(wait(&mut rig, Duration::from_millis(300)), [""; 0], "{worker}");
+        rig.event(end_of_stream(worker));
+        assert_eq!(wait(&mut rig, Duration::from_millis(300)), [""; 0], "{worker}");
+        if worker % 5 == 0 {
+            work(&mut rig, 2);
+        }
+        if let Some((batch, _)) = held(&rig, 2, JobId(1)).first() {
+            let effects = rig.event(answer(2, *batch, 0, 1));
+            assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
+            return;
+        }
+    }
+    panic!("the sound worker never got it");
+}
+
+#[test]
+fn one_bad_node_fails_no_job_while_a_sound_worker_is_there() {
+    for (host, bad) in [("sound", "bad"), ("node", "node")] {
+        for works in [false, true] {
+            check_bad_node(host, bad, works);
+        }
+    }
+}
+
+#[test]
+fn a_bad_node_alone_is_given_up_in_the_end() {
+    let mut rig = Rig::with(1, &[]);
+    let mut process = 0;
+    let reason = loop {
+        process += 1;
+        let worker = u64::from(process);
+        rig.event(hello_on("bad", worker, process, 1));
+        let effects = [wait(&mut rig, Duration::from_secs(1)), rig.event(end_of_stream(worker))];
+        if process == 5 {
+            let waits = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap().waiting_for;
+            let expected = "a sound worker for 1 realizations over which others vanished; the \
+                            last 3 workers of bad vanished with what they held";
+            assert_eq!(waits, expected);
+        }
+        let ended = effects.concat().into_iter().find(|it| it.starts_with("store job 1 end"));
+        if let Some(reason) = ended {
+            break reason;
+        }
+    };
+    assert!(reason.contains("was alone on 10 workers that vanished (bad)"), "{reason}");
+    // Ten deaths in a row are no matter of seconds.
+    assert!(rig.now > 5 * EXPIRY, "{:?}", rig.now);
+    // The case file is complete, and the realization to the bit.
+    let (_, text) = reason.split_once('\n').unwrap();
+    let Case { setup, bone } = case_file::parse(text, Format::Toml).unwrap();
+    let specification = propagation(1);
+    let ensemble = Ensemble::new(&specification.start(), specification.monte_carlo.seed).unwrap();
+    assert_eq!((setup, bone), (specification.setup, ensemble.bone(0).unwrap()));
 }
 
 #[test]

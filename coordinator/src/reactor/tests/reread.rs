@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
+use crate::event::Unread;
 use crate::reactor::Restored;
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, Store as _};
@@ -77,14 +78,87 @@ fn a_store_that_cannot_be_read_is_asked_again() {
     let restored = Restored::load(&mut store).unwrap();
     let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
     let mut rig = Rig { state, now: Duration::ZERO };
-    let found = Err("the cable is out".to_owned());
-    rig.check(Event::Read { job: JobId(1), number: 0, found }, &[]);
+    rig.check(refused(0), &[]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     let waits = "the store does not give a record, it is tried again: the cable is out (since 0 s)";
     assert_eq!(snapshot.waiting_for, waits);
     rig.check_after(Duration::from_secs(2), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1"]);
+}
+
+/// The store cannot be read.
+fn refused(number: u64) -> Event {
+    let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+    Event::Read { job: JobId(1), number, found }
+}
+
+/// What the store has is damaged.
+fn damaged(number: u64) -> Event {
+    Event::Read { job: JobId(1), number, found: Err(Unread::Damaged) }
+}
+
+/// A restarted coordinator with worker 1, about to read the first evaluation of a job.
+fn restarted(store: &mut MemoryStore) -> Rig {
+    let restored = Restored::load(store).unwrap();
+    let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
+    let mut rig = Rig { state, now: Duration::ZERO };
+    rig.event(hello(1, 1));
+    rig
+}
+
+#[test]
+fn a_damaged_evaluation_is_computed_again_and_no_other() {
+    let (_, mut store) = rig(&[1], 3);
+    let mut rig = restarted(&mut store);
+    read(&mut rig, &store, 0);
+    rig.check(damaged(1), &["send 1: batch 1 = 0+1"]);
+    let effects = react(&mut rig.state, answer(1, 1, 1, 1), rig.now);
+    let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
+        panic!("{effects:?}");
+    };
+    assert_eq!(record.outcomes, store.evaluation(JobId(1), 1).unwrap().unwrap().outcomes);
+    rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
+    assert_eq!(read(&mut rig, &store, 2), ["send 1: batch 2 = 0+1"]);
+    assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 3);
+}
+
+#[test]
+fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
+    let (_, mut store) = rig(&[1], 3);
+    let mut rig = restarted(&mut store);
+    rig.check(damaged(0), &["send 1: batch 1 = 0+1"]);
+    rig.event(answer(1, 1, 700, 1));
+    rig.check(stored(1, RecordKey::Evaluation(0)), &["read job 1 evaluation 1"]);
+    // It leads elsewhere: the second evaluation is at the same point, the third is not.
+    let mut number = 1;
+    while read(&mut rig, &store, number) == [format!("read job 1 evaluation {}", number + 1)] {
+        number += 1;
+    }
+    assert_eq!(rig.state.jobs[&JobId(1)].stored, number);
+    let batch = batch_of(&rig, JobId(1));
+    let effects = react(&mut rig.state, answer(1, batch, number, 1), rig.now);
+    let Effect::Store(Record::Evaluation { is_last: true, .. }) = &effects[0] else {
+        panic!("{effects:?}");
+    };
+}
+
+#[test]
+fn a_job_whose_evaluations_cannot_be_read_is_cancelled_at_once() {
+    let cancel = || request(7, Request::Cancel(JobId(1)));
+    let end = ["store job 1 end: cancelled "];
+    // Before the store has refused, after that, and when what it has is damaged.
+    let (_, mut store) = rig(&[1], 2);
+    let mut rig = restarted(&mut store);
+    rig.check(cancel(), &[]);
+    rig.check(refused(0), &end);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    let mut rig = restarted(&mut store);
+    rig.check(refused(0), &[]);
+    rig.check(cancel(), &end);
+    let mut rig = restarted(&mut store);
+    rig.check(cancel(), &[]);
+    rig.check(damaged(0), &end);
 }
 
 #[test]
@@ -110,7 +184,9 @@ fn the_evaluations_of_an_expelled_worker_are_computed_again() {
     assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
     // Nothing is read before the expulsion is durable.
     assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
-    rig.check_after(Duration::from_secs(2), &[&effects[0]]);
+    rig.check_after(Duration::from_secs(2), &[]);
+    rig.check(not_stored(2, RecordKey::Expulsion(1)), &[]);
+    rig.check_after(Duration::ZERO, &[&effects[0]]);
     rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), [""; 0]);
@@ -165,4 +241,51 @@ fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on
     rig.check(failed(), &["despair after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &[&expelled]);
     rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+}
+
+/// A search of one evaluation, answered by process 2, whose end the store has refused.
+fn refused_end() -> Rig {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    rig.accept(propagation(1));
+    rig.event(hello_of(100, 2, 1));
+    rig.check(answer(100, 1, 0, 1), &["store job 1 evaluation 0"]);
+    let end = rig.event(stored(1, RecordKey::Evaluation(0)));
+    assert_eq!(end, ["store job 1 end: converged "]);
+    rig.event(end_of_stream(100));
+    rig
+}
+
+fn not_stored(job: u64, key: RecordKey) -> Event {
+    Event::StoreFailed { job: JobId(job), key, error: "the disk is full".to_owned() }
+}
+
+#[test]
+fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
+    // Refused before the worker is found out.
+    let mut rig = refused_end();
+    rig.check(not_stored(1, RecordKey::End), &[]);
+    expose(&mut rig, 2);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    // Nothing is written meanwhile that is not so.
+    rig.check_after(Duration::from_secs(1), &[]);
+
+    // On its way by then, and refused after that.
+    for again in [false, true] {
+        let mut rig = refused_end();
+        if again {
+            rig.check(not_stored(1, RecordKey::End), &[]);
+            rig.check_after(Duration::from_secs(2), &["store job 1 end: converged "]);
+        }
+        let effects = expose(&mut rig, 2);
+        assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
+        rig.check(not_stored(1, RecordKey::End), &[]);
+        rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    }
+
+    // On its way, and durable: the log names it.
+    let mut rig = refused_end();
+    expose(&mut rig, 2);
+    rig.check(stored(1, RecordKey::End), &["publish 1"]);
+    rig.check(stored(2, RecordKey::Expulsion(1)), &[]);
 }

@@ -73,6 +73,22 @@ fn a_silent_worker_loses_its_lease() {
 }
 
 #[test]
+fn while_the_coordinator_stands_still_nobody_is_silent() {
+    let mut rig = Rig::with(8, &[1]);
+    rig.check_after(Duration::from_secs(9), &[]);
+    for _ in 0..3 {
+        rig.now += Duration::from_secs(3600);
+        let effects = rig.event(Event::Tick);
+        assert!(!effects.iter().any(|effect| effect.starts_with("close")), "{effects:?}");
+    }
+    // It was silent for nine seconds before, and it still is.
+    rig.check_after(Duration::from_secs(1), &[]);
+    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+                   attach again";
+    rig.check_after(Duration::from_millis(1), &[expired]);
+}
+
+#[test]
 fn signs_of_life_are_given_in_time() {
     let mut rig = Rig::new();
     rig.event(hello(1, 1));

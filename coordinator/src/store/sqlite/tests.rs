@@ -460,7 +460,8 @@ fn every_damaged_record_is_named() {
         store.put_expulsion(&expulsion(1)).unwrap();
         store.connection.execute(sql, []).unwrap();
         let jobs = store.jobs().map(|_| ());
-        let read = jobs.and_then(|()| evaluations(&mut store, 1).map(|_| ()));
+        let read = jobs.and_then(|()| store.end(JobId(1)).map(|_| ()));
+        let read = read.and_then(|()| evaluations(&mut store, 1).map(|_| ()));
         let read = read.and_then(|()| store.expulsions().map(|_| ()));
         let error = read.and_then(|()| store.summary(JobId(1)).map(|_| ())).unwrap_err();
         assert!(
@@ -468,6 +469,27 @@ fn every_damaged_record_is_named() {
             "{sql}: {error}"
         );
     }
+}
+
+#[test]
+fn a_job_whose_end_is_damaged_keeps_no_other_from_being_served() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for id in [1, 2, 3] {
+        store.put_job(&job(id)).unwrap();
+    }
+    for id in [1, 2] {
+        store.finish_job(&end(id), &summary(id)).unwrap();
+    }
+    store.connection.execute("UPDATE ending SET evaluations = 7 WHERE job = 1", []).unwrap();
+    let jobs = store.jobs().unwrap();
+    let [damaged, whole, unfinished] = &jobs[..] else { panic!("{jobs:?}") };
+    let ending = &damaged.end.as_ref().unwrap().ending;
+    assert_eq!(ending.status, Status::Failed);
+    let reason = ending.reason.as_deref().unwrap();
+    assert!(reason.contains("is damaged: the end of job 1; restore the file"), "{reason}");
+    assert_eq!(whole.end, Some(end(2)));
+    assert_eq!(unfinished.end, None);
 }
 
 #[test]

@@ -1,0 +1,68 @@
+//! What schedules have seen.
+
+/// How often what happened.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) lost: u64,
+    pub(crate) revoked: u64,
+    pub(crate) closed: u64,
+    pub(crate) late: u64,
+    pub(crate) restarts: u64,
+    pub(crate) refusals: u64,
+    /// Clean ends of the coordinator.
+    pub(crate) stops: u64,
+    /// Jobs that were cancelled before their end.
+    pub(crate) cancelled: u64,
+    /// Jobs that failed because two answers differed.
+    pub(crate) exposed: u64,
+    /// Times without any write.
+    pub(crate) outages: u64,
+    /// Batches of which somebody has answered every realization before.
+    pub(crate) checked: u64,
+    /// Wrong answers.
+    pub(crate) lies: u64,
+    /// Workers expelled.
+    pub(crate) expelled: u64,
+    /// Stored evaluations that were replaced by others.
+    pub(crate) replaced: u64,
+    /// Stored evaluations that were computed again and found the same.
+    pub(crate) confirmed: u64,
+    /// Restarts with expelled workers in the store.
+    pub(crate) remembered: u64,
+    /// Jobs that ended right although somebody had lied in them.
+    pub(crate) repaired: u64,
+    /// Jobs forgotten.
+    pub(crate) pruned: u64,
+    /// Stored evaluations that were damaged.
+    pub(crate) damaged: u64,
+    /// Times in which the coordinator stood still.
+    pub(crate) pauses: u64,
+    /// Deaths of a node that dies over whatever it gets.
+    pub(crate) bad_deaths: u64,
+}
+
+impl Counts {
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.lost += other.lost;
+        self.revoked += other.revoked;
+        self.closed += other.closed;
+        self.late += other.late;
+        self.restarts += other.restarts;
+        self.refusals += other.refusals;
+        self.stops += other.stops;
+        self.cancelled += other.cancelled;
+        self.exposed += other.exposed;
+        self.outages += other.outages;
+        self.checked += other.checked;
+        self.lies += other.lies;
+        self.expelled += other.expelled;
+        self.replaced += other.replaced;
+        self.confirmed += other.confirmed;
+        self.remembered += other.remembered;
+        self.repaired += other.repaired;
+        self.pruned += other.pruned;
+        self.bad_deaths += other.bad_deaths;
+        self.pauses += other.pauses;
+        self.damaged += other.damaged;
+    }
+}

@@ -1,0 +1,68 @@
+//! A node that is not in order, and a coordinator that stops or stands still.
+
+use std::time::Duration;
+
+use osteon_coordinator::event::{Event, Hello};
+use osteon_coordinator::ids::WorkerId;
+
+use super::{Happening, Worker, World};
+use crate::fake;
+
+/// Numbers of processes of the bad node are above this one.
+const BAD_PROCESSES: u32 = 1_000_000;
+
+impl World {
+    /// Whether there is a bad node, and when the coordinator is told to stop or stands still.
+    pub(super) fn plan_faults(&mut self) {
+        if self.draw(4) == 0 {
+            self.within(500, Happening::ArriveBad);
+        }
+        if self.draw(3) == 0 {
+            self.within(3000, Happening::Drain);
+        }
+        for _ in 0..self.draw(4) {
+            self.within(3000, Happening::Pause);
+        }
+    }
+
+    /// The coordinator stands still for longer than silence may last. Whatever comes meanwhile it
+    /// finds when it goes on, after it has looked at the time. Some workers have given it up by
+    /// then, and attach again.
+    pub(super) fn pause(&mut self) {
+        self.counts.pauses += 1;
+        let until = self.now + self.config.expiry + Duration::from_millis(1 + self.draw(3000));
+        let later = self.agenda.split_off(&(until, 0));
+        for ((_, number), happening) in std::mem::replace(&mut self.agenda, later) {
+            let number = if matches!(happening, Happening::Tick) { 0 } else { number };
+            self.agenda.insert((until, number), happening);
+        }
+        self.now = until;
+        let workers: Vec<(WorkerId, u32)> =
+            self.workers.iter().map(|(id, worker)| (*id, worker.process)).collect();
+        for (worker, process) in workers {
+            let known = self.workers.get_mut(&worker).unwrap();
+            known.heard = until;
+            if !known.bad && !self.expelled.contains(&process) && self.draw(2) == 0 {
+                self.after(1, Happening::GiveUp(worker));
+            }
+        }
+    }
+
+    /// A worker gives up a coordinator that was silent, and looks for it again.
+    pub(super) fn give_up(&mut self, worker: WorkerId) {
+        if let Some(gone) = self.workers.remove(&worker) {
+            self.react(Event::StreamEnded { worker });
+            self.within(400, Happening::Return(gone.process));
+        }
+    }
+
+    /// A process on a node that is not in order.
+    pub(super) fn arrive_bad(&mut self) {
+        let number = self.number();
+        let (worker, process) = (WorkerId(number), BAD_PROCESSES + number as u32);
+        let hello = Hello { host: "bad".to_owned(), ..fake::hello(process) };
+        let known = Worker { process, bad: true, heard: self.now, ..Worker::default() };
+        self.workers.insert(worker, known);
+        self.react(Event::Hello { worker, hello });
+    }
+}
