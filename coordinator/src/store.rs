@@ -158,6 +158,18 @@ pub enum StoreError {
         /// Why.
         error: std::io::Error,
     },
+    /// The file cannot be made.
+    #[error(
+        "cannot make {}: {error}; give the coordinator's user write permission to its directory, or \
+         choose another directory",
+        path.display()
+    )]
+    Make {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
     /// Another process has it open.
     #[error(
         "{} is in use by {holder}; stop that one, or choose another directory",

@@ -27,7 +27,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let directory = arguments.store;
     if matches!(address, ListenAddress::Unix(_)) {
         // The socket may be meant to lie in the directory of the store.
-        fs::create_dir_all(&directory)
+        SqliteStore::make_directory(&directory)
             .with_context(|| format!("cannot create the directory {}", directory.display()))
             .map_err(Failure::Failed)?;
     }

@@ -1,8 +1,9 @@
 //! Opening the file: whose it is, on which kind of disk it lies, of which format it is. Nothing of
 //! a file that is refused is changed.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read as _, Write as _};
+use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -24,6 +25,12 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest text of a lock that is shown, bytes.
 const HOLDER_BYTES_MAX: u64 = 256;
 
+/// Mode of a new directory, and of a new file: measurements are nobody else's business.
+const DIRECTORY_MODE: u32 = 0o700;
+const FILE_MODE: u32 = 0o600;
+/// The bits of a mode that concern others than the owner.
+const OTHERS: u32 = 0o077;
+
 /// How changes are made safe against a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Journal {
@@ -35,10 +42,11 @@ pub(super) enum Journal {
 
 /// Opens the file in `directory`, making both if need be; the lock is held as long as the file.
 pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), StoreError> {
-    fs::create_dir_all(directory)
+    make_directory(directory)
         .map_err(|error| StoreError::Directory { path: directory.to_owned(), error })?;
     let path = directory.join(FILE);
     let lock = lock(directory, &path)?;
+    make_private(directory, &path).map_err(|error| StoreError::Make { path: path.clone(), error })?;
     let network = network_file_system(directory);
     let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
     if let Some(kind) = network {
@@ -49,6 +57,33 @@ pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), Stor
     }
     let connection = open_file(&path, journal)?;
     Ok((connection, lock, path))
+}
+
+/// Makes a directory that only this user can enter, and those on the way to it; one that is there
+/// stays as it is.
+pub(super) fn make_directory(directory: &Path) -> io::Result<()> {
+    DirBuilder::new().recursive(true).mode(DIRECTORY_MODE).create(directory)
+}
+
+/// Makes an empty file that only this user can read, to which SQLite gives its tables, and whose
+/// mode those beside it get; warns of one that is there and that others can reach.
+fn make_private(directory: &Path, path: &Path) -> io::Result<()> {
+    let made = OpenOptions::new().write(true).create_new(true).mode(FILE_MODE).open(path);
+    match made {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        made => return made.map(drop),
+    }
+    let open = |path: &Path| Ok::<bool, io::Error>(mode(path)? & OTHERS != 0);
+    if open(path)? && open(directory)? {
+        tracing::warn!(path = %path.display(),
+            "other users of this machine can read the store: to keep measurements and results from \
+             them, run `chmod 700` on its directory");
+    }
+    Ok(())
+}
+
+fn mode(path: &Path) -> io::Result<u32> {
+    Ok(fs::metadata(path)?.permissions().mode())
 }
 
 /// Opens the file, brings it up to date and sets its modes.

@@ -125,6 +125,28 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.expulsions().unwrap(), []);
 }
 
+#[test]
+fn other_users_cannot_read_what_is_made() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    let directory = tempfile::tempdir().unwrap();
+    let made = directory.path().join("on/the/way");
+    let mut store = SqliteStore::open(&made).unwrap();
+    store.put_job(&job(1)).unwrap();
+    for path in [&made, made.parent().unwrap()] {
+        assert_eq!(mode(path), 0o700, "{}", path.display());
+    }
+    for name in [FILE, "osteon.sqlite-wal"] {
+        assert_eq!(mode(&made.join(name)), 0o600, "{name}");
+    }
+    drop(store);
+    // What an operator has chosen stays.
+    fs::set_permissions(&made, fs::Permissions::from_mode(0o750)).unwrap();
+    fs::set_permissions(made.join(FILE), fs::Permissions::from_mode(0o640)).unwrap();
+    drop(SqliteStore::open(&made).unwrap());
+    assert_eq!((mode(&made), mode(&made.join(FILE))), (0o750, 0o640));
+}
+
 fn expulsion(number: u64) -> ExpulsionRecord {
     ExpulsionRecord {
         number,
