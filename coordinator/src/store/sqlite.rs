@@ -349,7 +349,8 @@ impl Store for SqliteStore {
     }
 
     fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        let sql = "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
+        let sql =
+            "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
                    ORDER BY number";
         let read = |row: &Row<'_>| {
             let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);

@@ -46,7 +46,8 @@ pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), Stor
         .map_err(|error| StoreError::Directory { path: directory.to_owned(), error })?;
     let path = directory.join(FILE);
     let lock = lock(directory, &path)?;
-    make_private(directory, &path).map_err(|error| StoreError::Make { path: path.clone(), error })?;
+    make_private(directory, &path)
+        .map_err(|error| StoreError::Make { path: path.clone(), error })?;
     let network = network_file_system(directory);
     let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
     if let Some(kind) = network {

@@ -46,7 +46,9 @@ fn evaluation(job: u64, number: u64) -> EvaluationRecord {
         estimated_error: (number != 1)
             .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
         workers: (0..number)
-            .map(|process| WorkerName::new("a node", u32::try_from(process).unwrap(), process << 62))
+            .map(|process| {
+                WorkerName::new("a node", u32::try_from(process).unwrap(), process << 62)
+            })
             .collect(),
     }
 }
