@@ -3,6 +3,7 @@
 use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
@@ -34,6 +35,7 @@ pub(crate) enum Bound {
 /// A connection whose handshake is over.
 #[derive(Debug)]
 pub(crate) struct Connection {
+    number: u64,
     io: Io,
     certificate: Certificate,
     /// Until the first byte has come: when to give up.
@@ -45,6 +47,8 @@ pub(crate) struct Connection {
 /// What is known of the peer of a call.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
+    /// Number of its connection, from 1.
+    pub(crate) connection: u64,
     /// What its certificate says.
     pub(crate) certificate: Certificate,
 }
@@ -147,8 +151,10 @@ async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> 
 
 impl Connection {
     fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
         let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
-        Self { io, certificate, patience, _place: place }
+        Self { number, io, certificate, patience, _place: place }
     }
 }
 
@@ -156,7 +162,7 @@ impl Connected for Connection {
     type ConnectInfo = Peer;
 
     fn connect_info(&self) -> Peer {
-        Peer { certificate: self.certificate }
+        Peer { connection: self.number, certificate: self.certificate }
     }
 }
 

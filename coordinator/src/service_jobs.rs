@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::Stream;
-use osteon_common::limits::{FETCHES_AT_ONCE_MAX, NAME_BYTES_MAX, PRIORITY_MAX};
+use osteon_common::limits::{
+    FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
+};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
@@ -16,7 +18,7 @@ use osteon_proto::v1::{
 };
 use osteon_proto::{realizations, results, specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
-use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot};
 use tonic::{Request, Response, Status};
 
 use crate::access_layer::Holder;
@@ -28,6 +30,7 @@ use crate::fetching;
 use crate::ids::JobId;
 use crate::leftover::{Leftover, ReadError};
 use crate::observers;
+use crate::places::{Caller, Places};
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
@@ -46,14 +49,14 @@ pub(crate) struct JobsService {
     messages: mpsc::Sender<Message>,
     store: mpsc::Sender<Command>,
     /// What jobs left may be large: a few at a time are held in memory.
-    fetches: Arc<Semaphore>,
+    fetches: Places,
 }
 
 type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        Self { messages, store, fetches: Arc::new(Semaphore::new(FETCHES_AT_ONCE_MAX)) }
+        Self { messages, store, fetches: Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX) }
     }
 
     /// Queues a message for the core; refused when it does not keep up.
@@ -183,8 +186,9 @@ impl Jobs for JobsService {
         &self,
         request: Request<FetchRequest>,
     ) -> Result<Response<Self::FetchStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let job = job(&request.into_inner().job)?;
-        let place = Arc::clone(&self.fetches).acquire_owned().await.map_err(|_| stopped())?;
+        let place = self.fetches.take(caller).await?;
         let leftover = self.leftover(job).await?;
         Ok(Response::new(Box::pin(fetching::paced(parts(leftover), place))))
     }
