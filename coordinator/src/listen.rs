@@ -160,7 +160,7 @@ impl Listener {
         }
         let refused = |source| BindError::Tcp { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
-        let url = format!("http://{}", listener.local_addr().map_err(refused)?);
+        let url = url(listener.local_addr().map_err(refused)?).await;
         Ok(Self::open(Bound::Tcp(listener), None, url))
     }
 
@@ -209,6 +209,19 @@ impl FromStr for ListenAddress {
         };
         numeric.parse().map(Self::Tcp).map_err(|_| unreadable())
     }
+}
+
+/// The URL of an address; of one that stands for every address of this machine, by the machine's
+/// name, if it is a name that is known.
+async fn url(local: SocketAddr) -> String {
+    if local.ip().is_unspecified() {
+        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let host = format!("{}:{}", name.trim(), local.port());
+        if !name.trim().is_empty() && tokio::net::lookup_host(&host).await.is_ok() {
+            return format!("http://{host}");
+        }
+    }
+    format!("http://{local}")
 }
 
 /// Removes the socket that a killed process left at `path`: one that nobody listens on any more,
@@ -276,6 +289,18 @@ mod tests {
         assert!(error.to_string().contains("--insecure"), "{error}");
         assert!(error.to_string().contains("--tls-cert"), "{error}");
         assert!(Listener::bind(&everywhere, true).await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn the_url_of_every_address_is_one_that_can_be_dialled() {
+        let listener = Listener::bind(&"0.0.0.0:0".parse().unwrap(), true).await.unwrap();
+        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+        let address = listener.url().strip_prefix("http://").unwrap().to_owned();
+        // A machine whose own name is not known keeps the address.
+        let host = address.rsplit_once(':').unwrap().0;
+        let known = tokio::net::lookup_host((name.trim(), 1)).await.is_ok();
+        assert_eq!(host, if known { name.trim() } else { "0.0.0.0" });
+        tokio::net::TcpStream::connect(&address).await.unwrap();
     }
 
     #[tokio::test]

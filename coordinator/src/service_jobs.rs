@@ -19,6 +19,7 @@ use osteon_proto::v1::{
 use osteon_proto::{realizations, results, specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
 use crate::access_layer::Holder;
@@ -39,6 +40,8 @@ const PAGE_JOBS_MAX: u32 = 1000;
 const HISTORY_BLOCK_ROWS: usize = 4096;
 /// A request that finds no place among those that wait for this long is refused.
 const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
+/// Who cancels a job that has not ended after this long is told what it waits for.
+const END_PATIENCE: Duration = Duration::from_secs(5);
 /// When what was refused for want of room may be tried again.
 const RETRY: Duration = Duration::from_secs(10);
 /// Realizations in one message.
@@ -84,6 +87,14 @@ impl JobsService {
             Answer::Snapshot(snapshot) => Ok(Some(snapshot)),
             _ => Err(unexpected()),
         }
+    }
+
+    /// Says what a cancelled job waits for, before its client has waited too long.
+    async fn not_ended_yet(&self, job: JobId) -> Result<Status, Status> {
+        let snapshot = self.snapshot(event::Request::Get(job)).await?;
+        let waiting_for = snapshot.unwrap_or_default().waiting_for;
+        let waits = if waiting_for.is_empty() { String::new() } else { format!(": {waiting_for}") };
+        Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
     async fn leftover(&self, job: JobId) -> Result<Leftover, Status> {
@@ -178,7 +189,11 @@ impl Jobs for JobsService {
         request: Request<CancelRequest>,
     ) -> Result<Response<CancelResponse>, Status> {
         let job = job(&request.into_inner().job)?;
-        let snapshot = self.snapshot(event::Request::Cancel(job)).await?;
+        let cancelled = self.snapshot(event::Request::Cancel(job));
+        let snapshot = match timeout(END_PATIENCE, cancelled).await {
+            Ok(snapshot) => snapshot?,
+            Err(_) => return Err(self.not_ended_yet(job).await?),
+        };
         Ok(Response::new(CancelResponse { snapshot }))
     }
 

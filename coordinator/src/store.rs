@@ -158,6 +158,14 @@ pub enum StoreError {
         /// Why.
         error: std::io::Error,
     },
+    /// There is no room for a new file.
+    #[error("no room is left for {}: {error}; make room on its disk", path.display())]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
     /// The file cannot be made.
     #[error(
         "cannot make {}: {error}; give the coordinator's user write permission to its directory, or \

@@ -47,7 +47,7 @@ pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), Stor
     let path = directory.join(FILE);
     let lock = lock(directory, &path)?;
     make_private(directory, &path)
-        .map_err(|error| StoreError::Make { path: path.clone(), error })?;
+        .map_err(|error| unmade(&path, error, |path, error| StoreError::Make { path, error }))?;
     let network = network_file_system(directory);
     let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
     if let Some(kind) = network {
@@ -81,6 +81,21 @@ fn make_private(directory: &Path, path: &Path) -> io::Result<()> {
              them, run `chmod 700` on its directory");
     }
     Ok(())
+}
+
+/// Why there is no file: for want of room, or `otherwise`.
+fn unmade(
+    path: &Path,
+    error: io::Error,
+    otherwise: impl FnOnce(PathBuf, io::Error) -> StoreError,
+) -> StoreError {
+    let path = path.to_owned();
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            StoreError::NoRoom { path, error }
+        }
+        _ => otherwise(path, error),
+    }
 }
 
 fn mode(path: &Path) -> io::Result<u32> {
@@ -161,7 +176,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
 /// Takes the store for this process and writes there who that is.
 fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     let path = directory.join(LOCK);
-    let failed = |error| StoreError::Lock { path: path.clone(), error };
+    let failed = |error| unmade(&path, error, |path, error| StoreError::Lock { path, error });
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     let mut file = options.open(&path).map_err(failed)?;
@@ -271,6 +286,20 @@ mod tests {
             // Who prints the chain adds nothing.
             assert!(refusal.source().is_none(), "{refusal:?}");
         }
+    }
+
+    #[test]
+    fn a_full_disk_is_no_matter_of_permissions() {
+        let told = |kind: io::ErrorKind| {
+            let path = Path::new("osteon.sqlite");
+            unmade(path, io::Error::from(kind), |path, error| StoreError::Make { path, error })
+        };
+        for full in [io::ErrorKind::StorageFull, io::ErrorKind::QuotaExceeded] {
+            let told = told(full).to_string();
+            assert!(told.contains("make room") && !told.contains("permission"), "{told}");
+        }
+        let denied = told(io::ErrorKind::PermissionDenied).to_string();
+        assert!(denied.contains("give the coordinator's user write permission"), "{denied}");
     }
 
     #[test]
