@@ -8,22 +8,25 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use futures::{Stream, stream};
-use osteon_common::limits::{CONNECTIONS_MAX, HANDSHAKES_MAX};
+use osteon_common::limits::HANDSHAKES_MAX;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::JoinSet;
-use tokio::time::{Sleep, sleep, timeout};
+use tokio::time::{Instant, Sleep, sleep, timeout};
 use tokio_rustls::server::TlsStream;
 use tonic::transport::server::Connected;
 
 use crate::access::Certificate;
+use crate::open_files;
 use crate::tls::Tls;
 
 /// A peer must complete its handshake, and then send its first bytes, within this time each.
 pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Wait after the operating system gave no connection, e.g. because too many files are open.
 const REFUSED_WAIT: Duration = Duration::from_millis(100);
+/// Shortest time between two lines about that.
+const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A bound socket.
 #[derive(Debug)]
@@ -40,7 +43,7 @@ pub(crate) struct Connection {
     certificate: Certificate,
     /// Until the first byte has come: when to give up.
     patience: Option<Pin<Box<Sleep>>>,
-    /// One of [`CONNECTIONS_MAX`].
+    /// One of [`open_files::connections_max`].
     _place: OwnedSemaphorePermit,
 }
 
@@ -69,8 +72,9 @@ pub(crate) fn connections(
     let acceptor = Acceptor {
         bound,
         tls,
-        places: Arc::new(Semaphore::new(CONNECTIONS_MAX)),
+        places: Arc::new(Semaphore::new(open_files::connections_max())),
         handshakes: JoinSet::new(),
+        complaint: None,
     };
     stream::unfold(acceptor, |mut acceptor| async {
         let connection = acceptor.next().await;
@@ -83,6 +87,8 @@ struct Acceptor {
     tls: Option<Tls>,
     places: Arc<Semaphore>,
     handshakes: JoinSet<Option<Connection>>,
+    /// When it was last said that the operating system gives no connection.
+    complaint: Option<Instant>,
 }
 
 impl Acceptor {
@@ -100,7 +106,7 @@ impl Acceptor {
                     let (io, place) = match accepted {
                         Ok(accepted) => accepted,
                         Err(error) => {
-                            tracing::warn!(%error, "cannot accept a connection");
+                            self.complain(&error);
                             sleep(REFUSED_WAIT).await;
                             continue;
                         }
@@ -113,6 +119,16 @@ impl Acceptor {
                     }
                 }
             }
+        }
+    }
+}
+
+impl Acceptor {
+    /// Says now and then that there is no connection.
+    fn complain(&mut self, error: &io::Error) {
+        if self.complaint.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
+            self.complaint = Some(Instant::now());
+            tracing::warn!(%error, "cannot accept connections; said at most once a minute");
         }
     }
 }

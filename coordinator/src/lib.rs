@@ -25,6 +25,7 @@ pub mod leftover;
 pub mod listen;
 mod message_body;
 mod observers;
+pub mod open_files;
 mod places;
 mod rate;
 pub mod reactor;
