@@ -149,6 +149,23 @@ fn other_users_cannot_read_what_is_made() {
     assert_eq!((mode(&made), mode(&made.join(FILE))), (0o750, 0o640));
 }
 
+#[test]
+fn a_store_that_is_closed_is_one_file_and_a_copy_of_it_is_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let (there, copy) = (directory.path().join("there"), directory.path().join("copy"));
+    let mut store = SqliteStore::open(&there).unwrap();
+    store.put_job(&job(1)).unwrap();
+    store.put_evaluation(&evaluation(1, 0), false).unwrap();
+    assert!(there.join("osteon.sqlite-wal").exists());
+    drop(store);
+    assert!(!there.join("osteon.sqlite-wal").exists());
+    fs::create_dir(&copy).unwrap();
+    fs::copy(there.join(FILE), copy.join(FILE)).unwrap();
+    let mut copied = SqliteStore::open(&copy).unwrap();
+    assert_eq!(copied.job(JobId(1)).unwrap(), Some(job(1)));
+    assert_eq!(evaluations(&mut copied, 1).unwrap(), [evaluation(1, 0)]);
+}
+
 fn expulsion(number: u64) -> ExpulsionRecord {
     ExpulsionRecord {
         number,
