@@ -233,6 +233,17 @@ pub enum StoreError {
         /// What SQLite said.
         error: rusqlite::Error,
     },
+    /// Its pages do not fit together.
+    #[error(
+        "{} is damaged: {found}; restore the file from a copy, or choose another directory",
+        path.display()
+    )]
+    Inconsistent {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite found first.
+        found: String,
+    },
     /// Another program's tables are in it.
     #[error(
         "{} is a database of another program and is left as it is; choose another directory",

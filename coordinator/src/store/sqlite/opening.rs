@@ -110,6 +110,7 @@ pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, Sto
     // Before all else: then the write-ahead log needs no memory shared with others.
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
     check_format(&connection, path)?;
+    check_pages(&connection, path)?;
     prepare(&mut connection, journal).map_err(refused)?;
     Ok(connection)
 }
@@ -139,6 +140,20 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     } else {
         Ok(())
     }
+}
+
+/// Refuses a file whose pages do not fit together. Checksums find only what is read, and some
+/// records are read much later. This reads the file once.
+fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
+    let found: String = connection
+        .query_row("PRAGMA quick_check(1)", [], |row| row.get(0))
+        .map_err(|source| refusal(path, source))?;
+    if found == "ok" {
+        return Ok(());
+    }
+    // A heading may stand before what it found.
+    let found = found.lines().last().unwrap_or_default().to_owned();
+    Err(StoreError::Inconsistent { path: path.to_owned(), found })
 }
 
 /// Sets the modes, makes the tables of a new file, and brings those of an old one up to date.

@@ -166,6 +166,35 @@ fn a_store_that_is_closed_is_one_file_and_a_copy_of_it_is_whole() {
     assert_eq!(evaluations(&mut copied, 1).unwrap(), [evaluation(1, 0)]);
 }
 
+#[test]
+fn pages_that_do_not_fit_together_are_found_at_the_start() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for number in 0..9 {
+        store.put_job(&job(number)).unwrap();
+    }
+    drop(store);
+    let path = directory.path().join(FILE);
+    let whole = fs::read(&path).unwrap();
+    let page = usize::from(u16::from_be_bytes([whole[16], whole[17]]));
+    let pages = whole.len() / page;
+    for damaged in 2..=pages {
+        let mut bytes = whole.clone();
+        let first = (damaged - 1) * page;
+        bytes[first..first + 64].fill(0xff);
+        fs::write(&path, &bytes).unwrap();
+        let error = SqliteStore::open(directory.path()).unwrap_err();
+        assert!(
+            matches!(error, StoreError::Inconsistent { .. } | StoreError::Corrupt { .. }),
+            "page {damaged} of {pages}: {error}"
+        );
+        assert!(error.to_string().contains("choose another directory"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), bytes, "page {damaged}");
+    }
+    fs::write(&path, &whole).unwrap();
+    assert_eq!(SqliteStore::open(directory.path()).unwrap().jobs().unwrap().len(), 9);
+}
+
 fn expulsion(number: u64) -> ExpulsionRecord {
     ExpulsionRecord {
         number,
