@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::limits::{NAME_BYTES_MAX, REALIZATIONS_MAX};
+use osteon_common::limits::REALIZATIONS_MAX;
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
 use osteon_common::violations::Violations;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
@@ -17,6 +17,8 @@ use osteon_proto::{realizations, results, specification, status};
 use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::{Code, Response, Status};
+
+use crate::request::Request;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
@@ -69,6 +71,17 @@ pub(crate) enum ClientError {
         /// What it says.
         reason: String,
     },
+    /// Whether it has accepted a job is not known.
+    #[error(
+        "{cause}; the job may be accepted all the same: `osteon submit` of the same job with \
+         --request-id {request_id} prints its id and makes no second one"
+    )]
+    Uncertain {
+        /// What became of the last attempt.
+        cause: Box<ClientError>,
+        /// The request.
+        request_id: String,
+    },
     /// It sent what cannot be read.
     #[error("the coordinator at {endpoint} answers what cannot be read: {source}")]
     Malformed {
@@ -90,17 +103,6 @@ impl ClientError {
             _ => false,
         }
     }
-}
-
-/// Who this is for the sharing of workers between users: user and host.
-fn user() -> String {
-    let user = ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let mut name = format!("{}@{}", user.unwrap_or_default(), host.trim());
-    while name.len() > NAME_BYTES_MAX {
-        name.pop();
-    }
-    name
 }
 
 fn indented(violations: &Violations) -> String {
@@ -159,21 +161,40 @@ impl Client {
         }
     }
 
-    /// Submits a job; its id.
+    /// Submits a job; its id. While it is not known whether the coordinator has it, the same
+    /// request is sent again, in all no longer than a client waits.
     pub(crate) async fn submit(
         &mut self,
         specification: &JobSpecification,
-        request_id: &str,
+        request: &Request,
         priority: u32,
     ) -> Result<String, ClientError> {
-        let request = v1::SubmitRequest {
+        let message = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
-            request_id: request_id.to_owned(),
-            client: user(),
+            request_id: request.id.clone(),
+            client: request.client.clone(),
             priority,
         };
-        let call = self.jobs.submit(request);
-        Ok(answered(&self.endpoint, call).await?.job)
+        let (begun, mut uncertain) = (Instant::now(), false);
+        loop {
+            let left = answer_limit().saturating_sub(begun.elapsed());
+            let call = self.jobs.submit(message.clone());
+            let error = match answered_within(&self.endpoint, left, call).await {
+                Ok(response) => return Ok(response.job),
+                Err(error) => error,
+            };
+            let lost = matches!(error, ClientError::Lost { .. });
+            uncertain |= lost || matches!(error, ClientError::Unanswered { .. });
+            if !uncertain {
+                return Err(error);
+            }
+            let pause = Duration::from_millis(RETRY_MS);
+            if !lost || begun.elapsed() + pause >= answer_limit() {
+                let (cause, request_id) = (Box::new(error), request.id.clone());
+                return Err(ClientError::Uncertain { cause, request_id });
+            }
+            sleep(pause).await;
+        }
     }
 
     /// All jobs, oldest first.
@@ -324,7 +345,15 @@ async fn answered<T>(
     endpoint: &Endpoint,
     call: impl Future<Output = Result<Response<T>, Status>>,
 ) -> Result<T, ClientError> {
-    match timeout(answer_limit(), call).await {
+    answered_within(endpoint, answer_limit(), call).await
+}
+
+async fn answered_within<T>(
+    endpoint: &Endpoint,
+    limit: Duration,
+    call: impl Future<Output = Result<Response<T>, Status>>,
+) -> Result<T, ClientError> {
+    match timeout(limit, call).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(refused(endpoint, &status)),
         Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),
@@ -410,45 +439,4 @@ impl Parts {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::*;
-
-    #[test]
-    fn an_answer_is_told_from_a_loss() {
-        let endpoint: Endpoint = "unix:a".parse().unwrap();
-        let shown = |status: &Status| refused(&endpoint, status).to_string();
-        let answered = Status::unavailable("the store is full");
-        assert_eq!(
-            shown(&answered),
-            "the coordinator at unix:a cannot do it now: the store is full"
-        );
-        for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
-            broken.set_source(Arc::new(std::io::Error::other("reset")));
-            assert_eq!(shown(&broken), "lost the coordinator at unix:a: reset");
-        }
-        let refusal = shown(&Status::already_exists("taken"));
-        assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
-        let directory = tempfile::tempdir().unwrap();
-        let socket = directory.path().join("socket");
-        let endpoint = Endpoint::Unix(socket.clone());
-        let remote = Remote { endpoint, files: CredentialFiles::default() };
-        let begun = Instant::now();
-        let error = Client::connect(&remote).await.unwrap_err().to_string();
-        assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
-        let waited = begun.elapsed();
-        assert!(waited > answer_limit() * 9 / 10 && waited <= answer_limit(), "{waited:?}");
-
-        let comes = async {
-            sleep(answer_limit() / 2).await;
-            tokio::net::UnixListener::bind(&socket).unwrap()
-        };
-        let (_listener, connected) = tokio::join!(comes, Client::connect(&remote));
-        connected.unwrap();
-    }
-}
+mod tests;

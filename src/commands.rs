@@ -27,9 +27,8 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Worker { config, files } => worker::serve(config, &files).await,
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
-        Resolved::Submit { job, kind, request_id, priority, coordinator, format } => {
-            let submission =
-                jobs::Submission { job: &job, kind, request_id: &request_id, priority };
+        Resolved::Submit { job, kind, request, priority, coordinator, format } => {
+            let submission = jobs::Submission { job: &job, kind, request: &request, priority };
             jobs::submit(submission, &coordinator, format).await
         }
         Resolved::Prune { older_than, keep_last, coordinator, format } => {

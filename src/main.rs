@@ -16,6 +16,7 @@ mod instruction_set;
 mod new_files;
 mod output;
 mod progress;
+mod request;
 mod resolved;
 mod results_directory;
 mod signals;

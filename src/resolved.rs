@@ -19,6 +19,7 @@ use crate::arguments::{
 use crate::client::Remote;
 use crate::ending::Failure;
 use crate::instruction_set;
+use crate::request::Request;
 
 /// Worker processes of a run on this machine, unless given.
 const WORKERS_DEFAULT: u32 = 2;
@@ -75,8 +76,8 @@ pub(crate) enum Resolved {
         job: PathBuf,
         /// What the job does.
         kind: JobKind,
-        /// Empty: a new job.
-        request_id: String,
+        /// The request that stands for it.
+        request: Request,
         /// Rank among the user's own jobs.
         priority: u32,
         /// Where to.
@@ -323,7 +324,7 @@ fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Resolved {
     Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
-        request_id: request_id.unwrap_or_default(),
+        request: request_id.map_or_else(Request::new, Request::with_id),
         priority,
         coordinator,
         format: format(json),

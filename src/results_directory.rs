@@ -18,6 +18,7 @@ use osteon_common::{job_file, results_csv, results_json};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
+use crate::request::Request;
 use crate::verdict;
 
 const JOB: &str = "job.toml";
@@ -120,20 +121,24 @@ impl ResultsDirectory {
         self.path.join(STORE)
     }
 
-    /// The request that stands for this directory, the same one at every call.
-    pub(crate) fn request_id(&self) -> Result<String, Failure> {
+    /// The request that stands for this directory, the same one at every call, on whatever host.
+    pub(crate) fn request(&self) -> Result<Request, Failure> {
         let path = self.path.join(REQUEST);
-        if let Some(id) = read_if_there(&path).map_err(Failure::Failed)?
-            && !id.trim().is_empty()
-        {
-            return Ok(id.trim().to_owned());
+        let stored = read_if_there(&path).map_err(Failure::Failed)?.unwrap_or_default();
+        let mut lines = stored.lines().map(str::trim);
+        if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
+            let request = Request::with_id(id.to_owned());
+            // An older version wrote no client.
+            let client = lines.next().map_or(request.client, str::to_owned);
+            return Ok(Request { client, ..request });
         }
-        let id = random_id();
-        write(&path, &format!("{id}\n")).map_err(Failure::Failed)?;
-        Ok(id)
+        let request = Request::new();
+        let text = format!("{}\n{}\n", request.id, request.client);
+        write(&path, &text).map_err(Failure::Failed)?;
+        Ok(request)
     }
 
-    /// Makes the next [`request_id`](Self::request_id) a new one: the job of the present one has
+    /// Makes the next [`request`](Self::request) a new one: the job of the present one has
     /// nothing more to give.
     pub(crate) fn forget_request(&self) {
         // A leftover does no harm but to show the same end again.
@@ -278,12 +283,5 @@ fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
 }
 
 /// 128 random bits in hexadecimal.
-fn random_id() -> String {
-    use std::hash::{BuildHasher as _, RandomState};
-    let process = std::process::id();
-    let half = |salt: u8| RandomState::new().hash_one((process, salt));
-    format!("{:016x}{:016x}", half(0), half(1))
-}
-
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,21 @@
 //! The wish of a user, or of the system, that the program ends.
 
+use std::time::Duration;
+
 use tokio::signal::unix::{SignalKind, signal};
 
 use crate::ending::Failure;
+use crate::progress::say;
+
+/// Signals that come so soon after the first are one with it: some programs send it to a process
+/// and to its group.
+const ONE_WISH: Duration = Duration::from_millis(300);
 
 /// Completes at the first SIGINT or SIGTERM after the call; these signals no longer end the process
 /// by themselves from then on. SIGHUP is left alone, so that `nohup` keeps its meaning.
+///
+/// Who then presses Ctrl-C again does not want to wait for an orderly end: the process exits, with
+/// code 1.
 ///
 /// # Errors
 /// When the system does not let signals be handled.
@@ -22,5 +32,18 @@ pub(crate) fn interruption() -> Result<impl Future<Output = ()>, Failure> {
             _ = interrupt.recv() => {}
             _ = terminate.recv() => {}
         }
+        tokio::spawn(exit_at_the_next());
     })
+}
+
+/// Ends the process at the next SIGINT.
+async fn exit_at_the_next() {
+    tokio::time::sleep(ONE_WISH).await;
+    // Hears only what comes from now on.
+    if let Ok(mut interrupt) = signal(SignalKind::interrupt())
+        && interrupt.recv().await.is_some()
+    {
+        say("osteon: interrupted again, ends at once");
+        std::process::exit(1);
+    }
 }

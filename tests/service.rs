@@ -255,6 +255,27 @@ fn services_end_cleanly_when_told_to() {
 }
 
 #[test]
+fn who_interrupts_twice_does_not_wait() {
+    let scratch = Scratch::new();
+    // A batch that takes long.
+    let method = "[solver]\nmethod = \"hybrid\"\nrefinement = 16.0\nelement_order = 12\n";
+    let file = scratch.write("job.toml", &format!("{}{method}", job(1, 1)));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let mut worker = coordinator.worker(1);
+    let id = coordinator.submit(&file);
+    eventually("the worker computes", || coordinator.job(&id)["workers"] == 1);
+    // Once would let it finish its batch and end with 0.
+    let mut code = None;
+    eventually("the worker ends", || {
+        worker.signal("INT");
+        code = worker.ended();
+        code.is_some()
+    });
+    assert_eq!(code, Some(1));
+    assert_eq!(coordinator.job(&id)["realizations_done"], 0);
+}
+
+#[test]
 fn workers_wait_for_their_coordinator_and_find_it_again() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(300, 20));

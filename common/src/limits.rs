@@ -58,14 +58,24 @@ pub const TOKENS_MAX: usize = 10_000;
 pub const CONNECTIONS_MAX: usize = 3 * WORKERS_MAX;
 /// Most TLS handshakes that a coordinator has under way.
 pub const HANDSHAKES_MAX: usize = 256;
-/// Most submissions whose messages a coordinator reads at a time; others wait.
+/// Longest message of a submission that is read whatever else is read, bytes.
+pub const SMALL_SUBMISSION_BYTES_MAX: u64 = 64 << 10;
+/// Most larger submissions whose messages a coordinator reads at a time; others wait.
 pub const SUBMISSIONS_AT_ONCE_MAX: usize = 16;
+/// Most of them that are of one caller.
+pub const SUBMISSIONS_OF_ONE_MAX: usize = 4;
+/// Longest time that such a message takes, s.
+pub const SUBMISSION_S_MAX: u64 = 10;
 /// Longest time from a call to the beginning of its answer, s.
 pub const CALL_S_MAX: u64 = 60;
 /// Longest list of headers of a call, bytes.
 pub const HEADER_BYTES_MAX: u32 = 16 << 10;
 /// Most fetches that a coordinator holds results for at a time; others wait.
 pub const FETCHES_AT_ONCE_MAX: usize = 8;
+/// Most of them that are of one caller.
+pub const FETCHES_OF_ONE_MAX: usize = 2;
+/// Longest time that a fetch takes, s.
+pub const FETCH_S_MAX: u64 = 300;
 /// A fetch ends when its reader takes nothing for this long, s.
 pub const READER_PATIENCE_S: u64 = 30;
 /// Highest priority of a job among those of its client.

@@ -3,26 +3,30 @@
 use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use futures::{Stream, stream};
-use osteon_common::limits::{CONNECTIONS_MAX, HANDSHAKES_MAX};
+use osteon_common::limits::HANDSHAKES_MAX;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::JoinSet;
-use tokio::time::{Sleep, sleep, timeout};
+use tokio::time::{Instant, Sleep, sleep, timeout};
 use tokio_rustls::server::TlsStream;
 use tonic::transport::server::Connected;
 
 use crate::access::Certificate;
+use crate::open_files;
 use crate::tls::Tls;
 
 /// A peer must complete its handshake, and then send its first bytes, within this time each.
 pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Wait after the operating system gave no connection, e.g. because too many files are open.
 const REFUSED_WAIT: Duration = Duration::from_millis(100);
+/// Shortest time between two lines about that.
+const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A bound socket.
 #[derive(Debug)]
@@ -34,17 +38,20 @@ pub(crate) enum Bound {
 /// A connection whose handshake is over.
 #[derive(Debug)]
 pub(crate) struct Connection {
+    number: u64,
     io: Io,
     certificate: Certificate,
     /// Until the first byte has come: when to give up.
     patience: Option<Pin<Box<Sleep>>>,
-    /// One of [`CONNECTIONS_MAX`].
+    /// One of [`open_files::connections_max`].
     _place: OwnedSemaphorePermit,
 }
 
 /// What is known of the peer of a call.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
+    /// Number of its connection, from 1.
+    pub(crate) connection: u64,
     /// What its certificate says.
     pub(crate) certificate: Certificate,
 }
@@ -65,8 +72,9 @@ pub(crate) fn connections(
     let acceptor = Acceptor {
         bound,
         tls,
-        places: Arc::new(Semaphore::new(CONNECTIONS_MAX)),
+        places: Arc::new(Semaphore::new(open_files::connections_max())),
         handshakes: JoinSet::new(),
+        complaint: None,
     };
     stream::unfold(acceptor, |mut acceptor| async {
         let connection = acceptor.next().await;
@@ -79,6 +87,8 @@ struct Acceptor {
     tls: Option<Tls>,
     places: Arc<Semaphore>,
     handshakes: JoinSet<Option<Connection>>,
+    /// When it was last said that the operating system gives no connection.
+    complaint: Option<Instant>,
 }
 
 impl Acceptor {
@@ -96,7 +106,7 @@ impl Acceptor {
                     let (io, place) = match accepted {
                         Ok(accepted) => accepted,
                         Err(error) => {
-                            tracing::warn!(%error, "cannot accept a connection");
+                            self.complain(&error);
                             sleep(REFUSED_WAIT).await;
                             continue;
                         }
@@ -109,6 +119,16 @@ impl Acceptor {
                     }
                 }
             }
+        }
+    }
+}
+
+impl Acceptor {
+    /// Says now and then that there is no connection.
+    fn complain(&mut self, error: &io::Error) {
+        if self.complaint.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
+            self.complaint = Some(Instant::now());
+            tracing::warn!(%error, "cannot accept connections; said at most once a minute");
         }
     }
 }
@@ -147,8 +167,10 @@ async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> 
 
 impl Connection {
     fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
         let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
-        Self { io, certificate, patience, _place: place }
+        Self { number, io, certificate, patience, _place: place }
     }
 }
 
@@ -156,7 +178,7 @@ impl Connected for Connection {
     type ConnectInfo = Peer;
 
     fn connect_info(&self) -> Peer {
-        Peer { certificate: self.certificate }
+        Peer { connection: self.number, certificate: self.certificate }
     }
 }
 

@@ -3,9 +3,11 @@
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
+use std::time::Duration;
 
-use osteon_common::limits::SUBMISSIONS_AT_ONCE_MAX;
-use tokio::sync::Semaphore;
+use osteon_common::limits::{
+    SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_S_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX,
+};
 use tonic::body::Body;
 use tonic::codegen::{Service, http};
 use tonic::{Code, Status};
@@ -13,6 +15,8 @@ use tower::Layer;
 
 use crate::accept::Peer;
 use crate::access::{self, Certificate, Denied, Need, Policy};
+use crate::message_body::MessageBody;
+use crate::places::{Caller, Places};
 use crate::tokens::Role;
 
 /// The name that a token is registered for, in the extensions of a call.
@@ -26,7 +30,7 @@ const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
 #[derive(Debug, Clone)]
 pub(crate) struct AccessLayer {
     policy: Arc<Policy>,
-    submissions: Arc<Semaphore>,
+    submissions: Places,
 }
 
 /// A service that only those may call whom the policy lets in.
@@ -38,7 +42,7 @@ pub(crate) struct Door<S> {
 
 impl AccessLayer {
     pub(crate) fn new(policy: Policy) -> Self {
-        let submissions = Arc::new(Semaphore::new(SUBMISSIONS_AT_ONCE_MAX));
+        let submissions = Places::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
         Self { policy: Arc::new(policy), submissions }
     }
 
@@ -103,12 +107,23 @@ where
         // The service that is ready is this one; its clone may not be.
         let fresh = self.inner.clone();
         let mut inner = std::mem::replace(&mut self.inner, fresh);
-        let submissions = Arc::clone(&self.layer.submissions);
+        let submissions = self.layer.submissions.clone();
         Box::pin(async move {
-            // Large messages are held in memory a few at a time; the others wait their turn, no
-            // longer than a call may take. The semaphore is never closed.
-            let _turn = submissions.acquire_owned().await;
-            inner.call(request).await
+            let (head, body) = request.into_parts();
+            let message = match MessageBody::begin(body).await {
+                Ok(message) => message,
+                Err(status) => return Ok(status.into_http()),
+            };
+            if message.length() <= SMALL_SUBMISSION_BYTES_MAX {
+                return inner.call(http::Request::from_parts(head, Body::new(message))).await;
+            }
+            // Large messages are held in memory a few at a time, and not for long.
+            let _place = match submissions.take(Caller::of(&head.extensions)).await {
+                Ok(place) => place,
+                Err(status) => return Ok(status.into_http()),
+            };
+            let message = message.within(Duration::from_secs(SUBMISSION_S_MAX));
+            inner.call(http::Request::from_parts(head, Body::new(message))).await
         })
     }
 }

@@ -223,8 +223,9 @@ pub enum Refusal {
 pub enum CloseReason {
     /// Its numerics differ from the coordinator's.
     #[error(
-        "this worker's numerics are `{worker}`, the coordinator's are `{coordinator}`; \
-         results would not be reproducible: run the same version of osteon on both"
+        "this worker's numerics are `{}`, the coordinator's are `{coordinator}`; \
+         results would not be reproducible: run the same version of osteon on both",
+        worker.escape_debug()
     )]
     FingerprintDiffers {
         /// Fingerprint of the worker.

@@ -5,31 +5,33 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
-use osteon_common::limits::READER_PATIENCE_S;
+use osteon_common::limits::{FETCH_S_MAX, READER_PATIENCE_S};
 use osteon_proto::v1::FetchResponse;
 use osteon_proto::v1::fetch_response::Part;
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
-use tokio::time::timeout;
+use tokio::sync::mpsc;
+use tokio::time::{Instant, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 /// Messages that are made before they are read.
 const AHEAD: usize = 2;
 
-/// The parts as a stream. Whoever takes nothing for a while gets nothing more, so that what the
-/// job left, and its `place` among the fetches, are not held for ever.
+/// The parts as a stream. Whoever takes nothing for a while, or takes too long for all, gets nothing
+/// more, so that what the job left, and its `place` among the fetches, are not held for ever.
 pub(crate) fn paced(
     parts: impl Iterator<Item = Part> + Send + 'static,
-    place: OwnedSemaphorePermit,
+    place: impl Send + 'static,
 ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send {
     let (sender, sent) = mpsc::channel(AHEAD);
     let too_slow = Arc::new(AtomicBool::new(false));
     let told = Arc::clone(&too_slow);
     tokio::spawn(async move {
         let _place = place;
+        let until = Instant::now() + Duration::from_secs(FETCH_S_MAX);
         for part in parts {
+            let patience = patience().min(until.saturating_duration_since(Instant::now()));
             let message = Ok(FetchResponse { part: Some(part) });
-            match timeout(patience(), sender.send(message)).await {
+            match timeout(patience, sender.send(message)).await {
                 Ok(Ok(())) => {}
                 // The reader is gone.
                 Ok(Err(_)) => return,
@@ -51,21 +53,22 @@ fn patience() -> Duration {
 
 fn too_late() -> Status {
     Status::deadline_exceeded(format!(
-        "nothing of the results was read for {READER_PATIENCE_S} s; fetch them again"
+        "nothing of the results was read for {READER_PATIENCE_S} s, or not all within {FETCH_S_MAX} s; \
+         fetch them again"
     ))
 }
 
 #[cfg(test)]
 mod tests {
     use osteon_proto::v1::HistoryBlock;
-    use tokio::sync::Semaphore;
+    use tokio::sync::{OwnedSemaphorePermit, Semaphore};
     use tokio::time::sleep;
     use tonic::Code;
 
     use super::*;
 
-    fn parts() -> impl Iterator<Item = Part> + Send {
-        (0..10).map(|_| Part::History(HistoryBlock::default()))
+    fn parts(count: usize) -> impl Iterator<Item = Part> + Send {
+        (0..count).map(|_| Part::History(HistoryBlock::default()))
     }
 
     async fn place(places: &Arc<Semaphore>) -> OwnedSemaphorePermit {
@@ -75,7 +78,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_steady_reader_gets_everything() {
         let places = Arc::new(Semaphore::new(1));
-        let mut stream = Box::pin(paced(parts(), place(&places).await));
+        let mut stream = Box::pin(paced(parts(10), place(&places).await));
         let mut count = 0;
         while let Some(part) = stream.next().await {
             part.unwrap();
@@ -89,7 +92,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn who_does_not_read_gives_the_place_back_and_is_told() {
         let places = Arc::new(Semaphore::new(1));
-        let stream = paced(parts(), place(&places).await);
+        let stream = paced(parts(10), place(&places).await);
         // Comes only when the first one has lost its place.
         drop(place(&places).await);
         let read: Vec<_> = stream.collect().await;
@@ -99,9 +102,22 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
+    async fn who_reads_a_little_now_and_then_does_not_hold_the_place_for_ever() {
+        let places = Arc::new(Semaphore::new(1));
+        let mut stream = Box::pin(paced(parts(100), place(&places).await));
+        let begun = Instant::now();
+        while let Some(Ok(_)) = stream.next().await {
+            sleep(patience() * 9 / 10).await;
+        }
+        let held = begun.elapsed();
+        assert!(held < Duration::from_secs(FETCH_S_MAX) + 4 * patience(), "{held:?}");
+        drop(place(&places).await);
+    }
+
+    #[tokio::test(start_paused = true)]
     async fn who_goes_gives_the_place_back_at_once() {
         let places = Arc::new(Semaphore::new(1));
-        drop(paced(parts(), place(&places).await));
+        drop(paced(parts(10), place(&places).await));
         let back = timeout(patience() / 2, place(&places)).await;
         assert!(back.is_ok());
     }

@@ -5,8 +5,10 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::SystemTime;
 
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
@@ -72,6 +74,15 @@ pub enum BindError {
         /// The path.
         path: PathBuf,
     },
+    /// Something that is no socket is there.
+    #[error(
+        "{} is there already, is no socket, and is left as it is; choose another path",
+        path.display()
+    )]
+    NotASocket {
+        /// The path.
+        path: PathBuf,
+    },
 }
 
 /// A bound address, ready to be served by [`crate::start`].
@@ -85,9 +96,15 @@ pub struct Listener {
     url: String,
 }
 
-/// The file of a Unix socket; removed with the last that needs it.
+/// The file of a Unix socket; removed with the last that needs it, unless another one is there.
 #[derive(Debug)]
-pub(crate) struct SocketFile(PathBuf);
+pub(crate) struct SocketFile {
+    path: PathBuf,
+    identity: FileIdentity,
+}
+
+/// Device, inode and, since inodes are used again, the time when the file was made.
+type FileIdentity = (u64, u64, Option<SystemTime>);
 
 impl Listener {
     /// Binds an address. `insecure` allows one that other machines can reach.
@@ -143,7 +160,7 @@ impl Listener {
         }
         let refused = |source| BindError::Tcp { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
-        let url = format!("http://{}", listener.local_addr().map_err(refused)?);
+        let url = url(listener.local_addr().map_err(refused)?).await;
         Ok(Self::open(Bound::Tcp(listener), None, url))
     }
 
@@ -151,16 +168,15 @@ impl Listener {
         let refused = |source| BindError::Unix { path: path.to_owned(), source };
         let listener = match UnixListener::bind(path) {
             Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
-                if UnixStream::connect(path).await.is_ok() {
-                    return Err(BindError::InUse { path: path.to_owned() });
-                }
-                std::fs::remove_file(path).map_err(refused)?;
+                remove_dead(path).await?;
                 UnixListener::bind(path).map_err(refused)?
             }
             bound => bound.map_err(refused)?,
         };
+        let identity = identity(path).map_err(refused)?;
+        let file = SocketFile { path: path.to_owned(), identity };
         let url = format!("unix:{}", path.display());
-        Ok(Self::open(Bound::Unix(listener), Some(SocketFile(path.to_owned())), url))
+        Ok(Self::open(Bound::Unix(listener), Some(file), url))
     }
 
     /// For everybody who reaches it.
@@ -195,10 +211,52 @@ impl FromStr for ListenAddress {
     }
 }
 
+/// The URL of an address; of one that stands for every address of this machine, by the machine's
+/// name, if it is a name that is known.
+async fn url(local: SocketAddr) -> String {
+    if local.ip().is_unspecified() {
+        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let host = format!("{}:{}", name.trim(), local.port());
+        if !name.trim().is_empty() && tokio::net::lookup_host(&host).await.is_ok() {
+            return format!("http://{host}");
+        }
+    }
+    format!("http://{local}")
+}
+
+/// Removes the socket that a killed process left at `path`: one that nobody listens on any more,
+/// and nothing else.
+async fn remove_dead(path: &Path) -> Result<(), BindError> {
+    let refused = |source| BindError::Unix { path: path.to_owned(), source };
+    let is_socket = std::fs::symlink_metadata(path).map_err(refused)?.file_type().is_socket();
+    if !is_socket {
+        return Err(BindError::NotASocket { path: path.to_owned() });
+    }
+    match UnixStream::connect(path).await {
+        Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
+            std::fs::remove_file(path).map_err(refused)
+        }
+        // Its queue is full.
+        Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+            Err(BindError::InUse { path: path.to_owned() })
+        }
+        Ok(_) => Err(BindError::InUse { path: path.to_owned() }),
+        Err(error) => Err(refused(error)),
+    }
+}
+
+fn identity(path: &Path) -> io::Result<FileIdentity> {
+    let found = std::fs::symlink_metadata(path)?;
+    // Not every file system knows the time.
+    Ok((found.dev(), found.ino(), found.created().ok()))
+}
+
 impl Drop for SocketFile {
     fn drop(&mut self) {
-        // Nothing can be done about a file that somebody else removed.
-        let _ = std::fs::remove_file(&self.0);
+        if identity(&self.path).is_ok_and(|found| found == self.identity) {
+            // Nothing can be done about a file that cannot be removed.
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 
@@ -234,6 +292,18 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn the_url_of_every_address_is_one_that_can_be_dialled() {
+        let listener = Listener::bind(&"0.0.0.0:0".parse().unwrap(), true).await.unwrap();
+        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+        let address = listener.url().strip_prefix("http://").unwrap().to_owned();
+        // A machine whose own name is not known keeps the address.
+        let host = address.rsplit_once(':').unwrap().0;
+        let known = tokio::net::lookup_host((name.trim(), 1)).await.is_ok();
+        assert_eq!(host, if known { name.trim() } else { "0.0.0.0" });
+        tokio::net::TcpStream::connect(&address).await.unwrap();
+    }
+
+    #[tokio::test]
     async fn port_zero_takes_a_free_port() {
         let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
         let port = listener.url().strip_prefix("http://127.0.0.1:").unwrap();
@@ -252,5 +322,54 @@ mod tests {
         assert!(matches!(error, BindError::InUse { .. }), "{error}");
         drop(listener);
         assert!(!path.exists());
+    }
+
+    #[tokio::test]
+    async fn what_is_no_socket_is_left_as_it_is() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("thesis.tex");
+        let link = directory.path().join("link");
+        std::fs::write(&path, "years of work").unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        for there in [&path, &link] {
+            let address = ListenAddress::Unix(there.clone());
+            let error = Listener::bind(&address, false).await.unwrap_err();
+            assert!(matches!(error, BindError::NotASocket { .. }), "{error}");
+            assert_eq!(std::fs::read(there).unwrap(), b"years of work");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_socket_whose_queue_is_full_is_alive() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("o.sock");
+        let address = ListenAddress::Unix(path.clone());
+        let socket = tokio::net::UnixSocket::new_stream().unwrap();
+        socket.bind(&path).unwrap();
+        // Nobody accepts.
+        let _listener = socket.listen(1).unwrap();
+        let mut waiting = Vec::new();
+        while let Ok(stream) = UnixStream::connect(&path).await {
+            waiting.push(stream);
+        }
+        let error = Listener::bind(&address, false).await.unwrap_err();
+        assert!(matches!(error, BindError::InUse { .. }), "{error}");
+        assert!(path.exists());
+    }
+
+    #[tokio::test]
+    async fn what_took_the_place_of_the_socket_stays() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("o.sock");
+        let address = ListenAddress::Unix(path.clone());
+        let first = Listener::bind(&address, false).await.unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let second = Listener::bind(&address, false).await.unwrap();
+        drop(first);
+        UnixStream::connect(&path).await.unwrap();
+        std::fs::remove_file(&path).unwrap();
+        std::fs::write(&path, "another's").unwrap();
+        drop(second);
+        assert_eq!(std::fs::read(&path).unwrap(), b"another's");
     }
 }

@@ -7,7 +7,9 @@ use thiserror::Error;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::state::{BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, SETTLED_MAX, Stage, State};
+use crate::state::{
+    BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, RequestName, SETTLED_MAX, Stage, State,
+};
 use crate::worker_name::WorkerName;
 
 /// What does not fit together.
@@ -99,8 +101,8 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         if job.search.evaluations() > job.stored {
             return Err(Insane::Stored(id));
         }
-        let request_id = &job.record.request_id;
-        if !request_id.is_empty() && state.requests.get(request_id) != Some(&id) {
+        let request = RequestName::of(&job.record);
+        if request.is_some_and(|request| state.requests.get(&request) != Some(&id)) {
             return Err(Insane::RequestId(id));
         }
     }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::Stream;
-use osteon_common::limits::{FETCHES_AT_ONCE_MAX, NAME_BYTES_MAX, PRIORITY_MAX};
+use osteon_common::limits::{
+    FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
+};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
@@ -16,7 +18,8 @@ use osteon_proto::v1::{
 };
 use osteon_proto::{realizations, results, specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
-use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
 use crate::access_layer::Holder;
@@ -28,6 +31,7 @@ use crate::fetching;
 use crate::ids::JobId;
 use crate::leftover::{Leftover, ReadError};
 use crate::observers;
+use crate::places::{Caller, Places};
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
@@ -36,6 +40,8 @@ const PAGE_JOBS_MAX: u32 = 1000;
 const HISTORY_BLOCK_ROWS: usize = 4096;
 /// A request that finds no place among those that wait for this long is refused.
 const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
+/// Who cancels a job that has not ended after this long is told what it waits for.
+const END_PATIENCE: Duration = Duration::from_secs(5);
 /// When what was refused for want of room may be tried again.
 const RETRY: Duration = Duration::from_secs(10);
 /// Realizations in one message.
@@ -46,14 +52,14 @@ pub(crate) struct JobsService {
     messages: mpsc::Sender<Message>,
     store: mpsc::Sender<Command>,
     /// What jobs left may be large: a few at a time are held in memory.
-    fetches: Arc<Semaphore>,
+    fetches: Places,
 }
 
 type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        Self { messages, store, fetches: Arc::new(Semaphore::new(FETCHES_AT_ONCE_MAX)) }
+        Self { messages, store, fetches: Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX) }
     }
 
     /// Queues a message for the core; refused when it does not keep up.
@@ -81,6 +87,14 @@ impl JobsService {
             Answer::Snapshot(snapshot) => Ok(Some(snapshot)),
             _ => Err(unexpected()),
         }
+    }
+
+    /// Says what a cancelled job waits for, before its client has waited too long.
+    async fn not_ended_yet(&self, job: JobId) -> Result<Status, Status> {
+        let snapshot = self.snapshot(event::Request::Get(job)).await?;
+        let waiting_for = snapshot.unwrap_or_default().waiting_for;
+        let waits = if waiting_for.is_empty() { String::new() } else { format!(": {waiting_for}") };
+        Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
     async fn leftover(&self, job: JobId) -> Result<Leftover, Status> {
@@ -175,7 +189,11 @@ impl Jobs for JobsService {
         request: Request<CancelRequest>,
     ) -> Result<Response<CancelResponse>, Status> {
         let job = job(&request.into_inner().job)?;
-        let snapshot = self.snapshot(event::Request::Cancel(job)).await?;
+        let cancelled = self.snapshot(event::Request::Cancel(job));
+        let snapshot = match timeout(END_PATIENCE, cancelled).await {
+            Ok(snapshot) => snapshot?,
+            Err(_) => return Err(self.not_ended_yet(job).await?),
+        };
         Ok(Response::new(CancelResponse { snapshot }))
     }
 
@@ -183,8 +201,9 @@ impl Jobs for JobsService {
         &self,
         request: Request<FetchRequest>,
     ) -> Result<Response<Self::FetchStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let job = job(&request.into_inner().job)?;
-        let place = Arc::clone(&self.fetches).acquire_owned().await.map_err(|_| stopped())?;
+        let place = self.fetches.take(caller).await?;
         let leftover = self.leftover(job).await?;
         Ok(Response::new(Box::pin(fetching::paced(parts(leftover), place))))
     }

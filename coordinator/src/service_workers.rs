@@ -278,4 +278,13 @@ mod tests {
         drop(stream);
         check_ended(messages).await;
     }
+
+    #[test]
+    fn nothing_that_a_worker_says_of_itself_writes_lines_of_its_own() {
+        let worker = "y\n\x1b[31mFAKE LOG\u{202e}".to_owned();
+        let reason = CloseReason::FingerprintDiffers { worker, coordinator: "x".to_owned() };
+        let told = status(&reason).message().to_owned();
+        assert!(told.contains(r"`y\n\u{1b}[31mFAKE LOG\u{202e}`"), "{told}");
+        assert!(!told.chars().any(char::is_control), "{told:?}");
+    }
 }

@@ -40,8 +40,8 @@ pub struct State {
     pub(crate) jobs: BTreeMap<JobId, Job>,
     /// Jobs that have ended; what they left is in the store.
     pub(crate) ended: BTreeMap<JobId, EndedJob>,
-    /// Job of each request id.
-    pub(crate) requests: BTreeMap<String, JobId>,
+    /// Job of each request.
+    pub(crate) requests: BTreeMap<RequestName, JobId>,
     /// Jobs that are not begun, in the order of their acceptance.
     pub(crate) waiting: VecDeque<JobId>,
     /// Jobs that are computed or whose evaluation is being stored.
@@ -134,13 +134,20 @@ pub(crate) enum Stage {
     Finishing(EndRecord),
 }
 
+/// Names the request that submitted a job: ids of different clients have nothing in common.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct RequestName {
+    client: String,
+    id: String,
+}
+
 /// Digest of a specification.
 pub(crate) type Identity = [u8; 32];
 
 /// A job whose end is durable: what a list shows of it.
 #[derive(Debug)]
 pub(crate) struct EndedJob {
-    pub(crate) request_id: String,
+    pub(crate) request: Option<RequestName>,
     pub(crate) identity: Identity,
     pub(crate) kind: JobKind,
     pub(crate) max_evaluations: u64,
@@ -432,7 +439,7 @@ impl EndedJob {
     pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
         let specification = &record.specification;
         Self {
-            request_id: record.request_id.clone(),
+            request: RequestName::of(record),
             identity: identity(specification),
             kind: specification.kind,
             max_evaluations: max_evaluations(specification),
@@ -441,6 +448,18 @@ impl EndedJob {
             sequence: self::sequence(sequence, end.ended),
             end,
         }
+    }
+}
+
+impl RequestName {
+    /// The request `id` of `client`; `None` without an id: then it is never repeated.
+    pub(crate) fn new(client: &str, id: &str) -> Option<Self> {
+        (!id.is_empty()).then(|| Self { client: client.to_owned(), id: id.to_owned() })
+    }
+
+    /// That which submitted a job.
+    pub(crate) fn of(record: &JobRecord) -> Option<Self> {
+        Self::new(&record.client, &record.request_id)
     }
 }
 

@@ -158,6 +158,26 @@ pub enum StoreError {
         /// Why.
         error: std::io::Error,
     },
+    /// There is no room for a new file.
+    #[error("no room is left for {}: {error}; make room on its disk", path.display())]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The file cannot be made.
+    #[error(
+        "cannot make {}: {error}; give the coordinator's user write permission to its directory, or \
+         choose another directory",
+        path.display()
+    )]
+    Make {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
     /// Another process has it open.
     #[error(
         "{} is in use by {holder}; stop that one, or choose another directory",
@@ -212,6 +232,17 @@ pub enum StoreError {
         path: PathBuf,
         /// What SQLite said.
         error: rusqlite::Error,
+    },
+    /// Its pages do not fit together.
+    #[error(
+        "{} is damaged: {found}; restore the file from a copy, or choose another directory",
+        path.display()
+    )]
+    Inconsistent {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite found first.
+        found: String,
     },
     /// Another program's tables are in it.
     #[error(

@@ -5,10 +5,15 @@
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
+mod slow;
 
 use std::time::Duration;
 
-use osteon_common::limits::{HEADER_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX, WORKER_MESSAGE_BYTES_MAX};
+use osteon_common::job::JobSpecification;
+use osteon_common::limits::{
+    HEADER_BYTES_MAX, SMALL_SUBMISSION_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX,
+    WORKER_MESSAGE_BYTES_MAX,
+};
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
 use osteon_proto::endpoint::{connect, jobs_client, workers_client};
@@ -22,7 +27,11 @@ use tonic::transport::Channel;
 use tonic::{Code, Request};
 use tonic_prost::ProstCodec;
 
+use crate::slow::{begin_submission, large};
+
 const TIMEOUT: Duration = Duration::from_secs(30);
+/// Less than any wait for a place.
+const PROMPT: Duration = Duration::from_secs(3);
 
 async fn coordinator() -> (Coordinator, Channel) {
     coordinator_with(Config::default()).await
@@ -91,16 +100,20 @@ async fn headers_are_read_up_to_their_bound() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn more_submissions_than_are_read_at_a_time_wait_their_turn() {
-    let (coordinator, channel) = coordinator().await;
-    let specification = specification::to_message(&fake::identification(100, 10, 7));
+    let (coordinator, _) = coordinator().await;
+    let specification = specification::to_message(&large());
+    assert!(specification.encoded_len() as u64 > SMALL_SUBMISSION_BYTES_MAX);
     let mut calls = tokio::task::JoinSet::new();
-    for _ in 0..10 * SUBMISSIONS_AT_ONCE_MAX {
-        let mut client = jobs_client(channel.clone());
-        let specification = Some(specification.clone());
-        calls.spawn(async move {
-            let request = SubmitRequest { specification, ..Default::default() };
-            client.submit(request).await.map(drop)
-        });
+    for _ in 0..10 * SUBMISSIONS_AT_ONCE_MAX / SUBMISSIONS_OF_ONE_MAX {
+        let channel = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
+        for _ in 0..SUBMISSIONS_OF_ONE_MAX {
+            let mut client = jobs_client(channel.clone());
+            let specification = Some(specification.clone());
+            calls.spawn(async move {
+                let request = SubmitRequest { specification, ..Default::default() };
+                client.submit(request).await.map(drop)
+            });
+        }
     }
     while let Some(call) = calls.join_next().await {
         call.unwrap().unwrap();
@@ -132,5 +145,36 @@ async fn a_call_whose_message_never_ends_is_given_up() {
     let specification = Some(specification::to_message(&fake::identification(100, 10, 7)));
     let request = SubmitRequest { specification, ..Default::default() };
     jobs_client(channel).submit(request).await.unwrap();
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn slow_submissions_keep_nobody_out() {
+    let (coordinator, slow) = coordinator().await;
+    let quick = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
+    let begun: Vec<_> = [1000, 1 << 20]
+        .into_iter()
+        .flat_map(|length| (0..100).map(move |_| length))
+        .map(|length| tokio::spawn(begin_submission(slow.clone(), length, None)))
+        .collect();
+    let small = fake::identification(100, 10, 7);
+    let large = large();
+    let submit = async |channel: &Channel, specification: &JobSpecification| {
+        let specification = Some(specification::to_message(specification));
+        let request = SubmitRequest { specification, ..Default::default() };
+        jobs_client(channel.clone()).submit(request).await
+    };
+    // The slow ones have come when one of their own finds no place.
+    let full = loop {
+        if let Err(full) = submit(&slow, &large).await {
+            break full;
+        }
+    };
+    assert_eq!(full.code(), Code::ResourceExhausted, "{full}");
+    for specification in [&small, &large] {
+        let submitted = tokio::time::timeout(PROMPT, submit(&quick, specification)).await;
+        submitted.unwrap().unwrap();
+    }
+    begun.iter().for_each(tokio::task::JoinHandle::abort);
     coordinator.shutdown().await;
 }

@@ -411,3 +411,26 @@ async fn health_and_reflection_are_on_the_same_port() {
     drop((health, reflection, answers));
     coordinator.shutdown().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_cancels_a_job_whose_end_the_store_refuses_is_told_so() {
+    let directory = tempfile::tempdir().unwrap();
+    drop(SqliteStore::open(directory.path()).unwrap());
+    let file = rusqlite::Connection::open(directory.path().join("osteon.sqlite")).unwrap();
+    let trigger = "CREATE TRIGGER full BEFORE INSERT ON ending
+                   BEGIN SELECT RAISE(ABORT, 'the disk is full'); END";
+    file.execute_batch(trigger).unwrap();
+    drop(file);
+    let store = Box::new(SqliteStore::open(directory.path()).unwrap());
+    let coordinator = coordinator("127.0.0.1:0", store).await;
+    let mut client = client(&coordinator).await;
+    let job = submit(&mut client, &fake::propagation(10, 7), "").await.unwrap();
+    let cancel = client.cancel(CancelRequest { job: job.clone() });
+    let told = tokio::time::timeout(TIMEOUT, cancel).await.unwrap().unwrap_err();
+    assert_eq!(told.code(), Code::Unavailable, "{told}");
+    let expected =
+        format!("job {job} is cancelled, and has not ended yet: the store does not take");
+    assert!(told.message().starts_with(&expected), "{told}");
+    assert!(told.message().contains("the disk is full"), "{told}");
+    coordinator.shutdown().await;
+}

@@ -145,8 +145,12 @@ impl Endpoint {
     /// What broke a connection, with a word about TLS where that may be the cause.
     pub fn explained(&self, reason: &str) -> String {
         match self {
-            // The answer to plain HTTP/2 was no HTTP/2.
-            Self::Http(authority) if reason.contains("protocol error") => {
+            // The answer to plain HTTP/2 was no HTTP/2, or none.
+            Self::Http(authority)
+                if ["protocol error", "operation was canceled"]
+                    .iter()
+                    .any(|known| reason.contains(known)) =>
+            {
                 format!("{reason}; if it speaks TLS, write https://{authority}")
             }
             _ => reason.to_owned(),
@@ -385,6 +389,19 @@ mod tests {
             ("http://node-3:1", false),
         ] {
             assert_eq!(url.parse::<Endpoint>().unwrap().is_local(), local, "{url}");
+        }
+    }
+
+    #[test]
+    fn what_may_be_tls_is_said_so() {
+        for (url, reason, expected) in [
+            ("http://a:1", "protocol error", "; if it speaks TLS, write https://a:1"),
+            ("http://a:1", "operation was canceled", "; if it speaks TLS, write https://a:1"),
+            ("http://a:1", "refused", ""),
+            ("https://a:1", "protocol error", ""),
+        ] {
+            let endpoint: Endpoint = url.parse().unwrap();
+            assert_eq!(endpoint.explained(reason), format!("{reason}{expected}"), "{url}");
         }
     }
 

@@ -4,7 +4,7 @@ use std::fs;
 
 use anyhow::Context as _;
 use osteon_coordinator::store::sqlite::SqliteStore;
-use osteon_coordinator::{BindError, Config, ListenAddress};
+use osteon_coordinator::{BindError, Config, ListenAddress, open_files};
 
 use crate::arguments::CoordinatorArguments;
 use crate::door::Door;
@@ -27,10 +27,11 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let directory = arguments.store;
     if matches!(address, ListenAddress::Unix(_)) {
         // The socket may be meant to lie in the directory of the store.
-        fs::create_dir_all(&directory)
+        SqliteStore::make_directory(&directory)
             .with_context(|| format!("cannot create the directory {}", directory.display()))
             .map_err(Failure::Failed)?;
     }
+    open_files::raise_limit();
     let listener = door.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
     let store = SqliteStore::open(&directory).map_err(Failure::failed)?;
     let config = Config {

@@ -14,6 +14,7 @@ use tonic::Code;
 use crate::client::{self, Client, ClientError, Fetched, Remote};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
+use crate::request::Request;
 use crate::resolved::Format;
 use crate::results_directory::{self, ResultsDirectory};
 use crate::verdict;
@@ -27,8 +28,8 @@ pub(super) struct Submission<'a> {
     pub(super) job: &'a Path,
     /// What the job does.
     pub(super) kind: JobKind,
-    /// Empty: a new job.
-    pub(super) request_id: &'a str,
+    /// The request that stands for it.
+    pub(super) request: &'a Request,
     /// Rank among the user's own jobs.
     pub(super) priority: u32,
 }
@@ -39,10 +40,10 @@ pub(super) async fn submit(
     coordinator: &Remote,
     format: Format,
 ) -> Result<Ending, Failure> {
-    let Submission { job, kind, request_id, priority } = submission;
+    let Submission { job, kind, request, priority } = submission;
     let specification = job_file::read(job, kind).map_err(Failure::bad_input)?;
     let mut client = Client::connect(coordinator).await?;
-    let id = client.submit(&specification, request_id, priority).await?;
+    let id = client.submit(&specification, request, priority).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }

@@ -16,6 +16,7 @@ use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownResult};
 use crate::progress::{Progress, say};
+use crate::request::Request;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
@@ -169,11 +170,11 @@ async fn drive(
     directory: Option<&ResultsDirectory>,
     note: impl Fn(&JobSnapshot),
 ) -> Result<Fetched, Failure> {
-    let request_id = match directory {
-        Some(directory) => directory.request_id()?,
-        None => String::new(),
+    let request = match directory {
+        Some(directory) => directory.request()?,
+        None => Request::new(),
     };
-    let job = client.submit(specification, &request_id, 0).await?;
+    let job = client.submit(specification, &request, 0).await?;
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }

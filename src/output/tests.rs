@@ -269,6 +269,15 @@ fn a_snapshot_is_one_line() {
         }
     });
     insta::assert_snapshot!(lines);
+    let [_, ended]: [JobSnapshot; 2] = jobs().try_into().unwrap();
+    let cancelled = JobSnapshot {
+        status: JobStatus::Cancelled.into(),
+        reason: String::new(),
+        best_cost: None,
+        ..ended
+    };
+    let line = printed(Format::Text, |output| output.snapshot(&cancelled).unwrap());
+    assert_eq!(line, "  0.4 s  cancelled\n");
 }
 
 #[test]

@@ -65,7 +65,11 @@ impl Output for TextOutput<'_> {
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
         let state = status_name(snapshot).unwrap_or_else(|| state_name(snapshot));
         let time = span(snapshot.elapsed_s);
-        self.verbatim(&format!("{time:>7}  {state}: {}\n", progress(snapshot)))
+        let line = match progress(snapshot).as_str() {
+            "" => format!("{time:>7}  {state}\n"),
+            progress => format!("{time:>7}  {state}: {progress}\n"),
+        };
+        self.verbatim(&line)
     }
 
     fn verbatim(&mut self, text: &str) -> io::Result<()> {
@@ -108,13 +112,10 @@ pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
 }
 
 fn progress(snapshot: &JobSnapshot) -> String {
-    let mut text = describe(snapshot);
-    if !snapshot.reason.is_empty() {
-        text.push_str("; ");
-        // A case file may follow.
-        text.push_str(snapshot.reason.lines().next().unwrap_or_default());
-    }
-    text
+    // A case file may follow the first line of a reason.
+    let reason = snapshot.reason.lines().next().unwrap_or_default();
+    let parts = [describe(snapshot), reason.to_owned()];
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 fn simulation_table(simulation: &ShownSimulation<'_>) -> String {

@@ -44,7 +44,7 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path().join("out");
         let directory = ResultsDirectory::open(&path).unwrap();
-        let request = directory.request_id().unwrap();
+        let request = directory.request().unwrap();
         fs::create_dir(directory.store()).unwrap();
         let text = directory.write_results(JobKind::Identification, &fetched(status)).unwrap();
 
@@ -54,9 +54,9 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let stored = ResultsDirectory::stored(&path, &specification()).unwrap();
         assert_eq!(stored, Some(text), "{status:?}");
         assert_eq!(directory.store().exists(), !ended, "{status:?}");
-        assert_eq!(directory.request_id().unwrap() == request, !ended, "{status:?}");
+        assert_eq!(directory.request().unwrap() == request, !ended, "{status:?}");
         directory.forget_request();
-        assert_ne!(directory.request_id().unwrap(), request, "{status:?}");
+        assert_ne!(directory.request().unwrap(), request, "{status:?}");
     }
 }
 
@@ -93,13 +93,13 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("out");
     let directory = ResultsDirectory::open(&path).unwrap();
-    let request = directory.request_id().unwrap();
+    let request = directory.request().unwrap();
     let mut failed = fetched(Status::Failed);
     failed.result.reason = Some("integrity error: realization 3 is …".to_owned());
     directory.write_results(JobKind::Identification, &failed).unwrap();
     assert_eq!(ResultsDirectory::finished(&path, &specification()).unwrap(), None);
     assert!(!directory.store().exists());
-    assert_ne!(directory.request_id().unwrap(), request);
+    assert_ne!(directory.request().unwrap(), request);
 }
 
 #[test]
@@ -121,4 +121,18 @@ fn a_file_that_no_run_has_written_is_not_read_to_its_end() {
     std::fs::remove_file(result).unwrap();
     let missing = result_of(directory.path()).unwrap_err().to_string();
     assert!(missing.contains(RESULT) && missing.contains("no such file"), "{missing}");
+}
+
+#[test]
+fn a_directory_is_the_same_request_on_every_host() {
+    let scratch = tempfile::tempdir().unwrap();
+    let directory = ResultsDirectory::open(scratch.path()).unwrap();
+    let path = scratch.path().join(REQUEST);
+    let request = directory.request().unwrap();
+    assert_eq!(directory.request().unwrap(), request);
+    fs::write(&path, "an id\nann@node-7\n").unwrap();
+    let elsewhere = Request { id: "an id".to_owned(), client: "ann@node-7".to_owned() };
+    assert_eq!(directory.request().unwrap(), elsewhere);
+    fs::write(&path, "an id\n").unwrap();
+    assert_eq!(directory.request().unwrap(), Request { client: request.client, ..elsewhere });
 }

@@ -16,7 +16,7 @@ use crate::api::{Api, client_of, progress, specification};
 use crate::proxy::{Proxy, Way};
 use crate::random::Random;
 use crate::service::{Service, undisturbed};
-use crate::support::{DEADLINE, Owned, Scratch, eventually, job};
+use crate::support::{DEADLINE, Owned, Scratch, eventually, job, run};
 
 const CLIENTS: usize = 200;
 /// Realizations of the crowd that the share is measured over.
@@ -194,4 +194,21 @@ fn messages_beyond_the_limit_are_refused_with_the_limit() {
     assert_eq!(read.code(), Code::InvalidArgument, "{read}");
     assert!(read.message().contains("at most 256 are allowed"), "{read}");
     story.check_end();
+}
+
+#[test]
+fn more_connections_than_files_wait_without_a_flood_in_the_log() {
+    let scratch = Scratch::new();
+    let enter = ["prlimit", "--nofile=64:64"].map(str::to_owned);
+    let service = Service::start_in(&scratch, &scratch.path("store"), &enter, &[]);
+    assert!(service.log().contains("connections=32"), "{}", service.log());
+    let address = service.url().trim_start_matches("http://");
+    // Those who say nothing are sent away after 10 s, and make room.
+    let crowd: Vec<_> = (0..50).map(|_| TcpStream::connect(address).unwrap()).collect();
+    eventually("a client is served", || {
+        run(&["jobs", "--coordinator", service.url()]).code == Some(0)
+    });
+    drop(crowd);
+    let refused = service.log().matches("cannot accept").count();
+    assert!(refused <= 1, "{refused} warnings");
 }

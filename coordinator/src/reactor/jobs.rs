@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::ids::JobId;
 use crate::search::{Ending, Search, Step};
 use crate::snapshot;
-use crate::state::{EndedJob, Job, Stage, State, Trouble};
+use crate::state::{EndedJob, Job, RequestName, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 
 /// A record is durable: the job goes on.
@@ -91,7 +91,9 @@ pub(super) fn store_failed(
             let answer = Answer::Refused(Refusal::Store { error: error.clone() });
             effects.push(Effect::Answer { token, answer });
         }
-        state.requests.remove(&job.record.request_id);
+        if let Some(request) = RequestName::of(&job.record) {
+            state.requests.remove(&request);
+        }
         state.jobs.remove(&id);
         return;
     }

@@ -72,10 +72,10 @@ pub(super) fn pruned(
     let answer = match outcome {
         Ok(()) => {
             for job in &jobs {
-                if let Some(ended) = state.ended.remove(job)
-                    && state.requests.get(&ended.request_id) == Some(job)
+                if let Some(request) = state.ended.remove(job).and_then(|ended| ended.request)
+                    && state.requests.get(&request) == Some(job)
                 {
-                    state.requests.remove(&ended.request_id);
+                    state.requests.remove(&request);
                 }
             }
             Answer::Pruned(jobs)

@@ -13,7 +13,7 @@ use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::Request;
 use crate::ids::{JobId, Token};
 use crate::snapshot;
-use crate::state::{Job, Stage, State, identity};
+use crate::state::{Job, RequestName, Stage, State, identity};
 use crate::store::JobRecord;
 
 /// Most expelled workers that are shown.
@@ -69,7 +69,8 @@ fn submit(
     if state.draining {
         return Err(Refusal::Draining);
     }
-    if let Some(known) = state.requests.get(&request_id) {
+    let request = RequestName::new(&client, &request_id);
+    if let Some(known) = request.as_ref().and_then(|request| state.requests.get(request)) {
         return resubmit(state, token, *known, &specification, request_id);
     }
     if state.unfinished() >= JOBS_MAX {
@@ -78,9 +79,7 @@ fn submit(
     find_room(state, &client, bytes(&specification))?;
     let id = JobId(state.next_job);
     state.next_job += 1;
-    if !request_id.is_empty() {
-        state.requests.insert(request_id.clone(), id);
-    }
+    state.requests.extend(request.map(|request| (request, id)));
     let fingerprint = version::fingerprint();
     let accepted = now;
     let record =

@@ -9,7 +9,7 @@ use super::{Effects, jobs};
 use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
-use crate::state::{EndedJob, Expelled, Job, Stage, State, sequence};
+use crate::state::{EndedJob, Expelled, Job, RequestName, Stage, State, sequence};
 use crate::store::{ExpulsionRecord, JobRecord, Store, StoreError};
 
 /// What a store holds, its evaluations aside.
@@ -84,12 +84,12 @@ impl State {
         for (id, mut job) in ended {
             // Snapshots were published while the end was on its way to the store.
             job.sequence = sequence(job.sequence, now);
-            state.know(id, &job.request_id);
+            state.know(id, job.request.clone());
             state.ended.insert(id, job);
         }
         for (record, evaluations) in unfinished {
             let id = record.job;
-            state.know(id, &record.request_id);
+            state.know(id, RequestName::of(&record));
             state.waiting.push_back(id);
             state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
         }
@@ -97,10 +97,8 @@ impl State {
         (state, effects)
     }
 
-    fn know(&mut self, id: JobId, request_id: &str) {
+    fn know(&mut self, id: JobId, request: Option<RequestName>) {
         self.next_job = self.next_job.max(id.0 + 1);
-        if !request_id.is_empty() {
-            self.requests.insert(request_id.to_owned(), id);
-        }
+        self.requests.extend(request.map(|request| (request, id)));
     }
 }

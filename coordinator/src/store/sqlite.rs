@@ -64,6 +64,14 @@ impl SqliteStore {
         Ok(Self { connection, path, lock })
     }
 
+    /// Makes a directory for a store, if there is none: other users cannot enter it.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn make_directory(directory: &Path) -> std::io::Result<()> {
+        opening::make_directory(directory)
+    }
+
     fn refused(&self, source: rusqlite::Error) -> StoreError {
         opening::refusal(&self.path, source)
     }

@@ -55,6 +55,31 @@ fn a_submission_is_idempotent_by_its_request_id() {
 }
 
 #[test]
+fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
+    let of = |token, client: &str, realizations| {
+        let Event::Requested { token, request } = submit(token, "r", propagation(realizations))
+        else {
+            unreachable!()
+        };
+        let Request::Submit { specification, request_id, priority, .. } = request else {
+            unreachable!()
+        };
+        let client = client.to_owned();
+        let request = Request::Submit { specification, request_id, client, priority };
+        Event::Requested { token, request }
+    };
+    let mut rig = Rig::new();
+    rig.check(of(1, "ann", 2), &["store job 1"]);
+    rig.check(of(2, "bob", 3), &["store job 2"]);
+    rig.check(stored(1, RecordKey::Job), &["answer 1: job 1"]);
+    rig.check(stored(2, RecordKey::Job), &["answer 2: job 2"]);
+    rig.check(of(3, "ann", 2), &["answer 3: job 1"]);
+    rig.check(of(4, "bob", 3), &["answer 4: job 2"]);
+    // What belongs to one is refused to nobody else.
+    rig.check(of(5, "cem", 4), &["store job 3"]);
+}
+
+#[test]
 fn a_job_that_cannot_be_stored_is_not_accepted() {
     let mut rig = Rig::new();
     rig.check(submit(1, "r", propagation(2)), &["store job 1"]);

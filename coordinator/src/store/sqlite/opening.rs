@@ -1,8 +1,9 @@
 //! Opening the file: whose it is, on which kind of disk it lies, of which format it is. Nothing of
 //! a file that is refused is changed.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read as _, Write as _};
+use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -24,6 +25,12 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest text of a lock that is shown, bytes.
 const HOLDER_BYTES_MAX: u64 = 256;
 
+/// Mode of a new directory, and of a new file: measurements are nobody else's business.
+const DIRECTORY_MODE: u32 = 0o700;
+const FILE_MODE: u32 = 0o600;
+/// The bits of a mode that concern others than the owner.
+const OTHERS: u32 = 0o077;
+
 /// How changes are made safe against a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Journal {
@@ -35,10 +42,12 @@ pub(super) enum Journal {
 
 /// Opens the file in `directory`, making both if need be; the lock is held as long as the file.
 pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), StoreError> {
-    fs::create_dir_all(directory)
+    make_directory(directory)
         .map_err(|error| StoreError::Directory { path: directory.to_owned(), error })?;
     let path = directory.join(FILE);
     let lock = lock(directory, &path)?;
+    make_private(directory, &path)
+        .map_err(|error| unmade(&path, error, |path, error| StoreError::Make { path, error }))?;
     let network = network_file_system(directory);
     let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
     if let Some(kind) = network {
@@ -51,6 +60,48 @@ pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), Stor
     Ok((connection, lock, path))
 }
 
+/// Makes a directory that only this user can enter, and those on the way to it; one that is there
+/// stays as it is.
+pub(super) fn make_directory(directory: &Path) -> io::Result<()> {
+    DirBuilder::new().recursive(true).mode(DIRECTORY_MODE).create(directory)
+}
+
+/// Makes an empty file that only this user can read, to which SQLite gives its tables, and whose
+/// mode those beside it get; warns of one that is there and that others can reach.
+fn make_private(directory: &Path, path: &Path) -> io::Result<()> {
+    let made = OpenOptions::new().write(true).create_new(true).mode(FILE_MODE).open(path);
+    match made {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+        made => return made.map(drop),
+    }
+    let open = |path: &Path| Ok::<bool, io::Error>(mode(path)? & OTHERS != 0);
+    if open(path)? && open(directory)? {
+        tracing::warn!(path = %path.display(),
+            "other users of this machine can read the store: to keep measurements and results from \
+             them, run `chmod 700` on its directory");
+    }
+    Ok(())
+}
+
+/// Why there is no file: for want of room, or `otherwise`.
+fn unmade(
+    path: &Path,
+    error: io::Error,
+    otherwise: impl FnOnce(PathBuf, io::Error) -> StoreError,
+) -> StoreError {
+    let path = path.to_owned();
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            StoreError::NoRoom { path, error }
+        }
+        _ => otherwise(path, error),
+    }
+}
+
+fn mode(path: &Path) -> io::Result<u32> {
+    Ok(fs::metadata(path)?.permissions().mode())
+}
+
 /// Opens the file, brings it up to date and sets its modes.
 pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, StoreError> {
     let refused = |source| refusal(path, source);
@@ -59,6 +110,7 @@ pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, Sto
     // Before all else: then the write-ahead log needs no memory shared with others.
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
     check_format(&connection, path)?;
+    check_pages(&connection, path)?;
     prepare(&mut connection, journal).map_err(refused)?;
     Ok(connection)
 }
@@ -88,6 +140,20 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     } else {
         Ok(())
     }
+}
+
+/// Refuses a file whose pages do not fit together. Checksums find only what is read, and some
+/// records are read much later. This reads the file once.
+fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
+    let found: String = connection
+        .query_row("PRAGMA quick_check(1)", [], |row| row.get(0))
+        .map_err(|source| refusal(path, source))?;
+    if found == "ok" {
+        return Ok(());
+    }
+    // A heading may stand before what it found.
+    let found = found.lines().last().unwrap_or_default().to_owned();
+    Err(StoreError::Inconsistent { path: path.to_owned(), found })
 }
 
 /// Sets the modes, makes the tables of a new file, and brings those of an old one up to date.
@@ -125,7 +191,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
 /// Takes the store for this process and writes there who that is.
 fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     let path = directory.join(LOCK);
-    let failed = |error| StoreError::Lock { path: path.clone(), error };
+    let failed = |error| unmade(&path, error, |path, error| StoreError::Lock { path, error });
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     let mut file = options.open(&path).map_err(failed)?;
@@ -235,6 +301,20 @@ mod tests {
             // Who prints the chain adds nothing.
             assert!(refusal.source().is_none(), "{refusal:?}");
         }
+    }
+
+    #[test]
+    fn a_full_disk_is_no_matter_of_permissions() {
+        let told = |kind: io::ErrorKind| {
+            let path = Path::new("osteon.sqlite");
+            unmade(path, io::Error::from(kind), |path, error| StoreError::Make { path, error })
+        };
+        for full in [io::ErrorKind::StorageFull, io::ErrorKind::QuotaExceeded] {
+            let told = told(full).to_string();
+            assert!(told.contains("make room") && !told.contains("permission"), "{told}");
+        }
+        let denied = told(io::ErrorKind::PermissionDenied).to_string();
+        assert!(denied.contains("give the coordinator's user write permission"), "{denied}");
     }
 
     #[test]

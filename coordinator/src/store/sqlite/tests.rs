@@ -127,6 +127,74 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.expulsions().unwrap(), []);
 }
 
+#[test]
+fn other_users_cannot_read_what_is_made() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    let directory = tempfile::tempdir().unwrap();
+    let made = directory.path().join("on/the/way");
+    let mut store = SqliteStore::open(&made).unwrap();
+    store.put_job(&job(1)).unwrap();
+    for path in [&made, made.parent().unwrap()] {
+        assert_eq!(mode(path), 0o700, "{}", path.display());
+    }
+    for name in [FILE, "osteon.sqlite-wal"] {
+        assert_eq!(mode(&made.join(name)), 0o600, "{name}");
+    }
+    drop(store);
+    // What an operator has chosen stays.
+    fs::set_permissions(&made, fs::Permissions::from_mode(0o750)).unwrap();
+    fs::set_permissions(made.join(FILE), fs::Permissions::from_mode(0o640)).unwrap();
+    drop(SqliteStore::open(&made).unwrap());
+    assert_eq!((mode(&made), mode(&made.join(FILE))), (0o750, 0o640));
+}
+
+#[test]
+fn a_store_that_is_closed_is_one_file_and_a_copy_of_it_is_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let (there, copy) = (directory.path().join("there"), directory.path().join("copy"));
+    let mut store = SqliteStore::open(&there).unwrap();
+    store.put_job(&job(1)).unwrap();
+    store.put_evaluation(&evaluation(1, 0), false).unwrap();
+    assert!(there.join("osteon.sqlite-wal").exists());
+    drop(store);
+    assert!(!there.join("osteon.sqlite-wal").exists());
+    fs::create_dir(&copy).unwrap();
+    fs::copy(there.join(FILE), copy.join(FILE)).unwrap();
+    let mut copied = SqliteStore::open(&copy).unwrap();
+    assert_eq!(copied.job(JobId(1)).unwrap(), Some(job(1)));
+    assert_eq!(evaluations(&mut copied, 1).unwrap(), [evaluation(1, 0)]);
+}
+
+#[test]
+fn pages_that_do_not_fit_together_are_found_at_the_start() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for number in 0..9 {
+        store.put_job(&job(number)).unwrap();
+    }
+    drop(store);
+    let path = directory.path().join(FILE);
+    let whole = fs::read(&path).unwrap();
+    let page = usize::from(u16::from_be_bytes([whole[16], whole[17]]));
+    let pages = whole.len() / page;
+    for damaged in 2..=pages {
+        let mut bytes = whole.clone();
+        let first = (damaged - 1) * page;
+        bytes[first..first + 64].fill(0xff);
+        fs::write(&path, &bytes).unwrap();
+        let error = SqliteStore::open(directory.path()).unwrap_err();
+        assert!(
+            matches!(error, StoreError::Inconsistent { .. } | StoreError::Corrupt { .. }),
+            "page {damaged} of {pages}: {error}"
+        );
+        assert!(error.to_string().contains("choose another directory"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), bytes, "page {damaged}");
+    }
+    fs::write(&path, &whole).unwrap();
+    assert_eq!(SqliteStore::open(directory.path()).unwrap().jobs().unwrap().len(), 9);
+}
+
 fn expulsion(number: u64) -> ExpulsionRecord {
     ExpulsionRecord {
         number,

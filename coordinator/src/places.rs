@@ -1,0 +1,142 @@
+//! Places for what takes room in memory: few at a time, fewer of one caller, so that who is slow
+//! does not keep the others out; and nobody waits for long.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
+
+use osteon_proto::status;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
+use tonic::Status;
+use tonic::codegen::http::Extensions;
+
+use crate::accept::Peer;
+use crate::access_layer::Holder;
+
+/// Who finds no place for this long is refused.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// When a refused call may be tried again.
+const RETRY: Duration = Duration::from_secs(5);
+
+/// Whose call it is.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Caller {
+    /// Whoever holds the token of this name.
+    Holder(String),
+    /// Without tokens: whoever is at the other end of this connection.
+    Connection(u64),
+}
+
+/// Some places.
+#[derive(Debug, Clone)]
+pub(crate) struct Places {
+    all: Arc<Semaphore>,
+    of_one: usize,
+    /// Those of each caller who has or wants one.
+    own: Arc<Mutex<BTreeMap<Caller, Weak<Semaphore>>>>,
+}
+
+/// One of the places, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct Place {
+    _own: OwnedSemaphorePermit,
+    _of_all: OwnedSemaphorePermit,
+}
+
+impl Caller {
+    /// The caller that the door and the listener have noted.
+    pub(crate) fn of(extensions: &Extensions) -> Self {
+        match (extensions.get::<Holder>(), extensions.get::<Peer>()) {
+            (Some(Holder(name)), _) => Self::Holder(name.clone()),
+            (None, Some(peer)) => Self::Connection(peer.connection),
+            // Numbers of connections begin above.
+            (None, None) => Self::Connection(0),
+        }
+    }
+}
+
+impl Places {
+    /// So many places, and so many for one caller.
+    pub(crate) fn new(all: usize, of_one: usize) -> Self {
+        Self { all: Arc::new(Semaphore::new(all)), of_one, own: Arc::default() }
+    }
+
+    /// Waits for a place.
+    ///
+    /// # Errors
+    /// `RESOURCE_EXHAUSTED` when there is none for a while.
+    pub(crate) async fn take(&self, caller: Caller) -> Result<Place, Status> {
+        let own = self.own(caller);
+        let both = async {
+            // The own one first: who waits for it is in nobody's way.
+            let own = own.acquire_owned().await.ok()?;
+            let of_all = Arc::clone(&self.all).acquire_owned().await.ok()?;
+            Some(Place { _own: own, _of_all: of_all })
+        };
+        // No semaphore is ever closed.
+        timeout(PATIENCE, both).await.ok().flatten().ok_or_else(full)
+    }
+
+    fn own(&self, caller: Caller) -> Arc<Semaphore> {
+        // Nothing panics while it is locked.
+        let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+        own.retain(|_, places| places.strong_count() > 0);
+        if let Some(places) = own.get(&caller).and_then(Weak::upgrade) {
+            return places;
+        }
+        let places = Arc::new(Semaphore::new(self.of_one));
+        own.insert(caller, Arc::downgrade(&places));
+        places
+    }
+}
+
+fn full() -> Status {
+    let waited = PATIENCE.as_secs();
+    let message = format!(
+        "others have sent or fetched so much that no place was free for {waited} s; try again"
+    );
+    status::resource_exhausted(message, RETRY)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::slice;
+
+    use tonic::Code;
+
+    use super::*;
+
+    async fn take(places: &Places, connection: u64) -> Result<Place, Code> {
+        places.take(Caller::Connection(connection)).await.map_err(|status| status.code())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn nobody_takes_all_and_nobody_waits_for_ever() {
+        let places = Places::new(3, 2);
+        let mut held = vec![take(&places, 1).await.unwrap(), take(&places, 1).await.unwrap()];
+        assert_eq!(take(&places, 1).await.unwrap_err(), Code::ResourceExhausted);
+        held.push(take(&places, 2).await.unwrap());
+        assert_eq!(take(&places, 3).await.unwrap_err(), Code::ResourceExhausted);
+        drop(held.remove(0));
+        let of_one = take(&places, 1).await.unwrap();
+        drop((of_one, held));
+        // Nothing is remembered of who has gone.
+        drop(take(&places, 4).await.unwrap());
+        let known: Vec<Caller> = places.own.lock().unwrap().keys().cloned().collect();
+        assert_eq!(known, slice::from_ref(&Caller::Connection(4)));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_waits_for_an_own_place_is_in_nobodys_way() {
+        let places = Places::new(2, 1);
+        let _held = take(&places, 1).await.unwrap();
+        let waiting = tokio::spawn({
+            let places = places.clone();
+            async move { take(&places, 1).await.map(drop) }
+        });
+        tokio::task::yield_now().await;
+        assert!(timeout(Duration::ZERO, take(&places, 2)).await.is_ok());
+        assert_eq!(waiting.await.unwrap(), Err(Code::ResourceExhausted));
+    }
+}

@@ -1,0 +1,127 @@
+//! What a client makes of losses and answers.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use osteon_common::job::JobKind;
+use osteon_common::job_file;
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::{Config, Coordinator, Listener};
+use tokio::net::{UnixListener, UnixStream};
+use tokio::sync::Notify;
+
+use super::*;
+
+#[test]
+fn an_answer_is_told_from_a_loss() {
+    let endpoint: Endpoint = "unix:a".parse().unwrap();
+    let shown = |status: &Status| refused(&endpoint, status).to_string();
+    let answered = Status::unavailable("the store is full");
+    assert_eq!(shown(&answered), "the coordinator at unix:a cannot do it now: the store is full");
+    for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
+        broken.set_source(Arc::new(std::io::Error::other("reset")));
+        assert_eq!(shown(&broken), "lost the coordinator at unix:a: reset");
+    }
+    let refusal = shown(&Status::already_exists("taken"));
+    assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
+    let directory = tempfile::tempdir().unwrap();
+    let socket = directory.path().join("socket");
+    let endpoint = Endpoint::Unix(socket.clone());
+    let remote = Remote { endpoint, files: CredentialFiles::default() };
+    let begun = Instant::now();
+    let error = Client::connect(&remote).await.unwrap_err().to_string();
+    assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
+    let waited = begun.elapsed();
+    assert!(waited > answer_limit() * 9 / 10 && waited <= answer_limit(), "{waited:?}");
+
+    let comes = async {
+        sleep(answer_limit() / 2).await;
+        tokio::net::UnixListener::bind(&socket).unwrap()
+    };
+    let (_listener, connected) = tokio::join!(comes, Client::connect(&remote));
+    connected.unwrap();
+}
+
+fn remote(socket: &Path) -> Remote {
+    Remote { endpoint: Endpoint::Unix(socket.to_owned()), files: CredentialFiles::default() }
+}
+
+fn example() -> JobSpecification {
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/quick.toml"));
+    job_file::read(&path, JobKind::Propagation).unwrap()
+}
+
+async fn coordinator(socket: &Path) -> Coordinator {
+    let address = format!("unix:{}", socket.display()).parse().unwrap();
+    let listener = Listener::bind(&address, false).await.unwrap();
+    let store = Box::new(MemoryStore::new());
+    osteon_coordinator::start(listener, store, Config::default()).await.unwrap()
+}
+
+/// Hands what the first connection to `from` sends to `to`, and no answer back, until it is told
+/// to cut it; those after it work.
+async fn loses_the_first_answer(from: UnixListener, to: PathBuf, cut: Arc<Notify>) {
+    let (mut client, _) = from.accept().await.unwrap();
+    let mut server = UnixStream::connect(&to).await.unwrap();
+    tokio::select! {
+        copied = tokio::io::copy(&mut client, &mut server) => drop(copied),
+        () = cut.notified() => {}
+    }
+    drop((client, server));
+    loop {
+        let (mut client, _) = from.accept().await.unwrap();
+        let mut server = UnixStream::connect(&to).await.unwrap();
+        tokio::spawn(async move {
+            drop(tokio::io::copy_bidirectional(&mut client, &mut server).await);
+        });
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_submission_whose_answer_is_lost_makes_one_job() {
+    let directory = tempfile::tempdir().unwrap();
+    let [there, between] = ["there", "between"].map(|name| directory.path().join(name));
+    let coordinator = coordinator(&there).await;
+    let cut = Arc::new(Notify::new());
+    let listener = UnixListener::bind(&between).unwrap();
+    let proxy = tokio::spawn(loses_the_first_answer(listener, there.clone(), Arc::clone(&cut)));
+    let mut client = Client::connect(&remote(&between)).await.unwrap();
+    let mut witness = Client::connect(&remote(&there)).await.unwrap();
+    let (specification, request) = (example(), Request::new());
+    let accepted = async {
+        while witness.list().await.unwrap().is_empty() {
+            sleep(Duration::from_millis(5)).await;
+        }
+        cut.notify_one();
+    };
+    let (submitted, ()) = tokio::join!(client.submit(&specification, &request, 0), accepted);
+    let jobs = witness.list().await.unwrap();
+    assert_eq!(jobs.len(), 1);
+    assert_eq!(submitted.unwrap(), jobs[0].job);
+    proxy.abort();
+    coordinator.shutdown().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
+    let directory = tempfile::tempdir().unwrap();
+    let socket = directory.path().join("socket");
+    let listener = UnixListener::bind(&socket).unwrap();
+    let cuts = tokio::spawn(async move {
+        loop {
+            drop(listener.accept().await.unwrap());
+        }
+    });
+    let mut client = Client::connect(&remote(&socket)).await.unwrap();
+    let (begun, request) = (Instant::now(), Request::new());
+    let error = client.submit(&example(), &request, 0).await.unwrap_err();
+    assert!(matches!(error, ClientError::Uncertain { .. }), "{error:?}");
+    let told = format!("--request-id {} ", request.id);
+    assert!(error.to_string().contains(&told), "{error}");
+    assert!(begun.elapsed() <= answer_limit(), "{:?}", begun.elapsed());
+    cuts.abort();
+}
