@@ -6,7 +6,8 @@ use osteon_common::results::{Evaluation, JobResult};
 use thiserror::Error;
 
 use crate::ids::JobId;
-use crate::store::{EndRecord, Store, StoreError};
+use crate::search::Summary;
+use crate::store::{EndRecord, JobRecord, Store, StoreError};
 
 /// What an ended job left.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,19 +53,70 @@ pub enum ReadError {
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
 pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadError> {
-    let job = end.job;
-    let record = store.job(job)?.ok_or(ReadError::Pruned { job })?;
-    let summary = store.summary(job)?.ok_or(ReadError::NoSummary { job })?;
-    let outcomes = match summary.best {
-        Some(number) => {
-            let best = store.evaluation(job, number)?;
-            Some(best.ok_or(ReadError::NoBest { job, number })?.outcomes)
+    let mut reading = Reading::new(end.clone());
+    loop {
+        if let Some(leftover) = reading.step(store)? {
+            return Ok(leftover);
         }
-        None => None,
-    };
-    let specification = (*record.specification).clone();
-    let result = summary.result(&specification, &end.ending, &end.version, outcomes.as_deref());
-    Ok(Leftover { specification, result, history: summary.history })
+    }
+}
+
+/// Reading what a job left record by record, so that others have the store in between: a record
+/// may be as large as ten million realizations.
+#[derive(Debug)]
+pub(crate) struct Reading {
+    end: EndRecord,
+    record: Option<JobRecord>,
+    summary: Option<Summary>,
+}
+
+impl Reading {
+    /// Nothing is read yet.
+    pub(crate) fn new(end: EndRecord) -> Self {
+        Self { end, record: None, summary: None }
+    }
+
+    /// Reads the next record; what the job left, once that was the last. Blocks for that long.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or something is missing in it.
+    pub(crate) fn step(&mut self, store: &mut dyn Store) -> Result<Option<Leftover>, ReadError> {
+        let job = self.end.job;
+        let Some(record) = &self.record else {
+            self.record = Some(store.job(job)?.ok_or(ReadError::Pruned { job })?);
+            return Ok(None);
+        };
+        let Some(summary) = self.summary.take() else {
+            let summary = store.summary(job)?;
+            self.summary = Some(found(store, job, summary, ReadError::NoSummary { job })?);
+            return Ok(None);
+        };
+        let best = match summary.best {
+            Some(number) => {
+                let best = store.evaluation(job, number)?;
+                Some(found(store, job, best, ReadError::NoBest { job, number })?.outcomes)
+            }
+            None => None,
+        };
+        let specification = (*record.specification).clone();
+        let (ending, version) = (&self.end.ending, &self.end.version);
+        let result = summary.result(&specification, ending, version, best.as_deref());
+        Ok(Some(Leftover { specification, result, history: summary.history }))
+    }
+}
+
+/// What is missing was forgotten with its job, or is `lost`.
+fn found<T>(
+    store: &mut dyn Store,
+    job: JobId,
+    read: Option<T>,
+    lost: ReadError,
+) -> Result<T, ReadError> {
+    match read {
+        Some(read) => Ok(read),
+        None if store.job(job)?.is_none() => Err(ReadError::Pruned { job }),
+        None => Err(lost),
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The one thread that touches the store. Records are written in the order they come, each is
 //! reported as an event; what ended jobs left is read for those who fetch it.
 
+use std::collections::VecDeque;
 use std::thread::{self, JoinHandle};
 
 use osteon_common::limits::JOBS_MAX;
@@ -10,7 +11,7 @@ use crate::effect::Record;
 use crate::event::Event;
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
-use crate::leftover::{self, Leftover, ReadError};
+use crate::leftover::{Leftover, ReadError, Reading};
 use crate::store::{EndRecord, ExpulsionRecord, Store, StoreError};
 
 /// Commands that may wait: a record for every job, and some readers.
@@ -37,29 +38,58 @@ pub(crate) fn start(
     let (sender, mut commands) = mpsc::channel(COMMANDS_MAX);
     let serve = move || {
         let _guard = guard;
-        while let Some(command) = commands.blocking_recv() {
-            match command {
-                Command::Put(record) => {
-                    // Nobody listens any more when the coordinator has stopped.
-                    let _ = events.blocking_send(put(store.as_mut(), &record));
-                }
-                Command::Read { job, number } => {
-                    let found = store.evaluation(job, number).map_err(|error| error.to_string());
-                    let _ = events.blocking_send(Event::Read { job, number, found });
-                }
-                Command::Prune { token, jobs } => {
-                    let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
-                    let _ = events.blocking_send(Event::Pruned { token, jobs, outcome });
-                }
-                Command::Fetch { end, reply } => {
-                    // The reader may have gone.
-                    let _ = reply.send(leftover::read(store.as_mut(), &end));
-                }
-            }
-        }
+        serve(store.as_mut(), &mut commands, &events);
     };
     let thread = thread::Builder::new().name("store".to_owned()).spawn(serve)?;
     Ok((sender, thread))
+}
+
+/// Does what is asked for until every sender of commands is gone. Of what is fetched one record is
+/// read at a time, and a command that has come meanwhile goes first: no record of a job under way
+/// waits for longer than it takes to read one.
+pub(crate) fn serve(
+    store: &mut dyn Store,
+    commands: &mut mpsc::Receiver<Command>,
+    events: &mpsc::Sender<Event>,
+) {
+    // As many as there are fetches at once.
+    let mut readings = VecDeque::new();
+    loop {
+        let command = if readings.is_empty() {
+            match commands.blocking_recv() {
+                Some(command) => Some(command),
+                None => return,
+            }
+        } else {
+            commands.try_recv().ok()
+        };
+        match command {
+            // Nobody listens any more when the coordinator has stopped.
+            Some(Command::Put(record)) => drop(events.blocking_send(put(store, &record))),
+            Some(Command::Read { job, number }) => {
+                let found = store.evaluation(job, number).map_err(|error| error.to_string());
+                drop(events.blocking_send(Event::Read { job, number, found }));
+            }
+            Some(Command::Prune { token, jobs }) => {
+                let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
+                drop(events.blocking_send(Event::Pruned { token, jobs, outcome }));
+            }
+            Some(Command::Fetch { end, reply }) => readings.push_back((Reading::new(end), reply)),
+            None => {}
+        }
+        let Some((mut reading, reply)) = readings.pop_front() else {
+            continue;
+        };
+        // The reader may have gone.
+        if reply.is_closed() {
+            continue;
+        }
+        match reading.step(store) {
+            Ok(None) => readings.push_back((reading, reply)),
+            Ok(Some(leftover)) => drop(reply.send(Ok(leftover))),
+            Err(error) => drop(reply.send(Err(error))),
+        }
+    }
 }
 
 fn put(store: &mut dyn Store, record: &Record) -> Event {

@@ -3,7 +3,6 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
 
 use std::collections::VecDeque;

@@ -18,7 +18,7 @@ use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
     AttachRequest, FetchRequest, GetRequest, JobState, ListExpelledRequest, PruneRequest,
-    SubmitRequest, WatchRequest, WorkerHello,
+    SubmitRequest, WatchRequest,
 };
 use osteon_proto::{batch, results, specification};
 use tokio::sync::mpsc;

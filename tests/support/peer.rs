@@ -31,6 +31,7 @@ pub(crate) fn hello(process: u32) -> WorkerHello {
         threads: 1,
         host: "peer".to_owned(),
         process,
+        instance: process.into(),
     }
 }
 

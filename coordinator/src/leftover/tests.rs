@@ -8,10 +8,15 @@ use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as 
 use osteon_common::outcome::Outcome;
 use osteon_common::results::EstimatedError;
 
+use tokio::sync::{mpsc, oneshot};
+
 use super::*;
+use crate::effect::Record;
+use crate::event::{Event, RecordKey};
 use crate::search::{Ending, Search, Step};
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, JobRecord};
+use crate::store_thread::{Command, serve};
 
 const JOB: JobId = JobId(1);
 
@@ -106,4 +111,64 @@ fn a_path_without_an_evaluation_leaves_a_result() {
     store.finish_job(&end, &crate::search::Summary::empty()).unwrap();
     let left = read(&mut store, &end).unwrap();
     assert_eq!(left.result, search.result(&end.ending, &end.version));
+}
+
+/// A store with an ended job.
+fn with_ended() -> (MemoryStore, JobRecord, EndRecord) {
+    let (record, search, end, best) = ended();
+    let mut store = MemoryStore::new();
+    store.put_job(&record).unwrap();
+    store.put_evaluation(&best, false).unwrap();
+    store.finish_job(&end, &search.summary()).unwrap();
+    (store, record, end)
+}
+
+#[test]
+fn a_record_is_read_at_a_time() {
+    let (mut store, _, end) = with_ended();
+    let mut reading = Reading::new(end.clone());
+    assert_eq!(reading.step(&mut store).unwrap(), None);
+    assert_eq!(reading.step(&mut store).unwrap(), None);
+    let whole = reading.step(&mut store).unwrap();
+    assert_eq!(whole, Some(read(&mut store, &end).unwrap()));
+}
+
+#[test]
+fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
+    for steps in 0..3 {
+        let (mut store, _, end) = with_ended();
+        let mut reading = Reading::new(end);
+        for _ in 0..steps {
+            assert_eq!(reading.step(&mut store).unwrap(), None);
+        }
+        store.forget_jobs(&[JOB]).unwrap();
+        let error = reading.step(&mut store).unwrap_err();
+        assert!(matches!(error, ReadError::Pruned { job: JOB }), "after {steps}: {error}");
+    }
+}
+
+/// Two fetches are asked for, then a record is to be put and the job forgotten: neither waits until
+/// all is read.
+#[test]
+fn a_fetch_lets_others_have_the_store_in_between() {
+    let (mut store, record, end) = with_ended();
+    let (sender, mut commands) = mpsc::channel(8);
+    let (events, mut done) = mpsc::channel(8);
+    let mut fetches = Vec::new();
+    for _ in 0..2 {
+        let (reply, fetched) = oneshot::channel();
+        sender.try_send(Command::Fetch { end: end.clone(), reply }).unwrap();
+        fetches.push(fetched);
+    }
+    let other = JobRecord { job: JobId(2), ..record };
+    sender.try_send(Command::Put(Record::Job(other))).unwrap();
+    sender.try_send(Command::Prune { token: None, jobs: vec![JOB] }).unwrap();
+    drop(sender);
+    serve(&mut store, &mut commands, &events);
+    assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });
+    assert!(matches!(done.try_recv().unwrap(), Event::Pruned { outcome: Ok(()), .. }));
+    for mut fetched in fetches {
+        let error = fetched.try_recv().unwrap().unwrap_err();
+        assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
+    }
 }

@@ -47,9 +47,12 @@ pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     // No job that ended in this life can be older than that yet.
     if grace > Duration::ZERO {
         if is_first && !jobs.is_empty() {
-            tracing::warn!(jobs = jobs.len(), in_s = grace.as_secs(),
+            tracing::warn!(
+                jobs = jobs.len(),
+                in_s = grace.as_secs(),
                 "these ended jobs are older than --keep-ended by this machine's clock and will be \
-                 forgotten; stop the coordinator if the clock is wrong");
+                 forgotten; stop the coordinator if the clock is wrong"
+            );
         }
         return;
     }

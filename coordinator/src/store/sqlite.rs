@@ -29,7 +29,7 @@ mod summary;
 
 use columns::{
     JobColumns, end_checksum, evaluation, evaluation_checksum, expulsion_checksum, job_checksum,
-    nanoseconds, pack_errors, pack_outcomes, pack_workers,
+    nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 
 /// The number in the file's header, changed with the tables or not at all, that holds the highest
@@ -250,7 +250,7 @@ impl Store for SqliteStore {
         record: &EvaluationRecord,
         is_last: bool,
     ) -> Result<(), StoreError> {
-        let point: Vec<u8> = record.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let point = pack_point(record.point);
         let outcomes = pack_outcomes(&record.outcomes);
         let errors = record.estimated_error.map(pack_errors);
         let (job, number, workers) = (record.job, record.number, pack_workers(&record.workers));
@@ -436,5 +436,7 @@ fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobColumns<'a> {
     }
 }
 
+#[cfg(test)]
+mod fuzz;
 #[cfg(test)]
 mod tests;

@@ -22,7 +22,7 @@ fn nothing_is_said_before_it_is_durable() {
     rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
     let fetch = || request(8, Request::Fetch(JobId(1)));
     rig.check(fetch(), &["answer 8: job 1 has not ended; wait for it with `osteon watch 1`"]);
-    rig.check(stored(1, RecordKey::End), &[]);
+    rig.check(stored(1, RecordKey::End), &["publish 1"]);
     rig.check(fetch(), &["answer 8: ended 1"]);
     assert!(rig.state.is_idle());
 }
@@ -121,7 +121,7 @@ fn an_end_that_is_not_durable_is_none() {
     }
     let refusal = "answer 8: job 1 has not ended; wait for it with `osteon watch 1`";
     rig.check(request(8, Request::Fetch(JobId(1))), &[refusal]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn a_store_that_refuses_for_too_long_is_despaired_of_and_tried_on() {
     }
     rig.check(store_failed(1, RecordKey::End), &["despair after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_cancelled_job_ends_when_its_end_is_durable() {
     rig.check(cancel(), &["store job 1 end: cancelled ", "revoke 1: batch 1", "revoke 1: batch 2"]);
     // The answer to a revoked batch may be on its way.
     rig.check(answer(1, 1, 0, 2), &[]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     rig.check(cancel(), &["answer 7: Ended Cancelled"]);
     let refusal = "answer 7: there is no job 9; `osteon jobs` lists those there are";
     rig.check(request(7, Request::Cancel(JobId(9))), &[refusal]);
@@ -159,7 +159,7 @@ fn a_job_cancelled_while_an_evaluation_is_stored_keeps_the_evaluation() {
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     rig.check(request(7, Request::Cancel(JobId(1))), &[]);
     rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 1);
 }
@@ -256,5 +256,5 @@ fn a_drained_coordinator_stops_when_everything_is_stored() {
     rig.check(hello(2, 1), &[closed]);
     rig.check(stored(2, RecordKey::Job), &["answer 3: job 2"]);
     rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
-    rig.check(stored(1, RecordKey::End), &["stop"]);
+    rig.check(stored(1, RecordKey::End), &["publish 1", "stop"]);
 }

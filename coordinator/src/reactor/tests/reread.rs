@@ -98,7 +98,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
     rig.check(request(7, Request::Cancel(JobId(1))), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), ["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled"]);
+    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 2);
 }

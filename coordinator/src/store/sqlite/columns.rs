@@ -160,6 +160,10 @@ fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
     rest.is_empty().then_some(EstimatedError { median, largest })
 }
 
+pub(super) fn pack_point(point: Point) -> Vec<u8> {
+    point.0.into_iter().flat_map(f64::to_le_bytes).collect()
+}
+
 fn unpack(point: &[u8]) -> Option<Point> {
     let (values, rest) = point.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();

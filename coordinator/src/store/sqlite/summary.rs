@@ -39,7 +39,12 @@ fn rows(encoded: &[u8]) -> Option<Vec<osteon_common::results::Evaluation>> {
     block.rows.iter().map(|row| results::evaluation_from_message(row).ok()).collect()
 }
 
-fn summary_checksum(job: JobId, digest: &str, best: Option<u64>, history: &[u8]) -> Vec<u8> {
+pub(super) fn summary_checksum(
+    job: JobId,
+    digest: &str,
+    best: Option<u64>,
+    history: &[u8],
+) -> Vec<u8> {
     let best = best.map(u64::to_le_bytes);
     let best = best.as_ref().map_or(&[] as &[u8], <[u8; 8]>::as_slice);
     checksum(&[&job.0.to_le_bytes(), digest.as_bytes(), best, history])

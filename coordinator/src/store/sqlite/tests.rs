@@ -12,7 +12,7 @@ use super::columns::checksum;
 use super::opening::{FILE, FORMAT, Journal, open_file};
 use super::*;
 
-fn job(id: u64) -> JobRecord {
+pub(super) fn job(id: u64) -> JobRecord {
     let mut parameters =
         [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed);
     parameters[1] = Range::Free { start: 17.717e9, lower: 12e9, upper: 25e9 };
@@ -36,7 +36,7 @@ fn job(id: u64) -> JobRecord {
     }
 }
 
-fn evaluation(job: u64, number: u64) -> EvaluationRecord {
+pub(super) fn evaluation(job: u64, number: u64) -> EvaluationRecord {
     EvaluationRecord {
         job: JobId(job),
         number,
@@ -53,7 +53,7 @@ fn evaluation(job: u64, number: u64) -> EvaluationRecord {
     }
 }
 
-fn end(job: u64) -> EndRecord {
+pub(super) fn end(job: u64) -> EndRecord {
     EndRecord {
         job: JobId(job),
         ending: Ending { status: Status::Failed, reason: Some("why".to_owned()) },
@@ -74,7 +74,7 @@ fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord
     Ok(all)
 }
 
-fn summary(job: u64) -> Summary {
+pub(super) fn summary(job: u64) -> Summary {
     let row = |number| osteon_common::results::Evaluation {
         number,
         point: evaluation(job, number).point,
