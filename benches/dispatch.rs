@@ -34,6 +34,7 @@ use osteon_proto::{results, specification};
 use osteon_solver::{Solver, Workspace};
 use tonic::transport::Channel;
 
+#[expect(dead_code, reason = "each benchmark uses a part of it")]
 mod service;
 
 use service::Service;
