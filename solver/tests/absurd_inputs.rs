@@ -1,6 +1,8 @@
 //! Whatever passes validation gives a velocity or a typed failure: never a panic, never a NaN,
 //! with bits that depend on the case alone.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 use faer::{Mat, Side};
 use osteon_common::case::{Bone, Setup};
 use osteon_common::check;
@@ -9,7 +11,7 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::realization::Ensemble;
-use osteon_common::sampling::pair_count;
+use osteon_common::sampling::{Sampling, pair_count};
 use osteon_common::violations::Violations;
 use osteon_solver::{Isa, Solver, Workspace};
 use proptest::prelude::*;
@@ -28,12 +30,16 @@ fn fluid() -> impl Strategy<Value = Fluid> {
         .prop_map(|(thickness, density, sound_speed)| Fluid { thickness, density, sound_speed })
 }
 
-/// Receivers from 1 mm to 50 mm, up to 64 of them, up to 10 mm apart.
+/// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.
 fn setup() -> impl Strategy<Value = Setup> {
     let probe = (
         0.25e6..2e6,
         (0.01..0.99, 0.01..0.99),
-        (decades(-3.0, -1.3), decades(-4.0, -2.0), 3_u32..=64),
+        (
+            prop_oneof![8 => decades(-3.0, -1.3), 1 => decades(-300.0, -3.0)],
+            decades(-4.0, -2.0),
+            3_u32..=64,
+        ),
     );
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
@@ -110,6 +116,45 @@ fn is_admissible(setup: &Setup) -> bool {
     violations.is_empty() && pair_count(setup) < PAIRS_MAX
 }
 
+/// Pressures or a typed refusal, of a few periods at a few times.
+fn check_traces(solver: &Solver, bone: &Bone) {
+    let duration = 2.0 / solver.setup().probe.center_frequency;
+    let sampling =
+        Sampling::for_traces(solver.setup(), speed_bound(solver.setup(), bone), duration);
+    if sampling.pairs(sampling.band) > PAIRS_MAX {
+        return;
+    }
+    match solver.traces(bone, duration, duration / 16.0) {
+        Ok(traces) => {
+            assert_eq!(traces.pressures.len(), solver.setup().probe.receivers.count as usize);
+            for pressures in &traces.pressures {
+                assert_eq!(pressures.len(), traces.times.len());
+                assert!(pressures.iter().all(|pressure| pressure.is_finite()));
+            }
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// The direct wave of a receiver at the source is infinite there, and finite next to it.
+#[test]
+fn traces_next_to_the_source_end() {
+    let mut setup = Setup::default();
+    setup.probe.receivers.count = 3;
+    let bone = matched(&setup).unwrap();
+    let mut before = 0.0;
+    for first_x1 in [1e-3, 1e-6, 1e-12, 1e-20, 1e-40, 1e-300] {
+        setup.probe.receivers.first_x1 = first_x1;
+        let traces = Solver::new(&setup).traces(&bone, 2e-6, 1e-7).unwrap();
+        let largest =
+            |r: usize| traces.pressures[r].iter().fold(0.0_f64, |max, p| max.max(p.abs()));
+        // It grows as the logarithm of the distance.
+        assert!(largest(0) > before, "{first_x1}: {} Pa", largest(0));
+        assert!(largest(0) < 1e3 * largest(1), "{first_x1}: {} Pa", largest(0));
+        before = largest(0);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
@@ -137,7 +182,8 @@ proptest! {
             }
             Err(failure) => prop_assert!(!failure.detail.is_empty()),
         }
-        // Another bone in between leaves no trace.
+        check_traces(&solver, &bone);
+        // Another bone in between leaves no mark.
         if let Some(other) = matched(&setup) {
             let _other = solver.arrival(&other, &mut workspace);
         }

@@ -136,7 +136,7 @@ impl Solver {
         let coupling = &setup.layers.coupling;
         let (source, receivers) = (setup.probe.source, setup.probe.receivers);
         let x = receivers.x1(r as u32) - source.x1;
-        let travel = |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
+        let travel = |height: f64| libm::hypot(x, height) / coupling.sound_speed;
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
         for (i, line) in tables.lines.iter().enumerate() {
