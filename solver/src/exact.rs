@@ -34,7 +34,7 @@ use crate::isa::{Isa, Kernel};
 use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
 use crate::picking::{self, Pick};
-use crate::solver::{Arrival, Failure, check_direct_wave, not_finite};
+use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::{ComplexVector, Scalar, Vector};
 
 /// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
@@ -130,7 +130,7 @@ impl Exact {
         let medium = self.isa.run(Solid(bone));
         let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
-            return Err(not_finite("the bone's wave speeds"));
+            return Err(speed_not_finite());
         }
         check_direct_wave(&self.setup, speed)?;
         Ok((medium, speed))
@@ -249,7 +249,8 @@ fn too_large(speed: f64) -> Failure {
     Failure {
         kind: FailureKind::NoConvergence,
         detail: format!(
-            "waves of up to {speed:.0} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            "waves of up to {} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            readable(speed),
             PAIRS_MARGIN * SAMPLING_PAIRS_MAX
         ),
     }

@@ -50,7 +50,7 @@ use self::scope::Scope;
 use crate::isa::Isa;
 use crate::medium::Medium;
 use crate::picking::Window;
-use crate::solver::{check_direct_wave, not_finite};
+use crate::solver::{check_direct_wave, speed_not_finite};
 use crate::{Arrival, Failure};
 
 /// Solves cases of one setup by the hybrid method.
@@ -96,7 +96,7 @@ impl Hybrid {
     ) -> Result<Arrival, Failure> {
         let speed = Medium::new(bone).fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
-            return Err(not_finite("the bone's wave speeds"));
+            return Err(speed_not_finite());
         }
         check_direct_wave(&self.setup, speed)?;
         let HybridWorkspace { memory, windows } = workspace;

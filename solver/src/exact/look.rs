@@ -13,7 +13,7 @@ use crate::exact::tables::Tables;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
-use crate::solver::not_finite;
+use crate::solver::pressure_not_finite;
 use crate::vector::Vector;
 
 /// The tapers that the estimate of the error compares with: start and end over the band. Sharper and
@@ -117,7 +117,7 @@ impl Exact {
         workspace: &mut ExactWorkspace,
     ) -> Result<(), Failure> {
         if !workspace.spectra.is_finite() {
-            return Err(not_finite("the pressure"));
+            return Err(pressure_not_finite());
         }
         let Self { setup, distances, isa, .. } = self;
         isa.run(Observe { setup, distances, rung, look, speed, workspace });

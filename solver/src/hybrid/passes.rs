@@ -11,7 +11,7 @@ use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
 use crate::isa::Isa;
 use crate::picking::{FLOOR, Pick, Window, pick};
-use crate::solver::not_finite;
+use crate::solver::pressure_not_finite;
 use crate::{Arrival, Failure};
 
 /// How fine the first pass is, over what the setup says.
@@ -133,8 +133,7 @@ impl Passes<'_> {
         let refinement = self.setup.solver.refinement;
         let periods = self.setup.probe.center_frequency * change.shift;
         let thinness = thinness(self.setup);
-        refinement * estimate <= SMALL_ERROR * thinness
-            && refinement * periods <= SMALL_SHIFT
+        refinement * estimate <= SMALL_ERROR * thinness && refinement * periods <= SMALL_SHIFT
     }
 
     /// Computes the bone `finer` times as fine as the setup says: the packet that was found
@@ -174,7 +173,7 @@ impl Passes<'_> {
             memory: self.memory,
         });
         if !finite {
-            return Err(not_finite("the pressure"));
+            return Err(pressure_not_finite());
         }
         let Memory { pressures, row, .. } = &mut *self.memory;
         for values in pressures.chunks_exact_mut(times.samples) {
