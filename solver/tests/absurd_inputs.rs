@@ -136,6 +136,35 @@ fn check_traces(solver: &Solver, bone: &Bone) {
     }
 }
 
+/// All receivers count, and what the message names is accepted.
+#[test]
+fn traces_are_bounded_together() {
+    let mut setup = Setup::default();
+    let bone = matched(&setup).unwrap();
+    setup.probe.receivers.count = 64;
+    let solver = Solver::new(&setup);
+    let refusal = |duration, time_step| {
+        let found = solver.traces(&bone, duration, time_step);
+        found.map_err(|error| error.to_string()).unwrap_err()
+    };
+    assert_eq!(
+        refusal(16e-6, 1e-11),
+        "traces of 1.6e-5 s every 1e-11 s at 64 receivers are 1.0e8 pressures; at most 5e6 are computed: \
+         give a --time-step of 2.07e-10 s or more, shorten --duration, or lower probe.receivers.count"
+    );
+    assert!(refusal(16e-6, 2e-10).contains("64 receivers are 5.1e6 pressures"));
+    for (duration, time_step) in [(1e-9, 2e-9), (-1.0, 1.0), (1.0, 0.0), (f64::NAN, 1.0)] {
+        let text = refusal(duration, time_step);
+        assert!(
+            text.ends_with("--time-step must be above 0, and --duration at least as long"),
+            "{text}"
+        );
+    }
+    // As many, of a shorter time.
+    let traces = solver.traces(&bone, 1e-6, 2.07e-10 / 16.0).unwrap();
+    assert!(traces.pressures.len() * traces.times.len() < 5_000_000);
+}
+
 /// The direct wave of a receiver at the source is infinite there, and finite next to it.
 #[test]
 fn traces_next_to_the_source_end() {
@@ -194,4 +223,36 @@ proptest! {
             prop_assert_eq!(&again, &found, "{}", isa.name());
         }
     }
+}
+
+/// Messages say what may be wrong, and no number in them has hundreds of digits.
+#[test]
+fn numbers_out_of_scale_are_told_in_short() {
+    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let bone = Ensemble::new(&point, 1).unwrap().bone(0).unwrap();
+    let changes: [(&str, fn(&mut Setup)); 5] = [
+        ("thickness", |s| s.layers.bone_thickness = 1e-12),
+        ("frequency", |s| s.probe.center_frequency = 1e-9),
+        ("speed", |s| s.layers.marrow.sound_speed = 1e300),
+        ("distance", |s| s.probe.receivers.first_x1 = 1e300),
+        ("amplitude", |s| s.probe.amplitude = 1e300),
+    ];
+    for (what, change) in changes {
+        let mut setup = Setup::default();
+        change(&mut setup);
+        let solver = Solver::new(&setup);
+        if let Err(failure) = solver.arrival(&bone, &mut Workspace::default()) {
+            let text = failure.detail;
+            assert!(text.len() < 200, "{what}: {text}");
+            assert!(!text.contains("NaN") || text.contains("layers, probe"), "{what}: {text}");
+        }
+    }
+    let mut setup = Setup::default();
+    setup.probe.amplitude = 1e306;
+    setup.probe.receivers.first_x1 = 1e-9;
+    let refused = Solver::new(&setup).traces(&bone, 4e-6, 1e-7).map_err(|error| error.to_string());
+    assert_eq!(
+        refused.unwrap_err(),
+        "a pressure came out as NaN or infinite; a number of layers, probe, density or elasticity is out of scale"
+    );
 }
