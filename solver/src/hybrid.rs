@@ -25,7 +25,8 @@
 //!   that of time steps as r^(-2) ([`element_convergence`], [`time_step_convergence`]).
 //!
 //! The estimated error is half of the change of the velocity by the last pass, and of what the scatter
-//! of the changes of its times could make of it. It is an estimate of size, not a bound.
+//! of the changes of its times could make of it, and no less than the error of the waves' speed
+//! on a last mesh of fewer than five nodes per wavelength. It is an estimate of size, not a bound.
 
 mod convergence;
 mod element;
@@ -46,6 +47,7 @@ use osteon_common::sampling;
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
 use self::march::Memory;
 use self::passes::Passes;
+use self::plan::Budget;
 use self::scope::Scope;
 use crate::isa::Isa;
 use crate::medium::Medium;
@@ -109,6 +111,7 @@ impl Hybrid {
             memory,
             windows,
             share: None,
+            budget: Budget::default(),
         }
         .arrival()
     }

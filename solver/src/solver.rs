@@ -35,6 +35,30 @@ pub struct Arrival {
     pub times: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
+    /// What was sampled; `None` under the hybrid method, whose discretisation is the setup's.
+    pub looks: Option<Looks>,
+}
+
+/// What the exact method sampled for one bone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// How often the bone was looked at.
+    pub count: u32,
+    /// (Frequency, wavenumber) pairs that were computed in all.
+    pub pairs_computed: u64,
+    /// Sampling of the last look that counted.
+    pub last: Sampled,
+}
+
+/// Sampling of one look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampled {
+    /// Highest frequency, Hz.
+    pub band: f64,
+    /// Time after which the signal repeats, s.
+    pub period: f64,
+    /// (Frequency, wavenumber) pairs.
+    pub pairs: u64,
 }
 
 /// Why a case has no velocity.
