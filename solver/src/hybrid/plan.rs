@@ -167,7 +167,7 @@ impl Plan {
         let steps = duration / step;
         let wavenumbers = (self.blocks() * LANES) as f64;
         let work = steps * wavenumbers * self.mesh.elements() as f64;
-        if !(steps <= STEPS_MAX) {
+        if steps > STEPS_MAX || steps.is_nan() {
             return Err(too_large(format!(
                 "{steps:.1e} time steps of {step:.3e} s are too many, allowed are {STEPS_MAX:.0e}"
             )));
