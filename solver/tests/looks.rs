@@ -1,7 +1,5 @@
 //! An arrival says what was sampled for it.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
-
 use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;

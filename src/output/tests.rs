@@ -3,6 +3,7 @@ use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
+use osteon_solver::{Looks, Sampled};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
 
