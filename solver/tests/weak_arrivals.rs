@@ -27,7 +27,7 @@ fn check(name: &str, constants: [f64; 6], bound: f64) {
 
 #[test]
 fn a_weak_first_arrival_is_right() {
-    // Without a look at nothing thinned out these are off by 5.8e-4 and 1.9e-4.
+    // Without a look at nothing thinned out these are off by 5.8e-4 and 3.2e-4.
     check("stiff across", [1579.81, 17.9107e9, 0.11726, 4.09166e9, 13.1159e9, 0.27735], 1e-4);
     check("in a search's bounds", [1750.0, 20e9, 0.22, 5e9, 10e9, 0.25], 1e-4);
 }
@@ -35,7 +35,7 @@ fn a_weak_first_arrival_is_right() {
 #[test]
 fn a_bone_whose_waves_hardly_couple_has_a_velocity() {
     for nu in [0.0, 0.005, 0.01, 0.03] {
-        check("nearly decoupled", [1598.8, 17e9, nu, 4.8e9, 9.8e9, nu], 3e-4);
+        check("nearly decoupled", [1598.8, 17e9, nu, 4.8e9, 9.8e9, nu], 1e-4);
     }
 }
 

@@ -319,7 +319,9 @@ mod tests {
             let drawn = drawn(1, index).unwrap().unwrap();
             let one = Measured::of(index, drawn, Isa::fastest(), &mut Workspace::default());
             let error = one.difference.velocity();
-            assert!(error.is_some_and(|error| error < 2e-4), "{error:?}: {}", one.described());
+            // No better than the reference knows itself.
+            let bound = one.reference.as_ref().map_or(0.0, |found| found.estimated_error).max(2e-4);
+            assert!(error.is_some_and(|error| error < bound), "{error:?}: {}", one.described());
         }
     }
 

@@ -21,7 +21,7 @@ const SECOND: f64 = 1.2;
 /// How much finer every pass from the third on is than the one before.
 const FINER: f64 = 1.5;
 /// Most passes.
-const PASSES_MAX: usize = 4;
+const PASSES_MAX: usize = 5;
 /// Passes without a velocity after which there is none: coarse ones can miss a weak arrival.
 const FAILURES_MAX: usize = 3;
 /// After the first, passes look this many periods of the centre frequency beyond the picked
@@ -37,6 +37,10 @@ const SMALL_ERROR: f64 = 2.5e-5;
 /// all times shift alike is the error of the elements, which falls fast; that they scatter is the
 /// kink's, and part of the estimated error.
 const SMALL_SHIFT: f64 = 2.5e-3;
+
+/// Largest change of a time against the mean, in periods of the centre frequency, at which passes end: a
+/// flat extremum moves by more than a line through all of them tells.
+const SMALL_SCATTER: f64 = 5e-4;
 
 /// A bone on its way through the passes.
 pub(super) struct Passes<'a> {
@@ -145,7 +149,9 @@ impl Passes<'_> {
         let refinement = self.setup.solver.refinement;
         let periods = self.setup.probe.center_frequency * change.shift;
         let thinness = thinness(self.setup);
-        refinement * estimate <= SMALL_ERROR * thinness && refinement * periods <= SMALL_SHIFT
+        refinement * estimate <= SMALL_ERROR * thinness
+            && refinement * periods <= SMALL_SHIFT
+            && refinement * self.setup.probe.center_frequency * change.scatter <= SMALL_SCATTER
     }
 
     /// Computes the bone `finer` times as fine as the setup says: the packet that was found
