@@ -8,9 +8,11 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::results_json;
 use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_solver::{Arrival, Failure};
 use osteon_study::check::Check;
+use serde_json::{Value, json};
 
 use crate::resolved::Format;
 
@@ -38,6 +40,20 @@ pub(crate) struct ShownSimulation<'a> {
     pub(crate) traces: Option<&'a Path>,
     /// The same case solved in other ways, if that was asked for.
     pub(crate) check: Option<&'a Check>,
+}
+
+/// The object `solver` of one solved case: the sampling that decided, where it is known.
+fn solver_value(setup: &Setup, arrival: Option<&Arrival>) -> Value {
+    let estimated_error = json!(arrival.map(|arrival| arrival.estimated_error));
+    let mut value = results_json::solver(setup, estimated_error);
+    if let Some(looks) = arrival.and_then(|arrival| arrival.looks) {
+        value["band"] = json!(looks.last.band);
+        value["period"] = json!(looks.last.period);
+        value["pairs"] = json!(looks.last.pairs);
+        value["pairs_computed"] = json!(looks.pairs_computed);
+        value["looks"] = json!(looks.count);
+    }
+    value
 }
 
 /// One way to print. Every method writes whole lines.

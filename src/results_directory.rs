@@ -6,7 +6,7 @@
 //! cancelled job.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{Read as _, Write as _};
+use std::io::{BufWriter, IntoInnerError, Read as _, Write};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
@@ -229,13 +229,21 @@ pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
 
 /// Writes `text` to `path` so that a reader sees either what was there before, or all of it.
 pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    write_by(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// The same for what `print` writes piece by piece.
+pub(crate) fn write_by(
+    path: &Path,
+    print: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> anyhow::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".part");
     let part = path.with_file_name(name);
     let write = || -> std::io::Result<()> {
-        let mut file = File::create(&part)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
+        let mut file = BufWriter::new(File::create(&part)?);
+        print(&mut file)?;
+        file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
         fs::rename(&part, path)
     };
     write().with_context(|| format!("cannot write {}", path.display()))

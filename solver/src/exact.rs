@@ -34,7 +34,7 @@ use crate::isa::{Isa, Kernel};
 use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
 use crate::picking::{self, Pick};
-use crate::solver::{Arrival, Failure, check_direct_wave, not_finite};
+use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::{ComplexVector, Scalar, Vector};
 
 /// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
@@ -115,14 +115,16 @@ impl Exact {
     ) -> Result<Arrival, Failure> {
         let (medium, speed) = self.solid(bone)?;
         let rung = sampling::rung(&self.setup, speed).ok_or_else(|| too_large(speed))?;
-        let mut sight = Sight { exact: self, medium: &medium, speed, rung, workspace };
+        let mut sight =
+            Sight { exact: self, medium: &medium, speed, rung, workspace, count: 0, pairs: 0 };
         let mut found = sight.looks();
         let next = sampling::nearness_to_next(&self.setup, rung, speed);
         if next > 0.0 {
             sight.rung += 1;
             found = self.merged_if_possible(found, sight.looks(), next);
         }
-        found.map(Arrival::from)
+        let Sight { count, pairs, .. } = sight;
+        found.map(|found| found.arrival(count, pairs))
     }
 
     /// The solid of a bone, and the bound of every wave's speed, m/s.
@@ -130,7 +132,7 @@ impl Exact {
         let medium = self.isa.run(Solid(bone));
         let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
-            return Err(not_finite("the bone's wave speeds"));
+            return Err(speed_not_finite());
         }
         check_direct_wave(&self.setup, speed)?;
         Ok((medium, speed))
@@ -235,13 +237,8 @@ impl Exact {
         let ratio = blend(first.pick.ratio, second.pick.ratio);
         let prominence = blend(first.pick.prominence, second.pick.prominence);
         let error = blend(first.error, second.error);
-        Ok(Estimated { pick: Pick { velocity, times, ratio, residual, prominence }, error })
-    }
-}
-
-impl From<Estimated> for Arrival {
-    fn from(Estimated { pick, error }: Estimated) -> Self {
-        Self { velocity: pick.velocity, times: pick.times, estimated_error: error }
+        let pick = Pick { velocity, times, ratio, residual, prominence };
+        Ok(Estimated { pick, error, sampled: second.sampled })
     }
 }
 
@@ -249,7 +246,8 @@ fn too_large(speed: f64) -> Failure {
     Failure {
         kind: FailureKind::NoConvergence,
         detail: format!(
-            "waves of up to {speed:.0} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            "waves of up to {} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            readable(speed),
             PAIRS_MARGIN * SAMPLING_PAIRS_MAX
         ),
     }
@@ -268,6 +266,10 @@ struct Sight<'a> {
     speed: f64,
     rung: usize,
     workspace: &'a mut ExactWorkspace,
+    /// Looks so far.
+    count: u32,
+    /// (Frequency, wavenumber) pairs that were computed so far.
+    pairs: u64,
 }
 
 impl Sight<'_> {
@@ -336,6 +338,7 @@ impl Sight<'_> {
         self.exact.fill_plate(self.medium, accurate);
         spectra.clear(&rung.tables);
         spectra.fill(self.exact.isa, &rung.tables, self.medium, accurate, 0..rung.whole.lines);
+        self.pairs += rung.whole.sampled.pairs;
         self.look(rung, &rung.whole)
     }
 
@@ -343,9 +346,11 @@ impl Sight<'_> {
     fn fill(&mut self, rung: &Rung, from: usize, to: usize) {
         let ExactWorkspace { fast, spectra, .. } = &mut *self.workspace;
         spectra.fill(self.exact.isa, &rung.tables, self.medium, fast, from..to);
+        self.pairs += rung.tables.pairs(from..to);
     }
 
     fn look(&mut self, rung: &Rung, look: &Look) -> Result<Estimated, Failure> {
+        self.count += 1;
         self.exact.observe(self.speed, rung, look, self.workspace)?;
         self.exact.picked(rung, look, self.workspace)
     }

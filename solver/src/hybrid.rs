@@ -25,7 +25,8 @@
 //!   that of time steps as r^(-2) ([`element_convergence`], [`time_step_convergence`]).
 //!
 //! The estimated error is half of the change of the velocity by the last pass, and of what the scatter
-//! of the changes of its times could make of it. It is an estimate of size, not a bound.
+//! of the changes of its times could make of it, and no less than the error of the waves' speed
+//! on a last mesh of fewer than five nodes per wavelength. It is an estimate of size, not a bound.
 
 mod convergence;
 mod element;
@@ -46,11 +47,12 @@ use osteon_common::sampling;
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
 use self::march::Memory;
 use self::passes::Passes;
+use self::plan::Budget;
 use self::scope::Scope;
 use crate::isa::Isa;
 use crate::medium::Medium;
 use crate::picking::Window;
-use crate::solver::{check_direct_wave, not_finite};
+use crate::solver::{check_direct_wave, speed_not_finite};
 use crate::{Arrival, Failure};
 
 /// Solves cases of one setup by the hybrid method.
@@ -96,7 +98,7 @@ impl Hybrid {
     ) -> Result<Arrival, Failure> {
         let speed = Medium::new(bone).fastest.max(self.setup.layers.marrow.sound_speed);
         if !speed.is_finite() {
-            return Err(not_finite("the bone's wave speeds"));
+            return Err(speed_not_finite());
         }
         check_direct_wave(&self.setup, speed)?;
         let HybridWorkspace { memory, windows } = workspace;
@@ -109,6 +111,7 @@ impl Hybrid {
             memory,
             windows,
             share: None,
+            budget: Budget::default(),
         }
         .arrival()
     }

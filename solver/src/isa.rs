@@ -5,6 +5,8 @@
 //! multiply-adds, whose results do not depend on how many lanes fit into a register. Without
 //! hardware support a fused multiply-add is a slow but exact function call.
 
+#[cfg(target_arch = "aarch64")]
+use crate::vector::Neon;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Fma};
 use crate::vector::{Scalar, Vector};
@@ -22,14 +24,16 @@ enum Kind {
     Avx2,
     #[cfg(target_arch = "x86_64")]
     Avx512,
+    #[cfg(target_arch = "aarch64")]
+    Neon,
 }
 
 impl Isa {
     /// The instruction sets that this machine offers, slowest first.
     pub fn available() -> Vec<Self> {
         #[cfg_attr(
-            not(target_arch = "x86_64"),
-            expect(unused_mut, reason = "only x86-64 has more")
+            not(any(target_arch = "x86_64", target_arch = "aarch64")),
+            expect(unused_mut, reason = "other processors have no more")
         )]
         let mut sets = vec![Self(Kind::Baseline)];
         #[cfg(target_arch = "x86_64")]
@@ -43,6 +47,10 @@ impl Isa {
                     sets.push(Self(Kind::Avx512));
                 }
             }
+        }
+        #[cfg(target_arch = "aarch64")]
+        if std::arch::is_aarch64_feature_detected!("neon") {
+            sets.push(Self(Kind::Neon));
         }
         sets
     }
@@ -67,6 +75,8 @@ impl Isa {
             Kind::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
             Kind::Avx512 => "avx512",
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon => "neon",
         }
     }
 
@@ -83,6 +93,9 @@ impl Isa {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Kind::Avx512 => unsafe { avx512(kernel) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon => unsafe { neon(kernel) },
         }
     }
 }
@@ -113,4 +126,35 @@ fn avx2<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx512f,avx2,fma")]
 fn avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
+}
+
+#[cfg(target_arch = "aarch64")]
+#[target_feature(enable = "neon")]
+fn neon<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Neon>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every register of `vector.rs` computes on some machine, and no machine goes without the best
+    /// that it certainly has.
+    #[test]
+    fn every_kind_of_register_is_offered() {
+        let names: Vec<&str> = Isa::available().into_iter().map(Isa::name).collect();
+        assert_eq!(names[0], "baseline");
+        #[cfg(target_arch = "aarch64")]
+        assert_eq!(names, ["baseline", "neon"]);
+        let sources = (include_str!("isa.rs"), include_str!("vector.rs"));
+        let registers = sources.1.split("vector!(").skip(1).map(|text| {
+            let name = text.lines().find(|line| line.contains("_t, ") || line.contains("__m"));
+            name.and_then(|line| line.trim().split(',').next()).unwrap()
+        });
+        let registers: Vec<&str> = registers.collect();
+        assert_eq!(registers, ["Fma", "Avx2", "Avx512", "Neon"]);
+        for register in registers {
+            assert!(sources.0.contains(&format!("kernel.run::<{register}>()")), "{register}");
+        }
+    }
 }

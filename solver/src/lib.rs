@@ -26,9 +26,9 @@ mod solver;
 mod vector;
 
 pub use complex::Complex;
-pub use exact::{admittance, fastest_wave};
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
+pub use exact::{admittance, fastest_wave};
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::Isa;
-pub use solver::{Arrival, Failure, Solver, Workspace};
+pub use solver::{Arrival, Failure, Looks, Sampled, Solver, Workspace};

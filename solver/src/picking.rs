@@ -92,7 +92,7 @@ pub(crate) fn pick(
         return Err(Failure {
             kind: FailureKind::DirectWaveFirst,
             detail: format!(
-                "at receiver {} (x1 = {} m from the source) the direct wave arrives before the first \
+                "at receiver {} ({:?} m from the source) the direct wave arrives before the first \
                  extremum of the wave through the bone",
                 r + 1,
                 distances[r]

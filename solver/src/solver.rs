@@ -35,6 +35,30 @@ pub struct Arrival {
     pub times: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
+    /// What was sampled; `None` under the hybrid method, whose discretisation is the setup's.
+    pub looks: Option<Looks>,
+}
+
+/// What the exact method sampled for one bone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// How often the bone was looked at.
+    pub count: u32,
+    /// (Frequency, wavenumber) pairs that were computed in all.
+    pub pairs_computed: u64,
+    /// Sampling of the last look that counted.
+    pub last: Sampled,
+}
+
+/// Sampling of one look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampled {
+    /// Highest frequency, Hz.
+    pub band: f64,
+    /// Time after which the signal repeats, s.
+    pub period: f64,
+    /// (Frequency, wavenumber) pairs.
+    pub pairs: u64,
 }
 
 /// Why a case has no velocity.
@@ -100,11 +124,11 @@ pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure
             return Err(Failure {
                 kind: FailureKind::DirectWaveFirst,
                 detail: format!(
-                    "at receiver {} ({x} m from the source) the direct wave arrives at {:.3} µs, a wave \
-                     through the bone not before {:.3} µs",
+                    "at receiver {} ({x:?} m from the source) the direct wave arrives at {} µs, a wave \
+                     through the bone not before {} µs",
                     r + 1,
-                    direct * 1e6,
-                    earliest * 1e6
+                    readable(direct * 1e6),
+                    readable(earliest * 1e6)
                 ),
             });
         }
@@ -112,11 +136,46 @@ pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure
     Ok(())
 }
 
-pub(crate) fn not_finite(what: &str) -> Failure {
+/// A number in a sentence: three decimals, or an exponent where that would be a row of zeros.
+pub(crate) fn readable(value: f64) -> String {
+    if (1e-2..1e6).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.3e}") }
+}
+
+/// What to look at when a pressure is not finite.
+pub(crate) const OUT_OF_SCALE: &str =
+    "a number of layers, probe, density or elasticity is out of scale";
+
+/// The failure of a bone whose waves have no finite speed.
+pub(crate) fn speed_not_finite() -> Failure {
     Failure {
         kind: FailureKind::NotFinite,
-        detail: format!(
-            "{what} came out as NaN or infinite; density or elasticity is out of scale"
-        ),
+        detail: "the bone's wave speeds came out as NaN or infinite; density or elasticity is out of scale"
+            .to_owned(),
+    }
+}
+
+/// The failure of a case whose pressure is not finite.
+pub(crate) fn pressure_not_finite() -> Failure {
+    Failure {
+        kind: FailureKind::NotFinite,
+        detail: format!("the pressure came out as NaN or infinite; {OUT_OF_SCALE}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_sentences_are_short() {
+        for (value, expected) in [
+            (14.26666, "14.267"),
+            (-0.05, "-0.050"),
+            (1e300, "1.000e300"),
+            (6.7e-16, "6.700e-16"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(readable(value), expected);
+        }
     }
 }

@@ -114,7 +114,7 @@ impl Vector for Scalar {
 /// Implements [`Vector`] by the intrinsics of one instruction set.
 macro_rules! vector {
     ($(#[$doc:meta])* $name:ident, $register:ty, $width:expr, $splat:path, $load:path, $store:path,
-     $add:path, $sub:path, $mul:path, $div:path, $sqrt:path, $mul_add:expr, $mul_sub:expr, $mul_sub_from:expr) => {
+     $add:path, $sub:path, $mul:path, $div:path, $sqrt:path, $mul_add:path, $mul_sub:path, $mul_sub_from:path) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub(crate) struct $name($register);
@@ -240,8 +240,28 @@ mod aarch64 {
     vector!(
         /// Two numbers.
         Neon, float64x2_t, 2, vdupq_n_f64, vld1q_f64, vst1q_f64, vaddq_f64, vsubq_f64, vmulq_f64, vdivq_f64, vsqrtq_f64,
-        |a, b, c| vfmaq_f64(c, a, b), |a, b, c| vfmaq_f64(vnegq_f64(c), a, b), |a, b, c| vfmsq_f64(c, a, b)
+        mul_add, mul_sub, mul_sub_from
     );
+
+    // The intrinsics take the addend first.
+
+    #[inline(always)]
+    unsafe fn mul_add(a: float64x2_t, b: float64x2_t, addend: float64x2_t) -> float64x2_t {
+        // SAFETY: that of the caller.
+        unsafe { vfmaq_f64(addend, a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_sub(a: float64x2_t, b: float64x2_t, subtrahend: float64x2_t) -> float64x2_t {
+        // SAFETY: that of the caller.
+        unsafe { vfmaq_f64(vnegq_f64(subtrahend), a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_sub_from(a: float64x2_t, b: float64x2_t, minuend: float64x2_t) -> float64x2_t {
+        // SAFETY: that of the caller.
+        unsafe { vfmsq_f64(minuend, a, b) }
+    }
 }
 
 #[cfg(target_arch = "aarch64")]

@@ -9,13 +9,15 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::realization::Ensemble;
-use osteon_common::sampling::pair_count;
+use osteon_common::sampling::{Sampling, pair_count};
 use osteon_common::violations::Violations;
 use osteon_solver::{Isa, Solver, Workspace};
 use proptest::prelude::*;
 
 /// Setups with more pairs are left out: they are as right, and take too long here.
 const PAIRS_MAX: f64 = 3e4;
+
+type Change = fn(&mut Setup);
 
 /// 10^exponent for an exponent between the given ones.
 fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
@@ -28,12 +30,16 @@ fn fluid() -> impl Strategy<Value = Fluid> {
         .prop_map(|(thickness, density, sound_speed)| Fluid { thickness, density, sound_speed })
 }
 
-/// Receivers from 1 mm to 50 mm, up to 64 of them, up to 10 mm apart.
+/// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.
 fn setup() -> impl Strategy<Value = Setup> {
     let probe = (
         0.25e6..2e6,
         (0.01..0.99, 0.01..0.99),
-        (decades(-3.0, -1.3), decades(-4.0, -2.0), 3_u32..=64),
+        (
+            prop_oneof![8 => decades(-3.0, -1.3), 1 => decades(-300.0, -3.0)],
+            decades(-4.0, -2.0),
+            3_u32..=64,
+        ),
     );
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
@@ -110,6 +116,74 @@ fn is_admissible(setup: &Setup) -> bool {
     violations.is_empty() && pair_count(setup) < PAIRS_MAX
 }
 
+/// Pressures or a typed refusal, of a few periods at a few times.
+fn check_traces(solver: &Solver, bone: &Bone) {
+    let duration = 2.0 / solver.setup().probe.center_frequency;
+    let sampling =
+        Sampling::for_traces(solver.setup(), speed_bound(solver.setup(), bone), duration);
+    if sampling.pairs(sampling.band) > PAIRS_MAX {
+        return;
+    }
+    match solver.traces(bone, duration, duration / 16.0) {
+        Ok(traces) => {
+            assert_eq!(traces.pressures.len(), solver.setup().probe.receivers.count as usize);
+            for pressures in &traces.pressures {
+                assert_eq!(pressures.len(), traces.times.len());
+                assert!(pressures.iter().all(|pressure| pressure.is_finite()));
+            }
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// All receivers count, and what the message names is accepted.
+#[test]
+fn traces_are_bounded_together() {
+    let mut setup = Setup::default();
+    let bone = matched(&setup).unwrap();
+    setup.probe.receivers.count = 64;
+    let solver = Solver::new(&setup);
+    let refusal = |duration, time_step| {
+        let found = solver.traces(&bone, duration, time_step);
+        found.map_err(|error| error.to_string()).unwrap_err()
+    };
+    assert_eq!(
+        refusal(16e-6, 1e-11),
+        "traces of 1.6e-5 s every 1e-11 s at 64 receivers are 1.0e8 pressures; at most 5e6 are computed: \
+         give a --time-step of 2.07e-10 s or more, shorten --duration, or lower probe.receivers.count"
+    );
+    assert!(refusal(16e-6, 2e-10).contains("64 receivers are 5.1e6 pressures"));
+    for (duration, time_step) in [(1e-9, 2e-9), (-1.0, 1.0), (1.0, 0.0), (f64::NAN, 1.0)] {
+        let text = refusal(duration, time_step);
+        assert!(
+            text.ends_with("--time-step must be above 0, and --duration at least as long"),
+            "{text}"
+        );
+    }
+    // As many, of a shorter time.
+    let traces = solver.traces(&bone, 1e-6, 2.07e-10 / 16.0).unwrap();
+    assert!(traces.pressures.len() * traces.times.len() < 5_000_000);
+}
+
+/// The direct wave of a receiver at the source is infinite there, and finite next to it.
+#[test]
+fn traces_next_to_the_source_end() {
+    let mut setup = Setup::default();
+    setup.probe.receivers.count = 3;
+    let bone = matched(&setup).unwrap();
+    let mut before = 0.0;
+    for first_x1 in [1e-3, 1e-6, 1e-12, 1e-20, 1e-40, 1e-300] {
+        setup.probe.receivers.first_x1 = first_x1;
+        let traces = Solver::new(&setup).traces(&bone, 2e-6, 1e-7).unwrap();
+        let largest =
+            |r: usize| traces.pressures[r].iter().fold(0.0_f64, |max, p| max.max(p.abs()));
+        // It grows as the logarithm of the distance.
+        assert!(largest(0) > before, "{first_x1}: {} Pa", largest(0));
+        assert!(largest(0) < 1e3 * largest(1), "{first_x1}: {} Pa", largest(0));
+        before = largest(0);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
@@ -137,7 +211,8 @@ proptest! {
             }
             Err(failure) => prop_assert!(!failure.detail.is_empty()),
         }
-        // Another bone in between leaves no trace.
+        check_traces(&solver, &bone);
+        // Another bone in between leaves no mark.
         if let Some(other) = matched(&setup) {
             let _other = solver.arrival(&other, &mut workspace);
         }
@@ -148,4 +223,36 @@ proptest! {
             prop_assert_eq!(&again, &found, "{}", isa.name());
         }
     }
+}
+
+/// Messages say what may be wrong, and no number in them has hundreds of digits.
+#[test]
+fn numbers_out_of_scale_are_told_in_short() {
+    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let bone = Ensemble::new(&point, 1).unwrap().bone(0).unwrap();
+    let changes: [(&str, Change); 5] = [
+        ("thickness", |s| s.layers.bone_thickness = 1e-12),
+        ("frequency", |s| s.probe.center_frequency = 1e-9),
+        ("speed", |s| s.layers.marrow.sound_speed = 1e300),
+        ("distance", |s| s.probe.receivers.first_x1 = 1e300),
+        ("amplitude", |s| s.probe.amplitude = 1e300),
+    ];
+    for (what, change) in changes {
+        let mut setup = Setup::default();
+        change(&mut setup);
+        let solver = Solver::new(&setup);
+        if let Err(failure) = solver.arrival(&bone, &mut Workspace::default()) {
+            let text = failure.detail;
+            assert!(text.len() < 200, "{what}: {text}");
+            assert!(!text.contains("NaN") || text.contains("layers, probe"), "{what}: {text}");
+        }
+    }
+    let mut setup = Setup::default();
+    setup.probe.amplitude = 1e306;
+    setup.probe.receivers.first_x1 = 1e-9;
+    let refused = Solver::new(&setup).traces(&bone, 4e-6, 1e-7).map_err(|error| error.to_string());
+    assert_eq!(
+        refused.unwrap_err(),
+        "a pressure came out as NaN or infinite; a number of layers, probe, density or elasticity is out of scale"
+    );
 }

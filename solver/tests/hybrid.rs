@@ -223,3 +223,42 @@ fn absurd_inputs_are_typed_failures_or_right() {
         Some(FailureKind::DirectWaveFirst)
     );
 }
+
+/// The bound is on all passes of a bone together, and a thin plate that is refined stays within it.
+#[test]
+fn work_is_bounded_per_bone() {
+    let bone = bone(0.1, 7, 0);
+    let mut thin = setup(|s| s.layers.bone_thickness = 1e-3);
+    thin.solver.refinement = 4.0;
+    assert!(hybrid(&thin, &bone).unwrap().estimated_error < 1e-3);
+    let wide = setup(|s| {
+        s.probe.receivers.count = 64;
+        s.probe.receivers.pitch = 5e-3;
+    });
+    let failure = hybrid(&wide, &bone).unwrap_err();
+    assert_eq!(failure.kind, FailureKind::NoConvergence);
+    assert!(failure.detail.contains("at most 8e8 are computed for one bone"), "{}", failure.detail);
+    assert!(failure.detail.contains("solver.element_size"), "{}", failure.detail);
+}
+
+/// Passes that do not resolve the waves can agree; the estimate says that this means nothing.
+#[test]
+fn a_mesh_that_resolves_nothing_says_so() {
+    let bone = bone(0.1, 7, 0);
+    let exact = Solver::new(&Setup::default()).arrival(&bone, &mut Workspace::default()).unwrap();
+    for (element_size, element_order) in
+        [(1e-2, 2), (5e-3, 2), (2e-3, 2), (1e-3, 2), (1e-2, 4), (5e-3, 4), (2e-3, 4), (5e-3, 8)]
+    {
+        let setup = setup(|s| {
+            s.solver.element_size = element_size;
+            s.solver.element_order = element_order;
+        });
+        let Ok(found) = hybrid(&setup, &bone) else { continue };
+        let error = (found.velocity / exact.velocity - 1.0).abs();
+        assert!(
+            error < 10.0 * found.estimated_error,
+            "{element_size} m, order {element_order}: {error:e}, estimated {:e}",
+            found.estimated_error
+        );
+    }
+}

@@ -1,6 +1,6 @@
 //! `simulate`: one deterministic case.
 
-use std::fmt::Write as _;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -46,8 +46,8 @@ fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved,
             let traces = solver
                 .traces(&case.bone, arguments.duration, arguments.time_step)
                 .map_err(trace_failure)?;
-            let text = csv(&traces, case.setup.probe.receivers.positions());
-            Some(write(directory, &text).map_err(Failure::Failed)?)
+            let positions = case.setup.probe.receivers.positions();
+            Some(write(directory, &traces, positions).map_err(Failure::Failed)?)
         }
         None => None,
     };
@@ -58,35 +58,44 @@ fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved,
 
 fn trace_failure(error: TraceError) -> Failure {
     match error {
-        TraceError::Samples { .. } | TraceError::TooLong { .. } => Failure::bad_input(error),
+        TraceError::Times { .. } | TraceError::TooMany { .. } | TraceError::TooLong { .. } => {
+            Failure::bad_input(error)
+        }
         TraceError::NotFinite => Failure::failed(error),
     }
 }
 
-fn write(directory: &Path, text: &str) -> anyhow::Result<PathBuf> {
+fn write(
+    directory: &Path,
+    traces: &Traces,
+    positions: impl Iterator<Item = f64>,
+) -> anyhow::Result<PathBuf> {
     std::fs::create_dir_all(directory)
         .with_context(|| format!("cannot create the directory {}", directory.display()))?;
     let path = directory.join("traces.csv");
-    results_directory::write(&path, text)?;
+    results_directory::write_by(&path, |file| csv(traces, positions, file))?;
     Ok(path)
 }
 
 /// `time`, then one column per receiver headed by its x1.
-fn csv(traces: &Traces, positions: impl Iterator<Item = f64>) -> String {
-    let mut text = "time".to_owned();
-    // Writing to a string does not fail.
+fn csv(
+    traces: &Traces,
+    positions: impl Iterator<Item = f64>,
+    file: &mut dyn Write,
+) -> io::Result<()> {
+    write!(file, "time")?;
     for x1 in positions {
-        let _infallible = write!(text, ",{x1:?}");
+        write!(file, ",{x1:?}")?;
     }
-    text.push('\n');
+    writeln!(file)?;
     for (sample, time) in traces.times.iter().enumerate() {
-        let _infallible = write!(text, "{time:?}");
+        write!(file, "{time:?}")?;
         for pressure in &traces.pressures {
-            let _infallible = write!(text, ",{:?}", pressure[sample]);
+            write!(file, ",{:?}", pressure[sample])?;
         }
-        text.push('\n');
+        writeln!(file)?;
     }
-    text
+    Ok(())
 }
 
 #[cfg(test)]
@@ -99,8 +108,10 @@ mod tests {
             times: vec![0.0, 1e-8],
             pressures: vec![vec![0.0, 1.5], vec![-0.25, 1e-30], vec![0.0, 0.0]],
         };
+        let mut file = Vec::new();
+        csv(&traces, [0.011, 0.0118, 0.0126].into_iter(), &mut file).unwrap();
         assert_eq!(
-            csv(&traces, [0.011, 0.0118, 0.0126].into_iter()),
+            String::from_utf8(file).unwrap(),
             "time,0.011,0.0118,0.0126\n0.0,0.0,-0.25,0.0\n1e-8,1.5,1e-30,0.0\n"
         );
     }

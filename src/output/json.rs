@@ -2,13 +2,13 @@
 
 use std::io::{self, Write};
 
-use osteon_common::{results_json, version};
+use osteon_common::version;
 use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
 use serde_json::{Value, json};
 
-use super::{Output, ShownResult, ShownSimulation};
+use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::output::text::{kind_name, state_name, status_name};
 
 /// Output for programs.
@@ -35,7 +35,6 @@ impl Output for JsonOutput<'_> {
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         let setup = simulation.setup;
         let arrival = simulation.arrival;
-        let estimated_error = arrival.as_ref().ok().map(|arrival| arrival.estimated_error);
         let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
             let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
             json!({ "x1": x1, "time": time })
@@ -50,7 +49,7 @@ impl Output for JsonOutput<'_> {
                 "extremum": setup.picking.extremum.name(),
                 "threshold": setup.picking.threshold,
             },
-            "solver": results_json::solver(setup, json!(estimated_error)),
+            "solver": solver_value(setup, arrival.as_ref().ok()),
             "version": version::VERSION,
         });
         if let Some(check) = simulation.check {
@@ -84,8 +83,7 @@ impl Output for JsonOutput<'_> {
 /// The object `solver` of one solution, with what came out and how it differs from the refined one.
 fn solution_value(solution: &Solution) -> Value {
     let arrival = solution.arrival.as_ref();
-    let estimated_error = arrival.ok().map(|arrival| arrival.estimated_error);
-    let mut value = results_json::solver(&solution.setup, json!(estimated_error));
+    let mut value = solver_value(&solution.setup, arrival.ok());
     value["velocity"] = json!(arrival.ok().map(|arrival| arrival.velocity));
     value["failure"] = json!(arrival.err().map(|failure| failure.kind.name()));
     value["same_pick"] = json!(solution.difference != Difference::Picks);

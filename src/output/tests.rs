@@ -3,6 +3,7 @@ use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
+use osteon_solver::{Looks, Sampled};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
 
@@ -151,6 +152,7 @@ fn arrival() -> Arrival {
         velocity: 3908.75,
         times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
         estimated_error: 2e-5,
+        looks: None,
     }
 }
 
@@ -186,6 +188,23 @@ fn a_simulation_without_velocity_says_why() {
     insta::assert_snapshot!(simulation(Format::Json, &Err(failure()), None));
 }
 
+#[test]
+fn the_sampling_that_decided_is_shown() {
+    let last = Sampled { band: 12.5e6, period: 1.1e-5, pairs: 9000 };
+    let looks = Some(Looks { count: 3, pairs_computed: 17_000, last });
+    let arrival = Ok(Arrival { looks, ..arrival() });
+    let setup = setup(Method::Exact);
+    let shown = ShownSimulation { setup: &setup, arrival: &arrival, traces: None, check: None };
+    let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
+    let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
+    assert!(text(Format::Text).contains(line), "{}", text(Format::Text));
+    let value: serde_json::Value = serde_json::from_str(&text(Format::Json)).unwrap();
+    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("looks", 3)];
+    for (key, number) in expected {
+        assert_eq!(value["solver"][key], number, "{value:#}");
+    }
+}
+
 /// A check in which the hybrid method differs as given.
 fn checked(hybrid: Difference) -> Check {
     let solution = |method, velocity, difference| Solution {
@@ -211,7 +230,9 @@ fn a_check_shows_every_solution_and_whether_it_passed() {
     assert!(text(&checked(Difference::Picks)).contains("THE PICKS DIFFER\n"));
     let mut off = same.clone();
     off.exact.difference = Difference::Numbers { velocity: 1.1e-4, time: 1e-9 };
-    assert!(text(&off).contains("THE EXACT METHOD IS OFF by more than 1e-4\n"), "{}", text(&off));
+    assert!(text(&off).contains("OFF by more than 1e-4: EXACT\n"), "{}", text(&off));
+    off.hybrid.difference = Difference::Numbers { velocity: 2.7e-4, time: 1e-9 };
+    assert!(text(&off).contains("OFF by more than 1e-4: EXACT AND HYBRID\n"), "{}", text(&off));
     let json = simulation(Format::Json, &Ok(arrival()), Some(&same));
     let check = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["check"];
     assert_eq!(check.as_array().unwrap().len(), 3);

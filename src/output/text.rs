@@ -6,10 +6,9 @@ mod solver;
 
 use std::io::{self, Write};
 
-use osteon_common::results_json;
 use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
-use super::{Output, ShownResult, ShownSimulation};
+use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::client;
 use crate::progress::{describe, span};
 
@@ -139,8 +138,7 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
             text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
         }
     }
-    let estimated_error = simulation.arrival.as_ref().ok().map(|arrival| arrival.estimated_error);
-    let solver = results_json::solver(simulation.setup, estimated_error.into());
+    let solver = solver_value(simulation.setup, simulation.arrival.as_ref().ok());
     text.push_str(&format!("\n{}\n", solver::line(&solver)));
     if let Some(check) = simulation.check {
         text.push_str(&format!("\n{}", check::table(check)));

@@ -9,7 +9,7 @@ use osteon_solver::{Arrival, Failure};
 /// thousandth.
 const SAME_EXTREMUM: f64 = 0.1;
 
-/// Largest relative error of the exact method's velocity.
+/// Largest relative error of a velocity.
 const ERROR_MAX: f64 = 1e-4;
 /// The same in a thin plate: its first extremum lies closer to the wave of the pulse's kink.
 const ERROR_MAX_THIN: f64 = 3e-4;
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     fn arrival(velocity: f64, times: [f64; 3]) -> Result<Arrival, Failure> {
-        Ok(Arrival { velocity, times: times.to_vec(), estimated_error: 0.0 })
+        Ok(Arrival { velocity, times: times.to_vec(), estimated_error: 0.0, looks: None })
     }
 
     fn failure(kind: FailureKind) -> Result<Arrival, Failure> {

@@ -13,7 +13,7 @@ use crate::exact::tables::Tables;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
-use crate::solver::not_finite;
+use crate::solver::{Arrival, Looks, Sampled, pressure_not_finite};
 use crate::vector::Vector;
 
 /// The tapers that the estimate of the error compares with: start and end over the band. Sharper and
@@ -45,6 +45,7 @@ pub(crate) struct Rung {
 /// A band.
 #[derive(Debug)]
 pub(crate) struct Look {
+    pub(crate) sampled: Sampled,
     /// How many lines it needs, from the first on.
     pub(crate) lines: usize,
     /// One weight per line, of the runs that hold the lines.
@@ -70,6 +71,20 @@ pub(crate) struct ExactWorkspace {
 pub(crate) struct Estimated {
     pub(crate) pick: Pick,
     pub(crate) error: f64,
+    pub(crate) sampled: Sampled,
+}
+
+impl Estimated {
+    /// The arrival, found in `count` looks of so many pairs together.
+    pub(crate) fn arrival(self, count: u32, pairs_computed: u64) -> Arrival {
+        let Self { pick, error, sampled: last } = self;
+        Arrival {
+            velocity: pick.velocity,
+            times: pick.times,
+            estimated_error: error,
+            looks: Some(Looks { count, pairs_computed, last }),
+        }
+    }
 }
 
 impl Rung {
@@ -100,7 +115,9 @@ impl Look {
                 }
             }
         }
-        Self { lines, taper, others }
+        let pairs = tables.pairs(0..lines);
+        let sampled = Sampled { band, period: tables.sampling.period, pairs };
+        Self { sampled, lines, taper, others }
     }
 }
 
@@ -117,7 +134,7 @@ impl Exact {
         workspace: &mut ExactWorkspace,
     ) -> Result<(), Failure> {
         if !workspace.spectra.is_finite() {
-            return Err(not_finite("the pressure"));
+            return Err(pressure_not_finite());
         }
         let Self { setup, distances, isa, .. } = self;
         isa.run(Observe { setup, distances, rung, look, speed, workspace });
@@ -146,7 +163,7 @@ impl Exact {
         let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
         // A signal that changes past recognition makes the largest error, not a failure.
         let error = if error <= 1.0 { error } else { 1.0 };
-        Ok(Estimated { pick, error })
+        Ok(Estimated { pick, error, sampled: look.sampled })
     }
 }
 

@@ -12,7 +12,7 @@ use crate::exact::Exact;
 use crate::exact::look::{ExactWorkspace, Look, Rung};
 use crate::exact::response::respond;
 use crate::isa::Isa;
-use crate::lanes::{ComplexLanes, LANES};
+use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
 use crate::solver::{Arrival, Failure};
 
@@ -88,8 +88,7 @@ impl Stages {
 impl<'b> Filled<'b> {
     /// Number of (frequency, wavenumber) pairs.
     pub fn pairs(&self) -> usize {
-        let lines = &self.rung.tables.lines[..self.look.lines];
-        lines.iter().map(|line| line.blocks * LANES).sum()
+        self.look.sampled.pairs as usize
     }
 
     /// Admittance: the plate's response in every pair.
@@ -140,7 +139,8 @@ impl Observed<'_, '_> {
     /// When there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
         let Filled { exact, rung, look, memory, .. } = &*self.0;
-        exact.picked(rung, look, &memory.exact).map(Arrival::from)
+        let found = exact.picked(rung, look, &memory.exact)?;
+        Ok(found.arrival(1, look.sampled.pairs))
     }
 }
 

@@ -2,6 +2,7 @@
 //! and the rung of the speed ladder only.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use osteon_common::case::Setup;
 use osteon_common::sampling::{RUN, Run, Sampling, distances};
@@ -147,6 +148,11 @@ impl Tables {
     pub(crate) fn lines_within(&self, taper: (f64, f64)) -> usize {
         let within = |line: &Line| self.sampling.is_within(line.n, taper);
         self.lines.iter().rposition(within).map_or(0, |last| last + 1)
+    }
+
+    /// (Frequency, wavenumber) pairs of some lines.
+    pub(crate) fn pairs(&self, lines: Range<usize>) -> u64 {
+        self.lines[lines].iter().map(|line| (line.blocks * LANES) as u64).sum()
     }
 
     /// Weights of the lines, eight at a time, of a taper that starts and ends at two frequencies, Hz.

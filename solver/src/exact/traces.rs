@@ -12,11 +12,13 @@ use crate::exact::tables::Tables;
 use crate::exact::{FillPlate, Solid, direct};
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
-use crate::solver::Solver;
+use crate::solver::{OUT_OF_SCALE, Solver};
 use crate::vector::Vector;
 
-/// Most samples of one trace.
-const SAMPLES_MAX: f64 = 1e7;
+/// Most pressures, all receivers together: 40 MB.
+const PRESSURES_MAX: f64 = 5e6;
+/// A time step that a message names is longer by this than the shortest one: it is rounded.
+const TO_BE_SAFE: f64 = 1.01;
 
 /// Pressures at the receivers.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,20 +32,36 @@ pub struct Traces {
 /// Why there are no traces.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum TraceError {
-    /// Duration or time step is not a positive number, or there are too many samples.
+    /// Duration or time step is not a positive number, or there is no step in the duration.
     #[error(
-        "a trace of {duration} s at steps of {time_step} s is not possible; both must be above 0 and give at most \
-         1e7 samples"
+        "a trace of {duration:e} s every {time_step:e} s is not possible: --time-step must be above 0, and \
+         --duration at least as long"
     )]
-    Samples {
+    Times {
         /// s.
         duration: f64,
         /// s.
         time_step: f64,
     },
+    /// There would be too many samples.
+    #[error(
+        "traces of {duration:e} s every {time_step:e} s at {receivers} receivers are {:.1e} pressures; at most \
+         5e6 are computed: give a --time-step of {:.2e} s or more, shorten --duration, or lower \
+         probe.receivers.count",
+        pressures(*.duration, *.time_step, *.receivers),
+        TO_BE_SAFE * .duration * f64::from(*.receivers) / PRESSURES_MAX
+    )]
+    TooMany {
+        /// s.
+        duration: f64,
+        /// s.
+        time_step: f64,
+        /// Number of receivers.
+        receivers: u32,
+    },
     /// The sampling is too large.
     #[error(
-        "a trace of {duration} s needs {pairs:.1e} (frequency, wavenumber) pairs; at most 1e7 are computed: \
+        "a trace of {duration:e} s needs {pairs:.1e} (frequency, wavenumber) pairs; at most 1e7 are computed: \
          shorten --duration or lower the refinement"
     )]
     TooLong {
@@ -53,8 +71,12 @@ pub enum TraceError {
         pairs: f64,
     },
     /// A pressure came out as NaN or infinite.
-    #[error("a pressure came out as NaN or infinite; density or elasticity is out of scale")]
+    #[error("a pressure came out as NaN or infinite; {OUT_OF_SCALE}")]
     NotFinite,
+}
+
+fn pressures(duration: f64, time_step: f64, receivers: u32) -> f64 {
+    (duration / time_step + 1.0) * f64::from(receivers)
 }
 
 /// Computes the pressure at many times.
@@ -89,8 +111,12 @@ impl Solver {
     /// When the trace would be empty or too large.
     pub fn traces(&self, bone: &Bone, duration: f64, time_step: f64) -> Result<Traces, TraceError> {
         let samples = duration / time_step;
-        if !(duration > 0.0 && time_step > 0.0 && (1.0..=SAMPLES_MAX).contains(&samples)) {
-            return Err(TraceError::Samples { duration, time_step });
+        if !(duration > 0.0 && time_step > 0.0 && samples >= 1.0) {
+            return Err(TraceError::Times { duration, time_step });
+        }
+        let receivers = self.setup().probe.receivers.count;
+        if pressures(duration, time_step, receivers) > PRESSURES_MAX {
+            return Err(TraceError::TooMany { duration, time_step, receivers });
         }
         let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
         let thickness = self.setup().layers.bone_thickness;
@@ -136,7 +162,7 @@ impl Solver {
         let coupling = &setup.layers.coupling;
         let (source, receivers) = (setup.probe.source, setup.probe.receivers);
         let x = receivers.x1(r as u32) - source.x1;
-        let travel = |height: f64| x.mul_add(x, height * height).sqrt() / coupling.sound_speed;
+        let travel = |height: f64| libm::hypot(x, height) / coupling.sound_speed;
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
         for (i, line) in tables.lines.iter().enumerate() {

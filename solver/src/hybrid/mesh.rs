@@ -4,6 +4,8 @@
 //! A fluid is cut off, with p = 0, where no echo of the cut can reach a receiver before the direct
 //! wave: what is looked at is as if the fluid were whole.
 
+use std::f64::consts::PI;
+
 use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::slowness;
 
@@ -15,6 +17,9 @@ use crate::medium::Medium;
 const WAVELENGTH: f64 = 1.5e-3;
 /// Depths are made larger by this share, so that an echo comes clearly late.
 const DEPTH_MARGIN: f64 = 1.02;
+/// With this many nodes per wavelength at the centre frequency a mesh resolves the waves: then
+/// passes that tell the same are right.
+const NODES_PER_WAVELENGTH: f64 = 5.0;
 /// Most elements of a layer that are counted; beyond, the work is over its bound anyway.
 const ELEMENTS_MAX: f64 = 1e9;
 
@@ -80,6 +85,31 @@ impl Mesh {
     /// Elements of all layers.
     pub(super) fn elements(&self) -> usize {
         self.coupling.elements + self.bone.elements + self.marrow.elements
+    }
+
+    /// The largest relative error of the speed of waves at the centre frequency on this mesh, by the
+    /// leading term for elements of degree n with lumped mass,
+    /// (k h)^(2n) (n!/(2n)!)² / (2n (2n + 1)): Ainsworth and Wajid, SIAM J. Numer. Anal. 47 (2009).
+    ///
+    /// Only layers count that have too few nodes per wavelength for two meshes that agree to mean
+    /// anything; the term is more than 1 where waves are not resolved at all.
+    pub(super) fn dispersion(&self, setup: &Setup, bone: &Bone) -> f64 {
+        let coupling = setup.layers.coupling.sound_speed;
+        let order = self.element.count() - 1;
+        let error = |mesh: &LayerMesh, speed: f64| {
+            let phase = 2.0 * PI * setup.probe.center_frequency * mesh.size / speed;
+            let n = order as f64;
+            if 2.0 * PI * n >= NODES_PER_WAVELENGTH * phase {
+                return 0.0;
+            }
+            (1..=order).fold(0.5 / (n * (2.0 * n + 1.0)), |error, j| {
+                let ratio = phase / (n + j as f64);
+                error * ratio * ratio
+            })
+        };
+        error(&self.coupling, coupling)
+            .max(error(&self.bone, (coupling * Medium::new(bone).slowest_across()).sqrt()))
+            .max(error(&self.marrow, setup.layers.marrow.sound_speed))
     }
 
     /// Node and weights by which the pressure at height `x3` (m) in fluid 1 is interpolated.

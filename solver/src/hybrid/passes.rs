@@ -6,12 +6,12 @@ use osteon_common::outcome::FailureKind;
 use super::incident::Incident;
 use super::march::{Limit, March, Memory, Receiver};
 use super::operator::Operator;
-use super::plan::{Plan, SAMPLES_BEYOND, Times, thinness};
+use super::plan::{Budget, Plan, SAMPLES_BEYOND, Times, thinness};
 use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
 use crate::isa::Isa;
 use crate::picking::{FLOOR, Pick, Window, pick};
-use crate::solver::not_finite;
+use crate::solver::pressure_not_finite;
 use crate::{Arrival, Failure};
 
 /// How fine the first pass is, over what the setup says.
@@ -55,6 +55,8 @@ pub(super) struct Passes<'a> {
     pub(super) windows: &'a mut Vec<Window>,
     /// Time step over the stability limit, once it is known.
     pub(super) share: Option<f64>,
+    /// What the passes may still take.
+    pub(super) budget: Budget,
 }
 
 /// What a pass found.
@@ -62,6 +64,8 @@ struct Found {
     pick: Pick,
     /// Extrema below these are noise, Pa per Pa of the pulse's amplitude; one per receiver.
     floors: Vec<f64>,
+    /// Relative error of the speed of waves on its mesh.
+    dispersion: f64,
 }
 
 impl Passes<'_> {
@@ -84,8 +88,14 @@ impl Passes<'_> {
                 next = self.pass(finer, None);
             }
             match (&last, &next) {
-                // Finer than the bounds of the computation allow.
-                (Ok(_), Err(failure)) if is_final(failure) => break,
+                // Finer than the bounds of the computation allow. One pass alone says nothing of its
+                // error.
+                (Ok(_), Err(failure)) if is_final(failure) => {
+                    if passes == 1 {
+                        last = next;
+                    }
+                    break;
+                }
                 (Ok(before), Ok(after)) => {
                     let change = Change::new(&before.pick, &after.pick);
                     estimate = self.estimate(&change, &after.pick);
@@ -101,10 +111,12 @@ impl Passes<'_> {
                 _ => last = next,
             }
         }
-        last.map(|Found { pick, .. }| Arrival {
+        last.map(|Found { pick, dispersion, .. }| Arrival {
             velocity: pick.velocity,
             times: pick.times,
-            estimated_error: estimate,
+            // Passes that do not resolve the waves can tell the same by accident.
+            estimated_error: estimate.max(dispersion.min(1.0)),
+            looks: None,
         })
     }
 
@@ -150,12 +162,13 @@ impl Passes<'_> {
             Some(found) => self.whole.until(&found.pick.times, after),
             None => self.whole.clone(),
         };
-        let times = self.march(finer, &scope)?;
-        self.pick(&scope, times, before)
+        let (times, dispersion) = self.march(finer, &scope)?;
+        let (pick, floors) = self.pick(&scope, times, before)?;
+        Ok(Found { pick, floors, dispersion })
     }
 
-    /// Computes the pressures at the receivers.
-    fn march(&mut self, finer: f64, scope: &Scope) -> Result<Times, Failure> {
+    /// Computes the pressures at the receivers; also the relative error of the speed of waves.
+    fn march(&mut self, finer: f64, scope: &Scope) -> Result<(Times, f64), Failure> {
         let setup = self.setup;
         let plan = Plan::new(setup, self.bone, scope, finer)?;
         let operator = Operator::new(setup, self.bone, &plan.mesh);
@@ -164,7 +177,8 @@ impl Passes<'_> {
             wavenumber: plan.wavenumber_limit,
             state: &mut self.memory.state,
         });
-        let times = plan.times(setup, self.onset(), limit, self.share(limit)?)?;
+        let share = self.share(limit)?;
+        let times = plan.times(setup, self.onset(), limit, share, &mut self.budget)?;
         let filter = LowPass::new(plan.band * times.sample());
         let receivers: Vec<Receiver> =
             scope.windows.iter().map(|span| self.receiver(span, times, filter.reach())).collect();
@@ -179,7 +193,7 @@ impl Passes<'_> {
             memory: self.memory,
         });
         if !finite {
-            return Err(not_finite("the pressure"));
+            return Err(pressure_not_finite());
         }
         let Memory { pressures, row, .. } = &mut *self.memory;
         for values in pressures.chunks_exact_mut(times.samples) {
@@ -187,7 +201,7 @@ impl Passes<'_> {
             row.extend_from_slice(values);
             filter.apply(row, values);
         }
-        Ok(times)
+        Ok((times, plan.mesh.dispersion(setup, self.bone)))
     }
 
     /// The time step over the stability limit: of the first pass, `limit` (s), what the setup asks
@@ -235,13 +249,14 @@ impl Passes<'_> {
         }
     }
 
-    /// Picks the first arrival in what was computed.
+    /// Picks the first arrival in what was computed; also the pressures below which extrema are
+    /// noise.
     fn pick(
         &mut self,
         scope: &Scope,
         times: Times,
         before: Option<&Found>,
-    ) -> Result<Found, Failure> {
+    ) -> Result<(Pick, Vec<f64>), Failure> {
         let onset = self.onset();
         self.windows.resize_with(scope.windows.len(), Window::default);
         let rows = self.memory.pressures.chunks_exact(times.samples);
@@ -263,7 +278,7 @@ impl Passes<'_> {
         }
         let fc = self.setup.probe.center_frequency;
         let pick = pick(&self.setup.picking, fc, self.distances, self.windows)?;
-        Ok(Found { pick, floors })
+        Ok((pick, floors))
     }
 }
 

@@ -12,10 +12,12 @@ pub(super) fn table(check: &Check) -> String {
     rows.extend(check.solutions().map(row));
     let verdict = if check.passed() {
         "the methods agree".to_owned()
-    } else if check.solutions().iter().any(|one| one.difference == Difference::Picks) {
+    } else if !check.same_picks() {
         "THE PICKS DIFFER".to_owned()
     } else {
-        format!("THE EXACT METHOD IS OFF by more than {:e}", check.error_max())
+        let off = check.off().map(|one| one.setup.solver.method.name().to_uppercase());
+        let methods = off.collect::<Vec<_>>().join(" AND ");
+        format!("OFF by more than {:e}: {methods}", check.error_max())
     };
     let refined = significant(check.refined.setup.solver.refinement, 3);
     format!("against exact, refinement {refined}:\n{}{verdict}\n", aligned(&rows))
