@@ -1,6 +1,8 @@
 //! First arrivals that are small against the waves behind them: nothing that is left out of a quick
 //! look may move them.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 use osteon_common::case::{Bone, Setup};
 use osteon_common::parameters::Point;
 use osteon_common::settings::SolverSettings;
