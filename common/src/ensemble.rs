@@ -70,6 +70,11 @@ impl Germs {
         Self(std::array::from_fn(|_| uniform(rng.next_u64())))
     }
 
+    /// Germs of the highest 53 of 64 bits each, as [`Germs::draw`] makes them of its stream.
+    pub(crate) fn from_bits(bits: [u64; GERMS]) -> Self {
+        Self(bits.map(uniform))
+    }
+
     /// Germs from another source (a low-discrepancy sequence, a test), or `None` if one of them
     /// is outside (0, 1).
     pub fn new(germs: [f64; GERMS]) -> Option<Self> {

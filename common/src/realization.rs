@@ -4,7 +4,8 @@ use thiserror::Error;
 
 use crate::case::Bone;
 use crate::elasticity::{Inadmissible, NotElastic};
-use crate::ensemble::{ElasticityLaw, Germs, LawError};
+use crate::ensemble::{ElasticityLaw, LawError};
+use crate::germ_source::{GermMaker, GermSource};
 use crate::parameters::Point;
 
 /// The bones of one point of the search: everything that fixes the material at each index.
@@ -15,7 +16,7 @@ use crate::parameters::Point;
 pub struct Ensemble {
     density: f64,
     law: ElasticityLaw,
-    seed: u64,
+    germs: GermMaker,
 }
 
 /// Why a point has no ensemble.
@@ -30,17 +31,26 @@ pub enum PointError {
 }
 
 impl Ensemble {
-    /// The ensemble at a point, with the seed of its job.
+    /// The ensemble at a point, with independent germs of this seed.
     ///
     /// # Errors
     /// The first violated condition: density, constants of the mean model, dispersion.
     pub fn new(point: &Point, seed: u64) -> Result<Self, PointError> {
+        Self::drawn(point, GermSource::streams(seed))
+    }
+
+    /// The ensemble at a point, with the germs of its job.
+    ///
+    /// # Errors
+    /// The first violated condition: density, constants of the mean model, dispersion.
+    pub fn drawn(point: &Point, germs: GermSource) -> Result<Self, PointError> {
         let density = point.density();
         if !(density > 0.0 && density.is_finite()) {
             return Err(Inadmissible::NotPositive { name: "density", value: density }.into());
         }
         let mean = point.constants().elasticity()?;
-        Ok(Self { density, law: ElasticityLaw::new(&mean, point.dispersion())?, seed })
+        let law = ElasticityLaw::new(&mean, point.dispersion())?;
+        Ok(Self { density, law, germs: GermMaker::new(germs) })
     }
 
     /// The bone at `index`.
@@ -49,7 +59,7 @@ impl Ensemble {
     /// When the drawn matrix is not positive definite within rounding
     /// (see [`ElasticityLaw::realize`]).
     pub fn bone(&self, index: u64) -> Result<Bone, NotElastic> {
-        let elasticity = self.law.realize(&Germs::draw(self.seed, index))?;
+        let elasticity = self.law.realize(&self.germs.germs(index))?;
         Ok(Bone { density: self.density, elasticity })
     }
 }

@@ -1,0 +1,82 @@
+//! Where the germs of a job's realizations come from.
+
+use std::sync::{Arc, OnceLock};
+
+use crate::ensemble::Germs;
+use crate::sobol::Scramble;
+
+/// What fixes the germs at every index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GermSource {
+    /// Seed of the job.
+    pub seed: u64,
+    /// How they are made of it.
+    pub scheme: GermScheme,
+}
+
+/// How germs are made of seed and index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GermScheme {
+    /// Independent, one ChaCha stream per realization ([`Germs::draw`]).
+    Streams,
+    /// Scrambled Sobol' points: scramble `index / points`, its point `index % points`.
+    Sobol {
+        /// Points of each scramble, 1 to 10⁷.
+        points: u64,
+    },
+}
+
+/// Makes germs; what several indices share is made once.
+#[derive(Debug, Clone)]
+pub(crate) struct GermMaker {
+    source: GermSource,
+    /// Scrambles as they were first asked for: a batch spans few.
+    scrambles: Arc<[OnceLock<(u64, Scramble)>; SCRAMBLES_KEPT]>,
+}
+
+/// Scrambles that a batch of realizations can have at hand; further ones are made again when asked for.
+const SCRAMBLES_KEPT: usize = 4;
+
+impl GermSource {
+    /// Independent germs of this seed.
+    pub fn streams(seed: u64) -> Self {
+        Self { seed, scheme: GermScheme::Streams }
+    }
+}
+
+impl PartialEq for GermMaker {
+    /// What is kept is a function of the source.
+    fn eq(&self, other: &Self) -> bool {
+        self.source == other.source
+    }
+}
+
+impl GermMaker {
+    pub(crate) fn new(source: GermSource) -> Self {
+        Self { source, scrambles: Arc::default() }
+    }
+
+    /// The germs of one realization.
+    pub(crate) fn germs(&self, index: u64) -> Germs {
+        match self.source.scheme {
+            GermScheme::Streams => Germs::draw(self.source.seed, index),
+            GermScheme::Sobol { points } => {
+                let points = points.max(1);
+                self.with_scramble(index / points, |scramble| {
+                    Germs::from_bits(scramble.point(index % points))
+                })
+            }
+        }
+    }
+
+    fn with_scramble<T>(&self, number: u64, then: impl FnOnce(&Scramble) -> T) -> T {
+        let make = || (number, Scramble::new(self.source.seed, number));
+        for slot in self.scrambles.iter() {
+            let (kept, scramble) = slot.get_or_init(make);
+            if *kept == number {
+                return then(scramble);
+            }
+        }
+        then(&make().1)
+    }
+}

@@ -1,0 +1,212 @@
+//! Scrambled Sobol' points for the germs.
+//!
+//! The sequence of I. M. Sobol' (USSR Comput. Math. Math. Phys. 7 (1967)) with the direction numbers
+//! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654), of which the first 21
+//! dimensions are used. A scramble multiplies the digits of each coordinate by a random lower
+//! triangular matrix with a unit diagonal and adds a random shift (J. Matoušek, J. Complexity 14
+//! (1998), 527-556): every point is then uniform in the cube, every scramble is as evenly spread as
+//! the sequence itself, and independent scrambles tell the error of their mean.
+
+use rand_chacha::ChaCha20Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use crate::ensemble::GERMS;
+
+/// Binary digits of an index: [`crate::limits::REALIZATIONS_MAX`] is below 2²⁴.
+const INDEX_DIGITS: usize = 24;
+/// Binary digits of a coordinate.
+const DIGITS: usize = 64;
+/// Bytes 8 to 12 of the key, so that no stream of independent germs is a scramble's.
+const KEY_MARK: [u8; 5] = *b"sobol";
+
+/// Primitive polynomials and initial direction numbers of dimensions 2 to 21: the degree, the inner
+/// coefficients as a binary number, and m₁, m₂, …
+const DIRECTIONS: [(u32, u32, &[u32]); GERMS - 1] = [
+    (1, 0, &[1]),
+    (2, 1, &[1, 3]),
+    (3, 1, &[1, 3, 1]),
+    (3, 2, &[1, 1, 1]),
+    (4, 1, &[1, 1, 3, 3]),
+    (4, 4, &[1, 3, 5, 13]),
+    (5, 2, &[1, 1, 5, 5, 17]),
+    (5, 4, &[1, 1, 5, 5, 5]),
+    (5, 7, &[1, 1, 7, 11, 19]),
+    (5, 11, &[1, 1, 5, 1, 1]),
+    (5, 13, &[1, 1, 1, 3, 11]),
+    (5, 14, &[1, 3, 5, 5, 31]),
+    (6, 1, &[1, 3, 3, 9, 7, 49]),
+    (6, 13, &[1, 1, 1, 15, 21, 21]),
+    (6, 16, &[1, 3, 1, 13, 27, 49]),
+    (6, 19, &[1, 1, 1, 15, 7, 5]),
+    (6, 22, &[1, 3, 1, 15, 13, 25]),
+    (6, 25, &[1, 1, 5, 5, 19, 61]),
+    (7, 1, &[1, 3, 7, 11, 23, 15, 103]),
+    (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
+];
+
+/// The germ, numbered by rows of L_G, that each dimension of the sequence drives: the earlier a
+/// dimension, the better its points are spread, and 11, 55, 33, 23, 22, 13, 12 move the velocity
+/// most, in this order; the rest follow by rows.
+const GERM_OF_DIMENSION: [usize; GERMS] =
+    [0, 18, 11, 7, 6, 2, 1, 3, 4, 5, 8, 9, 10, 12, 13, 14, 15, 16, 17, 19, 20];
+
+/// One scramble of the sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Scramble {
+    /// For each dimension, what each digit of the index adds (exclusive or).
+    columns: [[u64; INDEX_DIGITS]; GERMS],
+    shift: [u64; GERMS],
+}
+
+impl Scramble {
+    /// Scramble `number` of the job with this seed.
+    ///
+    /// ChaCha20, the seed in bytes 0-7 of the key (little-endian), "sobol" in bytes 8-12, the number
+    /// as stream. For each dimension 63 words, of which word i-1 gives row i of the matrix left of
+    /// the diagonal by its highest i bits, then one word of shift; the first digit is the highest bit.
+    pub(crate) fn new(seed: u64, number: u64) -> Self {
+        let mut key = [0; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        key[8..13].copy_from_slice(&KEY_MARK);
+        let mut rng = ChaCha20Rng::from_seed(key);
+        rng.set_stream(number);
+        let mut scramble = Self { columns: [[0; INDEX_DIGITS]; GERMS], shift: [0; GERMS] };
+        for dimension in 0..GERMS {
+            let mut rows = [1 << (DIGITS - 1); DIGITS];
+            for (row, matrix_row) in rows.iter_mut().enumerate().skip(1) {
+                let left = u64::MAX << (DIGITS - row);
+                *matrix_row = (rng.next_u64() & left) | (1 << (DIGITS - 1 - row));
+            }
+            scramble.columns[dimension] = directions(dimension).map(|v| product(&rows, v));
+            scramble.shift[dimension] = rng.next_u64();
+        }
+        scramble
+    }
+
+    /// Coordinates of point `index`, below 2²⁴, of which each digit is a fair coin; in the order of
+    /// the germs.
+    pub(crate) fn point(&self, index: u64) -> [u64; GERMS] {
+        let mut point = [0; GERMS];
+        for (dimension, &germ) in GERM_OF_DIMENSION.iter().enumerate() {
+            let mut coordinate = self.shift[dimension];
+            for (digit, column) in self.columns[dimension].iter().enumerate() {
+                // All ones if the digit is set.
+                coordinate ^= column & ((index >> digit) & 1).wrapping_neg();
+            }
+            point[germ] = coordinate;
+        }
+        point
+    }
+}
+
+/// Direction numbers of a dimension, the first digit in the highest bit.
+fn directions(dimension: usize) -> [u64; INDEX_DIGITS] {
+    let first = |m: u64, column: usize| m << (DIGITS - 1 - column);
+    let Some((degree, inner, initial)) =
+        dimension.checked_sub(1).map(|dimension| DIRECTIONS[dimension])
+    else {
+        // Van der Corput's sequence.
+        return std::array::from_fn(|column| first(1, column));
+    };
+    let degree = degree as usize;
+    let mut columns = [0; INDEX_DIGITS];
+    for column in 0..INDEX_DIGITS {
+        columns[column] = if column < degree {
+            first(u64::from(initial[column]), column)
+        } else {
+            let mut value = columns[column - degree] ^ (columns[column - degree] >> degree);
+            for back in 1..degree {
+                if inner >> (degree - 1 - back) & 1 == 1 {
+                    value ^= columns[column - back];
+                }
+            }
+            value
+        };
+    }
+    columns
+}
+
+/// The product of a matrix of bits, by rows, with a vector of digits.
+fn product(rows: &[u64; DIGITS], digits: u64) -> u64 {
+    rows.iter().fold(0, |product, row| (product << 1) | u64::from((row & digits).count_ones() & 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joe and Kuo's own first points, without scramble; dimensions 1 to 5 and 21.
+    #[test]
+    fn the_sequence_is_sobols() {
+        let point = |index: usize| {
+            [0, 1, 2, 3, 4].map(|dimension| {
+                let columns = directions(dimension);
+                let digits = (0..INDEX_DIGITS).filter(|digit| index >> digit & 1 == 1);
+                let coordinate = digits.fold(0, |sum, digit| sum ^ columns[digit]);
+                coordinate as f64 / 2.0_f64.powi(64)
+            })
+        };
+        // In the order of indices; published lists often go by Gray code: 1, 3, 2, 6, …
+        assert_eq!(point(0), [0.0; 5]);
+        assert_eq!(point(1), [0.5; 5]);
+        assert_eq!(point(3), [0.75, 0.25, 0.25, 0.25, 0.75]);
+        assert_eq!(point(2), [0.25, 0.75, 0.75, 0.75, 0.25]);
+        assert_eq!(point(6), [0.375, 0.375, 0.625, 0.875, 0.375]);
+    }
+
+    #[test]
+    fn direction_numbers_are_odd_and_fit_their_digit() {
+        for dimension in 0..GERMS {
+            for (column, value) in directions(dimension).into_iter().enumerate() {
+                let m = value >> (DIGITS - 1 - column);
+                assert!(m % 2 == 1 && m < 2 << column, "{dimension} {column}: {m}");
+                assert_eq!(m << (DIGITS - 1 - column), value);
+            }
+        }
+        let mut germs = GERM_OF_DIMENSION;
+        germs.sort_unstable();
+        assert_eq!(germs, std::array::from_fn(|germ| germ));
+    }
+
+    /// 2ᵏ points that begin at a multiple of 2ᵏ: one in each of 2ᵏ equal intervals, in every
+    /// dimension and every scramble.
+    #[test]
+    fn every_coordinate_is_stratified() {
+        for (seed, number, block) in [(1, 0, 0), (1, 1, 5), (7, 0, 1023)] {
+            let scramble = Scramble::new(seed, number);
+            let mut seen = [[false; 64]; GERMS];
+            for index in 64 * block..64 * (block + 1) {
+                for (seen, coordinate) in seen.iter_mut().zip(scramble.point(index)) {
+                    seen[(coordinate >> 58) as usize] = true;
+                }
+            }
+            assert_eq!(seen, [[true; 64]; GERMS], "({seed}, {number}, {block})");
+        }
+    }
+
+    /// The first two dimensions are a (0, m, 2)-net in base 2: one point in each box of volume 2⁻ᵐ.
+    #[test]
+    fn the_first_two_germs_share_a_perfect_net() {
+        let scramble = Scramble::new(3, 2);
+        let [first, second, ..] = GERM_OF_DIMENSION;
+        for split in 0..=8 {
+            let mut seen = [false; 256];
+            for index in 0..256 {
+                let point = scramble.point(index);
+                let column = point[first].unbounded_shr(64 - split);
+                let row = point[second].unbounded_shr(56 + split);
+                seen[(column << (8 - split) | row) as usize] = true;
+            }
+            assert_eq!(seen, [true; 256], "{split}");
+        }
+    }
+
+    #[test]
+    fn scrambles_differ_by_seed_and_number() {
+        let first = Scramble::new(1, 0);
+        assert_eq!(first, Scramble::new(1, 0));
+        assert_ne!(first.point(0), Scramble::new(1, 1).point(0));
+        assert_ne!(first.point(0), Scramble::new(2, 0).point(0));
+        assert_ne!(first.columns, Scramble::new(1, 1).columns);
+    }
+}
