@@ -207,7 +207,7 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
     });
     let failed = api.end(&doomed);
     assert_eq!(failed.status(), JobStatus::Failed);
-    for part in ["realization 33", "osteon draw", "--index 33"] {
+    for part in ["realization 33", "osteon simulate", "mandel = ["] {
         assert!(failed.reason.contains(part), "{part} in {}", failed.reason);
     }
     assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
