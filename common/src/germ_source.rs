@@ -80,3 +80,27 @@ impl GermMaker {
         then(&make().1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn independent_germs_are_those_of_their_stream() {
+        let maker = GermMaker::new(GermSource::streams(5));
+        assert_eq!(maker.germs(17), Germs::draw(5, 17));
+    }
+
+    /// More scrambles than are kept, forwards and backwards.
+    #[test]
+    fn a_scramble_follows_the_one_before() {
+        let scheme = GermScheme::Sobol { points: 4 };
+        let maker = GermMaker::new(GermSource { seed: 9, scheme });
+        let check = |index: u64| {
+            let expected = Germs::from_bits(Scramble::new(9, index / 4).point(index % 4));
+            assert_eq!(maker.germs(index), expected, "{index}");
+        };
+        (0..40).for_each(check);
+        (0..40).rev().for_each(check);
+    }
+}
