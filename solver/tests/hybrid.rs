@@ -246,19 +246,23 @@ fn work_is_bounded_per_bone() {
 fn a_mesh_that_resolves_nothing_says_so() {
     let bone = bone(0.1, 7, 0);
     let exact = Solver::new(&Setup::default()).arrival(&bone, &mut Workspace::default()).unwrap();
-    for (element_size, element_order) in
-        [(1e-2, 2), (5e-3, 2), (2e-3, 2), (1e-3, 2), (1e-2, 4), (5e-3, 4), (2e-3, 4), (5e-3, 8)]
+    // With the least estimate that is honest; `None` where a typed failure is, too.
+    for (element_size, element_order, least) in
+        [(1e-2, 2, Some(1.0)), (1e-2, 4, None), (2e-3, 2, None), (1e-3, 2, None), (5e-3, 8, None)]
     {
         let setup = setup(|s| {
             s.solver.element_size = element_size;
             s.solver.element_order = element_order;
         });
-        let Ok(found) = hybrid(&setup, &bone) else { continue };
+        let Ok(found) = hybrid(&setup, &bone) else {
+            assert_eq!(least, None, "{element_size} m, order {element_order}");
+            continue;
+        };
         let error = (found.velocity / exact.velocity - 1.0).abs();
+        let estimate = found.estimated_error;
         assert!(
-            error < 10.0 * found.estimated_error,
-            "{element_size} m, order {element_order}: {error:e}, estimated {:e}",
-            found.estimated_error
+            error < 10.0 * estimate && (least.unwrap_or(0.0)..=1.0).contains(&estimate),
+            "{element_size} m, order {element_order}: {error:e}, estimated {estimate:e}"
         );
     }
 }
