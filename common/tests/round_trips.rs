@@ -187,6 +187,9 @@ const EDITS: [Edit; 14] = [
     |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
 ];
 
+/// Brackets of a text that the test itself may read as TOML.
+const BRACKETS_MAX: usize = 200;
+
 /// A file with some damage.
 fn text_of_a_file() -> impl Strategy<Value = String> {
     let files = [
@@ -270,7 +273,9 @@ proptest! {
     #[test]
     fn damaged_files_do_not_panic(text in text_of_a_file()) {
         no_panic(&text);
-        if let Ok(table) = toml::from_str::<toml::Table>(&text) {
+        // As it stands, the TOML crate takes the whole stack on thousands of open brackets.
+        let is_deep = text.matches(['[', '{']).count() > BRACKETS_MAX;
+        if !is_deep && let Ok(table) = toml::from_str::<toml::Table>(&text) {
             no_panic(&serde_json::to_string(&table).unwrap());
         }
     }
