@@ -290,6 +290,5 @@ fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
     Ok(Some(String::from_utf8(bytes).with_context(cannot)?))
 }
 
-/// 128 random bits in hexadecimal.
 #[cfg(test)]
 mod tests;

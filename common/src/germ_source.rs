@@ -31,7 +31,14 @@ pub enum GermScheme {
 pub(crate) struct GermMaker {
     source: GermSource,
     /// Scrambles as they were first asked for: a batch spans few.
-    scrambles: Arc<[OnceLock<(u64, Scramble)>; SCRAMBLES_KEPT]>,
+    scrambles: Arc<[OnceLock<Box<Numbered>>; SCRAMBLES_KEPT]>,
+}
+
+/// A scramble and its number.
+#[derive(Debug)]
+struct Numbered {
+    number: u64,
+    scramble: Scramble,
 }
 
 /// Scrambles that a batch of realizations can have at hand; further ones are made again when asked for.
@@ -70,14 +77,15 @@ impl GermMaker {
     }
 
     fn with_scramble<T>(&self, number: u64, then: impl FnOnce(&Scramble) -> T) -> T {
-        let make = || (number, Scramble::new(self.source.seed, number));
+        let make =
+            || Box::new(Numbered { number, scramble: Scramble::new(self.source.seed, number) });
         for slot in self.scrambles.iter() {
-            let (kept, scramble) = slot.get_or_init(make);
-            if *kept == number {
-                return then(scramble);
+            let kept = slot.get_or_init(make);
+            if kept.number == number {
+                return then(&kept.scramble);
             }
         }
-        then(&make().1)
+        then(&make().scramble)
     }
 }
 

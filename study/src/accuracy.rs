@@ -17,6 +17,16 @@ const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
 const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
 /// Realizations of each row, unless chosen otherwise.
 pub const REALIZATIONS: u64 = 1000;
+/// Columns of [`summary`].
+pub(crate) const SUMMARY: [&str; 7] = [
+    "median error",
+    "99 %",
+    "largest",
+    "different picks (%)",
+    "estimate / error 5 %",
+    "median",
+    "95 %",
+];
 /// Refinement of the reference.
 pub(crate) const REFERENCE: f64 = 5.0;
 
@@ -26,17 +36,7 @@ pub(crate) const REFERENCE: f64 = 5.0;
 /// # Errors
 /// When there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
-    let mut table = Table::new(&[
-        "plate (mm)",
-        "dispersion",
-        "median error",
-        "99 %",
-        "largest",
-        "different picks (%)",
-        "estimate / error 5 %",
-        "median",
-        "95 %",
-    ]);
+    let mut table = Table::new(&[&["plate (mm)", "dispersion"][..], &SUMMARY].concat());
     for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
         table.push(row(&cell));
         progress(&table.last_row());
@@ -89,7 +89,7 @@ pub(crate) struct Measured {
 }
 
 /// Median, 99 % and largest error, share of different picks (%), and three quantiles of the
-/// estimated over the true error.
+/// estimated over the true error, as [`SUMMARY`] has them.
 pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
     let differences: Vec<_> = measured.iter().map(|draw| draw.difference).collect();
     let spread = Spread::of(&differences);

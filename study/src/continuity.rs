@@ -9,7 +9,7 @@ use osteon_solver::{Failure, fastest_wave};
 
 use crate::Progress;
 use crate::difference::{Difference, Spread, difference};
-use crate::draws::{Draws, arrival, cells};
+use crate::draws::{Draws, arrival, cells, not_elastic};
 use crate::generator::Generator;
 use crate::table::{Table, millimetres, two_digits};
 
@@ -92,10 +92,7 @@ fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
         rows[i][j] *= 1.0 + CHANGE * generator.between(-1.0, 1.0);
         rows[j][i] = rows[i][j];
     }
-    let elasticity = Elasticity::new(rows).map_err(|error| Failure {
-        kind: osteon_common::outcome::FailureKind::NotFinite,
-        detail: error.to_string(),
-    })?;
+    let elasticity = Elasticity::new(rows).map_err(not_elastic)?;
     Ok(Bone { density: bone.density, elasticity })
 }
 

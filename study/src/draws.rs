@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use osteon_common::case::{Bone, Setup};
+use osteon_common::elasticity::NotElastic;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::{Ensemble, PointError};
@@ -82,10 +83,13 @@ impl Cell {
 
     /// The bone at `index`; what cannot be drawn is the failure of its index.
     pub(crate) fn bone(&self, index: u64) -> Result<Bone, Failure> {
-        self.ensemble
-            .bone(index)
-            .map_err(|error| Failure { kind: FailureKind::NotFinite, detail: error.to_string() })
+        self.ensemble.bone(index).map_err(not_elastic)
     }
+}
+
+/// The failure of a bone whose elasticity is none.
+pub(crate) fn not_elastic(error: NotElastic) -> Failure {
+    Failure { kind: FailureKind::NotFinite, detail: error.to_string() }
 }
 
 /// The arrival of a bone that may not be one.

@@ -1,5 +1,8 @@
 //! Reproducible random numbers for what a study varies beside the germs of its bones.
 
+/// Keeps the generators of neighbouring indices apart.
+const INDEX_STEP: u64 = 0x2545_f491_4f6c_dd1d;
+
 /// A splitmix64 generator.
 #[derive(Debug, Clone)]
 pub(crate) struct Generator {
@@ -7,9 +10,14 @@ pub(crate) struct Generator {
 }
 
 impl Generator {
-    /// The generator of one index.
+    /// The generator of a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self { state: seed }
+    }
+
+    /// The generator of one index of a study with this seed.
+    pub(crate) fn of_index(seed: u64, index: u64) -> Self {
+        Self::new(seed ^ index.wrapping_mul(INDEX_STEP))
     }
 
     /// The next number, from 0 to 1.

@@ -30,8 +30,6 @@ const CLASSES: [(f64, &str); 3] =
 const PAIRS_MAX: (f64, f64) = (1e5, 2e6);
 /// Most attempts to draw a case that is admissible and not too large.
 const TRIES_MAX: usize = 1000;
-/// Keeps the generators of neighbouring indices apart.
-const INDEX_STEP: u64 = 0x2545_f491_4f6c_dd1d;
 
 /// One case: a bone on its own setup, and what it was drawn from.
 #[derive(Debug, Clone)]
@@ -189,7 +187,7 @@ pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
 
 /// The first case of `index` that validation accepts, within the bound of time.
 fn drawn(seed: u64, index: u64) -> Result<Option<Drawn>, PointError> {
-    let mut generator = Generator::new(seed ^ index.wrapping_mul(INDEX_STEP));
+    let mut generator = Generator::of_index(seed, index);
     for _ in 0..TRIES_MAX {
         let (setup, point) = (setup(&mut generator), point(&mut generator));
         if !is_suitable(&setup) {

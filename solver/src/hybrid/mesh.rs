@@ -51,20 +51,15 @@ impl LayerMesh {
 
 impl Mesh {
     /// The mesh for `scope`, of elements `finer` times smaller than the setup says.
-    ///
-    /// Where shear waves in the bone are slower than sound in the coupling fluid, elements follow
-    /// the mean of the two on a scale of ratios: the slowest waves have little part in the first
-    /// arrival.
     pub(super) fn new(setup: &Setup, bone: &Bone, scope: &Scope, finer: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let size = |slowest: f64| {
             let share = (slowest / fc / WAVELENGTH).min(1.0);
             setup.solver.element_size * share / finer
         };
-        let coupling = setup.layers.coupling.sound_speed;
         let sizes = [
-            size(coupling),
-            size((coupling * Medium::new(bone).slowest_across()).sqrt()),
+            size(setup.layers.coupling.sound_speed),
+            size(bone_speed(setup, bone)),
             size(setup.layers.marrow.sound_speed),
         ];
         Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
@@ -94,7 +89,6 @@ impl Mesh {
     /// Only layers count that have too few nodes per wavelength for two meshes that agree to mean
     /// anything; the term is more than 1 where waves are not resolved at all.
     pub(super) fn dispersion(&self, setup: &Setup, bone: &Bone) -> f64 {
-        let coupling = setup.layers.coupling.sound_speed;
         let order = self.element.count() - 1;
         let error = |mesh: &LayerMesh, speed: f64| {
             let phase = 2.0 * PI * setup.probe.center_frequency * mesh.size / speed;
@@ -107,8 +101,8 @@ impl Mesh {
                 error * ratio * ratio
             })
         };
-        error(&self.coupling, coupling)
-            .max(error(&self.bone, (coupling * Medium::new(bone).slowest_across()).sqrt()))
+        error(&self.coupling, setup.layers.coupling.sound_speed)
+            .max(error(&self.bone, bone_speed(setup, bone)))
             .max(error(&self.marrow, setup.layers.marrow.sound_speed))
     }
 
@@ -124,6 +118,14 @@ impl Mesh {
 /// Longest path, m, across the coupling fluid in which a wave can arrive within its window.
 pub(super) fn path_heard(setup: &Setup, scope: &Scope) -> f64 {
     scope.across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
+}
+
+/// The speed, m/s, of waves that elements in the bone are made for.
+///
+/// Where shear waves in the bone are slower than sound in the coupling fluid, it is the mean of the two
+/// on a scale of ratios: the slowest waves have little part in the first arrival.
+fn bone_speed(setup: &Setup, bone: &Bone) -> f64 {
+    (setup.layers.coupling.sound_speed * Medium::new(bone).slowest_across()).sqrt()
 }
 
 /// Depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then up to the

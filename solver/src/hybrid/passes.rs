@@ -14,9 +14,10 @@ use crate::picking::{FLOOR, Pick, Window, pick};
 use crate::solver::pressure_not_finite;
 use crate::{Arrival, Failure};
 
-/// How fine the first pass is, over what the setup says.
+/// How fine the first pass is, over what the setup says. In a thin plate all passes are finer, by the
+/// square root of how thin it is.
 const FIRST: f64 = 0.75;
-/// The same of the second, which in a thin plate is finer still by the fourth root of how thin it is.
+/// The same of the second.
 const SECOND: f64 = 1.2;
 /// How much finer every pass from the third on is than the one before.
 const FINER: f64 = 1.5;
@@ -31,13 +32,12 @@ const PACKET_PERIODS: f64 = 1.25;
 /// the waves of the kink that one pass misses are in the next.
 const REMAINDER: f64 = 0.5;
 /// Estimated relative error of the velocity at which passes end, at refinement 1; in a thin plate
-/// larger by the square of how thin it is, since there the kink's waves die out more slowly.
+/// larger by how thin it is, since there the kink's waves die out more slowly.
 const SMALL_ERROR: f64 = 2.5e-5;
 /// Change of the mean of all times, in periods of the centre frequency, at which passes end. That
 /// all times shift alike is the error of the elements, which falls fast; that they scatter is the
 /// kink's, and part of the estimated error.
 const SMALL_SHIFT: f64 = 2.5e-3;
-
 /// Largest change of a time against the mean, in periods of the centre frequency, at which passes end: a
 /// flat extremum moves by more than a line through all of them tells.
 const SMALL_SCATTER: f64 = 5e-4;
