@@ -10,6 +10,7 @@
 
 pub(crate) mod direct;
 pub(crate) mod growth;
+pub(crate) mod ladder;
 pub(crate) mod look;
 pub(crate) mod plate;
 pub(crate) mod response;
@@ -19,15 +20,13 @@ pub mod stages;
 pub(crate) mod tables;
 pub(crate) mod traces;
 
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use osteon_common::case::{Bone, Setup};
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::outcome::FailureKind;
-use osteon_common::sampling::{self, Grade, RUNGS, Sampling};
+use osteon_common::sampling::{self, Grade};
 
 use crate::complex::Complex;
+use crate::exact::ladder::{Held, KeptBytes, Ladder, PAIRS_MARGIN};
 use crate::exact::look::{Estimated, ExactWorkspace, Look, Rung};
 use crate::exact::plate::{AccuratePlate, Plate};
 use crate::isa::{Isa, Kernel};
@@ -37,10 +36,6 @@ use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::{ComplexVector, Scalar, Vector};
 
-/// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
-const PAIRS_MARGIN: f64 = 8.0;
-/// Pairs whose tables one solver keeps, 20 MB; those of further rungs are made when needed.
-const KEPT_PAIRS_MAX: u64 = 400_000;
 /// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough grows
 /// from none to full.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
@@ -73,23 +68,7 @@ pub(crate) struct Exact {
     plain: Ladder,
     thorough: Ladder,
     refined: Ladder,
-    /// Pairs whose tables are kept.
-    kept: AtomicU64,
-}
-
-/// Samplings of one kind, by speed.
-#[derive(Debug)]
-struct Ladder {
-    setup: Setup,
-    grade: Grade,
-    /// Each is made when a bone first needs it; `None` if it would be too large.
-    rungs: [OnceLock<Option<Box<Rung>>>; RUNGS],
-}
-
-impl Ladder {
-    fn new(setup: &Setup, grade: Grade) -> Self {
-        Self { setup: *setup, grade, rungs: [const { OnceLock::new() }; RUNGS] }
-    }
+    kept: KeptBytes,
 }
 
 impl Exact {
@@ -104,7 +83,7 @@ impl Exact {
             plain: Ladder::new(setup, Grade::Plain),
             thorough: Ladder::new(setup, Grade::Thorough),
             refined: Ladder::new(&refined, Grade::Thorough),
-            kept: AtomicU64::new(0),
+            kept: KeptBytes::default(),
         }
     }
 
@@ -145,24 +124,8 @@ impl Exact {
     }
 
     /// One rung of a ladder, which a bone with waves of up to `speed` (m/s) needs.
-    fn rung<'a>(&self, ladder: &'a Ladder, index: usize, speed: f64) -> Result<&'a Rung, Failure> {
-        let Some(rung) = ladder.rungs.get(index) else {
-            return Err(too_large(speed));
-        };
-        let rung = rung.get_or_init(|| {
-            let sampling = Sampling::at_rung(&ladder.setup, index, ladder.grade);
-            let pairs = sampling.pairs(sampling.band);
-            if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
-                return None;
-            }
-            let keep = self.kept.fetch_add(pairs as u64, Ordering::Relaxed) + pairs as u64
-                <= KEPT_PAIRS_MAX;
-            if !keep {
-                self.kept.fetch_sub(pairs as u64, Ordering::Relaxed);
-            }
-            Some(Box::new(Rung::new(&ladder.setup, sampling, keep)))
-        });
-        rung.as_deref().ok_or_else(|| too_large(speed))
+    fn rung<'a>(&self, ladder: &'a Ladder, index: usize, speed: f64) -> Result<Held<'a>, Failure> {
+        ladder.rung(index, &self.kept).ok_or_else(|| too_large(speed))
     }
 
     /// An estimated error as it counts against bounds that are meant for refinement 1: who asks for
@@ -264,6 +227,7 @@ struct Sight<'a> {
     medium: &'a Medium,
     /// Bound of every wave's speed, m/s.
     speed: f64,
+    /// The rung that is taken of every ladder.
     rung: usize,
     workspace: &'a mut ExactWorkspace,
     /// Looks so far.
@@ -296,7 +260,7 @@ impl Sight<'_> {
     /// A look in the first band, and one in the whole band if that is needed.
     fn quick(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
         let exact = self.exact;
-        let rung = exact.rung(ladder, self.rung, self.speed)?;
+        let rung = &*exact.rung(ladder, self.rung, self.speed)?;
         exact.fill_plate(self.medium, &mut self.workspace.fast);
         self.workspace.spectra.clear(&rung.tables);
         self.fill(rung, 0, rung.first.lines);
@@ -333,7 +297,7 @@ impl Sight<'_> {
 
     /// One look, and a good one.
     fn thorough(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
-        let rung = self.exact.rung(ladder, self.rung, self.speed)?;
+        let rung = &*self.exact.rung(ladder, self.rung, self.speed)?;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
         self.exact.fill_plate(self.medium, accurate);
         spectra.clear(&rung.tables);

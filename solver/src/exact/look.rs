@@ -2,7 +2,7 @@
 //! its error.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{self, Sampling, velocity_taper};
+use osteon_common::sampling::{self, RUN, Sampling, velocity_taper};
 
 use crate::Failure;
 use crate::exact::Exact;
@@ -88,12 +88,18 @@ impl Estimated {
 }
 
 impl Rung {
+    /// Bytes that a rung takes, of so many pairs, that keeps its tables.
+    pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> u64 {
+        let lines = sampling.runs().len() * RUN;
+        (Tables::bytes(setup, sampling, pairs) + Grid::bytes(setup, lines)) as u64
+    }
+
     /// `keep`: whether tables are kept, rather than be computed whenever they are needed.
     pub(crate) fn new(setup: &Setup, sampling: Sampling, keep: bool) -> Self {
         let whole = velocity_taper(sampling.band);
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let tables = Tables::new(setup, sampling, 1.0, whole, keep);
-        let grid = Grid::new(setup, &tables);
+        let grid = Grid::new(setup, &tables, keep);
         let first = Look::new(&tables, sampling.first_band);
         let whole = Look::new(&tables, sampling.band);
         Self { tables, grid, first, whole }

@@ -7,7 +7,7 @@ use osteon_common::case::Setup;
 use osteon_common::sampling::{Run, Sampling, direct_arrival, distances};
 
 use crate::complex::Complex;
-use crate::exact::tables::{Line, Tables};
+use crate::exact::tables::Tables;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::Extremum;
 use crate::vector::{ComplexVector, Vector};
@@ -30,7 +30,8 @@ pub(crate) struct Grid {
     blocks: usize,
     /// α + iω of each line.
     slopes: Vec<Complex>,
-    /// e^{iωt} of line i at the first time of block b: `[i * blocks + b]`.
+    /// e^{iωt} of line i at the first time of block b, `[i * blocks + b]`; nothing where that is too
+    /// much to be kept.
     coarse: Vec<Complex>,
     /// e^{iωt} of each line at the lanes' delays.
     fine: Vec<ComplexLanes>,
@@ -41,6 +42,8 @@ pub(crate) struct Grid {
 pub(crate) struct Slopes {
     /// Coefficients of the slope times `fine`, per line.
     delayed: Vec<ComplexLanes>,
+    /// e^{iωt} at the first times of one group of blocks, where the grid keeps none.
+    coarse: Vec<Complex>,
     /// The slope on the grid, from its first block on.
     values: Vec<Lanes>,
     /// Extrema that were found but not yet refined.
@@ -61,29 +64,69 @@ struct Bracket {
 
 impl Grid {
     /// A grid that covers every window of the setup.
-    pub(crate) fn new(setup: &Setup, tables: &Tables) -> Self {
-        let step = 1.0 / (POINTS_PER_CYCLE * setup.probe.center_frequency);
-        let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
-        let blocks = ((last / step) as usize / LANES + 2).next_multiple_of(GROUP);
-        let wave = |line: &Line, j: usize| {
-            let (sin, cos) = libm::sincos(line.s.im * (j as f64 * step));
-            Complex::new(cos, sin)
+    ///
+    /// `keep`: whether its waves are kept, rather than be computed whenever they are needed.
+    pub(crate) fn new(setup: &Setup, tables: &Tables, keep: bool) -> Self {
+        let slopes: Vec<_> = tables.lines.iter().map(|line| line.s).collect();
+        let mut grid = Self {
+            step: Self::step(setup),
+            blocks: Self::blocks(setup),
+            slopes,
+            coarse: Vec::new(),
+            fine: Vec::new(),
         };
-        let coarse = tables
-            .lines
-            .iter()
-            .flat_map(|line| (0..blocks).map(move |b| wave(line, b * LANES)))
-            .collect();
-        let fine = tables
-            .lines
-            .iter()
-            .map(|line| ComplexLanes {
-                re: Lanes(std::array::from_fn(|lane| wave(line, lane).re)),
-                im: Lanes(std::array::from_fn(|lane| wave(line, lane).im)),
-            })
-            .collect();
-        let slopes = tables.lines.iter().map(|line| line.s).collect();
-        Self { step, blocks, slopes, coarse, fine }
+        let waves = |n| -> [Complex; LANES] { std::array::from_fn(|lane| grid.wave(n, lane)) };
+        let lines = 0..grid.slopes.len();
+        let fine = lines.clone().map(waves).map(|waves| ComplexLanes {
+            re: Lanes(waves.map(|wave| wave.re)),
+            im: Lanes(waves.map(|wave| wave.im)),
+        });
+        grid.fine = fine.collect();
+        if keep {
+            let coarse = lines.flat_map(|n| (0..grid.blocks).map(move |b| (n, b)));
+            grid.coarse = coarse.map(|(n, b)| grid.wave(n, b * LANES)).collect();
+        }
+        grid
+    }
+
+    /// Bytes that a grid of so many lines takes, if its waves are kept.
+    pub(crate) fn bytes(setup: &Setup, lines: usize) -> f64 {
+        let a_line = Self::blocks(setup) * size_of::<Complex>() + size_of::<ComplexLanes>();
+        lines as f64 * a_line as f64
+    }
+
+    fn step(setup: &Setup) -> f64 {
+        1.0 / (POINTS_PER_CYCLE * setup.probe.center_frequency)
+    }
+
+    fn blocks(setup: &Setup) -> usize {
+        let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
+        ((last / Self::step(setup)) as usize / LANES + 2).next_multiple_of(GROUP)
+    }
+
+    /// e^{iωt} of a line at time `j` of the grid.
+    fn wave(&self, line: usize, j: usize) -> Complex {
+        let (sin, cos) = libm::sincos(self.slopes[line].im * (j as f64 * self.step));
+        Complex::new(cos, sin)
+    }
+
+    /// e^{iωt} of the first `lines` at the first times of the [`GROUP`] blocks from `start` on, at
+    /// `[i * stride + offset + b]` of what is returned, with stride and offset.
+    #[inline(always)]
+    fn coarse<'a>(
+        &'a self,
+        lines: usize,
+        start: usize,
+        scratch: &'a mut Vec<Complex>,
+    ) -> (&'a [Complex], usize, usize) {
+        if !self.coarse.is_empty() {
+            return (&self.coarse, self.blocks, start);
+        }
+        scratch.clear();
+        for line in 0..lines {
+            scratch.extend((start..start + GROUP).map(|b| self.wave(line, b * LANES)));
+        }
+        (scratch, GROUP, 0)
     }
 
     /// The slope, times e^{-αt} T/2, in the blocks from `first` to at least `last`.
@@ -112,13 +155,14 @@ impl Grid {
         while b <= last {
             // The last group may begin earlier, so as to end on the grid.
             let start = b.min(self.blocks - GROUP);
+            let (waves, stride, offset) = self.coarse(lines, start, &mut slopes.coarse);
             let mut sums = [Lanes::ZERO; GROUP];
             for part in 0..V::PARTS {
                 let mut sum = [V::splat(0.0); GROUP];
                 for (n, delayed) in slopes.delayed.iter().enumerate() {
                     let wave = ComplexVector::<V>::load(delayed, part);
-                    let at = n * self.blocks + start;
-                    let coarse = &self.coarse[at..at + GROUP];
+                    let at = n * stride + offset;
+                    let coarse = &waves[at..at + GROUP];
                     for i in 0..GROUP {
                         let c = coarse[i];
                         let real = wave.re.mul_add(V::splat(c.re), sum[i]);

@@ -9,6 +9,7 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::{self, Grade, RUNGS};
 
 use crate::exact::Exact;
+use crate::exact::ladder::Held;
 use crate::exact::look::{ExactWorkspace, Look, Rung};
 use crate::exact::response::respond;
 use crate::isa::Isa;
@@ -34,8 +35,7 @@ pub struct Memory {
 #[derive(Debug)]
 pub struct Filled<'a> {
     exact: &'a Exact,
-    rung: &'a Rung,
-    look: &'a Look,
+    rung: Held<'a>,
     accurate: bool,
     medium: Medium,
     speed: f64,
@@ -80,21 +80,29 @@ impl Stages {
         let ladder = if accurate { &exact.thorough } else { &exact.quick };
         let index = sampling::rung(&exact.setup, speed).unwrap_or(RUNGS);
         let rung = exact.rung(ladder, index, speed)?;
-        let look = if accurate { &rung.whole } else { &rung.first };
-        Ok(Filled { exact, rung, look, accurate, medium, speed, memory })
+        Ok(Filled { exact, rung, accurate, medium, speed, memory })
     }
 }
 
+/// The first look of a rung.
+fn look(rung: &Rung, accurate: bool) -> &Look {
+    if accurate { &rung.whole } else { &rung.first }
+}
+
 impl<'b> Filled<'b> {
+    fn look(&self) -> &Look {
+        look(&self.rung, self.accurate)
+    }
+
     /// Number of (frequency, wavenumber) pairs.
     pub fn pairs(&self) -> usize {
-        self.look.sampled.pairs as usize
+        self.look().sampled.pairs as usize
     }
 
     /// Admittance: the plate's response in every pair.
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
         let (isa, tables, medium) = (self.exact.isa, &self.rung.tables, &self.medium);
-        let lines = &tables.lines[..self.look.lines];
+        let lines = &tables.lines[..self.look().lines];
         let Memory { exact: ExactWorkspace { fast, accurate, .. }, responses } = &mut *self.memory;
         responses.resize_with(lines.len(), Vec::new);
         for (line, responses) in lines.iter().zip(responses) {
@@ -126,8 +134,8 @@ impl<'b> Summed<'_, 'b> {
     /// # Errors
     /// When a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
-        let Filled { exact, rung, look, speed, memory, .. } = &mut *self.0;
-        exact.observe(*speed, rung, look, &mut memory.exact)?;
+        let Filled { exact, rung, accurate, speed, memory, .. } = &mut *self.0;
+        exact.observe(*speed, rung, look(rung, *accurate), &mut memory.exact)?;
         Ok(Observed(self.0))
     }
 }
@@ -138,7 +146,8 @@ impl Observed<'_, '_> {
     /// # Errors
     /// When there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
-        let Filled { exact, rung, look, memory, .. } = &*self.0;
+        let Filled { exact, rung, memory, .. } = &*self.0;
+        let look = self.0.look();
         let found = exact.picked(rung, look, &memory.exact)?;
         Ok(found.arrival(1, look.sampled.pairs))
     }

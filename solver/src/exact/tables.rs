@@ -59,6 +59,14 @@ pub(crate) struct Block {
 }
 
 impl Tables {
+    /// Bytes that tables of so many pairs take, if they are kept.
+    pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> f64 {
+        let a_pair = (size_of::<Block>() + size_of::<ComplexLanes>()) / LANES;
+        let highest = sampling.runs().iter().flat_map(|run| run.frequencies()).max().unwrap_or(0);
+        let cosines = sampling.wavenumbers(highest) * setup.probe.receivers.count as usize;
+        pairs * a_pair as f64 + (cosines * size_of::<f64>()) as f64
+    }
+
     /// Tables for a pulse of the given amplitude.
     ///
     /// `taper` cuts the whole band; `keep`: whether blocks are kept, rather than be computed whenever
