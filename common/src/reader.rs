@@ -163,6 +163,16 @@ impl Reader {
         whole
     }
 
+    /// Whether `key` is true.
+    pub(crate) fn truth(&mut self, table: &Table<'_>, key: &str) -> Option<bool> {
+        let node = table.get(key)?;
+        let Value::Boolean(truth) = node.value else {
+            self.wrong_type(table.path(key), "true or false", &node.value);
+            return None;
+        };
+        Some(truth)
+    }
+
     /// The choice that the string `key` names.
     pub(crate) fn choice<T: Copy>(
         &mut self,

@@ -18,6 +18,7 @@ pub mod models;
 pub mod refinement;
 pub mod setups;
 mod table;
+pub mod variance;
 
 pub use difference::{Difference, difference};
 pub use draws::{Draws, OPTIMUM};
