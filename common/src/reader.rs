@@ -122,6 +122,11 @@ impl Reader {
         }
     }
 
+    /// Whether a key of `table` was taken for a misspelt `key`.
+    pub(crate) fn is_misspelt(&self, table: &Table<'_>, key: &str) -> bool {
+        self.suggested.contains(&table.path(key))
+    }
+
     /// Records that `key` of `table` is absent, though it is needed.
     pub(crate) fn missing(&mut self, table: &Table<'_>, key: &str, expected: impl fmt::Display) {
         let path = table.path(key);

@@ -199,6 +199,7 @@ fn unknown_keys() {
             ("threshold = 0.06", "treshold = 0.06"),
             ("refinement = 1.5", "refinment = 1.5"),
             ("realizations = 500", "realisations = 500"),
+            ("sampling = \"sobol\"", "samplng = \"sobol\""),
             ("start = 0.1", "strat = 0.1"),
             ("[parameters.dispersion]", "[parameters.dispersoin]"),
             ("kind = \"moments\"", "\"sur prise\" = 1"),

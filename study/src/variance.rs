@@ -44,6 +44,8 @@ pub struct Scatter {
     pub deviation: Moments,
     /// Root mean square of the reported standard errors.
     pub reported: Moments,
+    /// Failed realizations, over all seeds.
+    pub failed: usize,
 }
 
 /// Standard deviations of mean and coefficient of variation over seeds at the paper's optimum, their
@@ -59,6 +61,7 @@ pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table,
         "sampling",
         "scrambles",
         "control variate",
+        "failed",
         "mean: deviation (m/s)",
         "gain",
         "reported / deviation",
@@ -79,6 +82,7 @@ pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table,
                 let mut row = vec![dispersion.to_string(), realizations.to_string()];
                 row.extend([sampling.name().to_owned(), scrambles.to_string()]);
                 row.push(if control_variate { "yes" } else { "no" }.to_owned());
+                row.push(found.failed.to_string());
                 row.extend(cells(&found, &plain));
                 table.push(row);
             }
@@ -101,16 +105,18 @@ pub fn scatter(
 ) -> Result<[Scatter; 2], PointError> {
     let solver = Solver::with_isa(&Setup::default(), repetitions.isa);
     let mut estimates = [Vec::new(), Vec::new()];
+    let mut failed = 0;
     for seed in repetitions.first..repetitions.first + repetitions.seeds {
         let plain = MonteCarlo { realizations, seed, sampling, scrambles, ..MonteCarlo::default() };
         let ensemble = Ensemble::drawn(point, plain.germs())?;
         let outcomes = outcomes(&solver, &ensemble, realizations);
+        failed += outcomes.iter().filter(|outcome| outcome.is_err()).count();
         for (estimates, control_variate) in estimates.iter_mut().zip([false, true]) {
             let monte_carlo = MonteCarlo { control_variate, ..plain };
             estimates.extend(statistics::estimate(&monte_carlo, point, &outcomes));
         }
     }
-    Ok(estimates.map(|estimates| Scatter::of(&estimates)))
+    Ok(estimates.map(|estimates| Scatter::of(&estimates, failed)))
 }
 
 fn outcomes(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<Outcome> {
@@ -122,7 +128,7 @@ fn outcomes(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<Outcome> {
 }
 
 impl Scatter {
-    fn of(estimates: &[Estimate]) -> Self {
+    fn of(estimates: &[Estimate], failed: usize) -> Self {
         let of = |moment: fn(&Moments) -> f64| {
             let values = || estimates.iter().map(|estimate| moment(&estimate.moments));
             let mean = values().sum::<f64>() / estimates.len() as f64;
@@ -135,7 +141,11 @@ impl Scatter {
         let mean = of(|moments| moments.mean);
         let variation = of(|moments| moments.coefficient_of_variation);
         let moments = |mean, coefficient_of_variation| Moments { mean, coefficient_of_variation };
-        Self { deviation: moments(mean.0, variation.0), reported: moments(mean.1, variation.1) }
+        Self {
+            deviation: moments(mean.0, variation.0),
+            reported: moments(mean.1, variation.1),
+            failed,
+        }
     }
 }
 
@@ -201,11 +211,11 @@ mod tests {
             standard_error: Moments { mean: error, coefficient_of_variation: 1.0 },
             controlled: false,
         };
-        let found = Scatter::of(&[estimate(1.0, 3.0), estimate(3.0, 4.0)]);
+        let found = Scatter::of(&[estimate(1.0, 3.0), estimate(3.0, 4.0)], 5);
         assert!((found.deviation.mean - 2.0_f64.sqrt()).abs() < 1e-15);
         assert!((found.deviation.coefficient_of_variation - 0.02_f64.sqrt()).abs() < 1e-15);
         assert!((found.reported.mean - 12.5_f64.sqrt()).abs() < 1e-15);
-        assert_eq!(found.reported.coefficient_of_variation, 1.0);
+        assert_eq!((found.reported.coefficient_of_variation, found.failed), (1.0, 5));
         assert_eq!(cells(&found, &found)[..3], ["1.4", "1.0", "2.5"]);
     }
 }

@@ -11,13 +11,16 @@ pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
         ["realizations", "seed", "sampling", "scrambles", "control_variate", "max_failed_fraction"];
     let table = reader.table(root, "monte_carlo", &keys);
     let sampling = Choice { all: &Sampling::ALL, name: Sampling::name, reserved: &[] };
+    let scrambles = reader.whole(&table, "scrambles", SCRAMBLES).unwrap_or(default.scrambles);
+    // What they must agree with is not known: that it is misspelt is all there is to say.
+    let alone = ["realizations", "sampling"].iter().any(|key| reader.is_misspelt(&table, key));
     MonteCarlo {
         realizations: reader
             .whole(&table, "realizations", REALIZATIONS)
             .unwrap_or(default.realizations),
         seed: reader.whole(&table, "seed", SEED).unwrap_or(default.seed),
         sampling: reader.choice(&table, "sampling", &sampling).unwrap_or(default.sampling),
-        scrambles: reader.whole(&table, "scrambles", SCRAMBLES).unwrap_or(default.scrambles),
+        scrambles: if alone { default.scrambles } else { scrambles },
         control_variate: reader.truth(&table, "control_variate").unwrap_or(default.control_variate),
         max_failed_fraction: reader
             .number(&table, "max_failed_fraction")
