@@ -11,6 +11,7 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
+use osteon_common::document::Format;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
@@ -203,7 +204,11 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 
 /// Refuses a directory whose job is not `specification`, and says where they differ.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    match difference(stored, &job_file::to_toml(specification)) {
+    // A version that did not know a key did what is its default.
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let complete = job_file::parse(stored, Format::Toml, directory, specification.kind)
+        .map_or_else(|_| stored.to_owned(), |there| job_file::to_toml(&there));
+    match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \

@@ -1,6 +1,7 @@
 //! The specification of a job: everything that its result depends on.
 
 use crate::case::Setup;
+use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
 
 /// What a job does.
@@ -58,16 +59,19 @@ pub enum Sampling {
     /// Independent germs, one ChaCha stream per realization.
     #[default]
     MonteCarlo,
+    /// Scrambled Sobol' points.
+    Sobol,
 }
 
 impl Sampling {
     /// Every sampling, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::MonteCarlo];
+    pub const ALL: [Self; 2] = [Self::MonteCarlo, Self::Sobol];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "monte_carlo",
+            Self::Sobol => "sobol",
         }
     }
 }
@@ -81,6 +85,11 @@ pub struct MonteCarlo {
     pub seed: u64,
     /// How germs are drawn.
     pub sampling: Sampling,
+    /// Independent scrambles of the Sobol' points, among which the realizations are divided evenly:
+    /// 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for independent germs.
+    pub scrambles: u64,
+    /// Whether the moments are corrected by those of √(c1111/ρ), which the law knows.
+    pub control_variate: bool,
     /// An evaluation with a larger fraction of failures is infeasible; 0 to 1.
     pub max_failed_fraction: f64,
 }
@@ -91,8 +100,26 @@ impl Default for MonteCarlo {
             realizations: 2747,
             seed: 1,
             sampling: Sampling::MonteCarlo,
+            scrambles: 1,
+            control_variate: false,
             max_failed_fraction: 0.01,
         }
+    }
+}
+
+impl MonteCarlo {
+    /// Where the germs come from.
+    pub fn germs(&self) -> GermSource {
+        let scheme = match self.sampling {
+            Sampling::MonteCarlo => GermScheme::Streams,
+            Sampling::Sobol => GermScheme::Sobol { points: self.points() },
+        };
+        GermSource { seed: self.seed, scheme }
+    }
+
+    /// Realizations of each scramble.
+    pub fn points(&self) -> u64 {
+        self.realizations / self.scrambles.max(1)
     }
 }
 

@@ -54,6 +54,7 @@ pub fn identification(result: &JobResult, setup: &Setup) -> String {
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
+    sampling(&mut put, result);
     let picking = &result.picking;
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
@@ -67,6 +68,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("realizations", json!(result.realizations));
+    sampling(&mut put, result);
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", estimate(best.and_then(|best| best.velocity)));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
@@ -148,7 +150,15 @@ fn moments(moments: Option<Moments>) -> Value {
 fn estimate(estimate: Option<Estimate>) -> Value {
     let mut value = moments(estimate.map(|estimate| estimate.moments));
     value["standard_error"] = moments(estimate.map(|estimate| estimate.standard_error));
+    value["controlled"] = json!(estimate.map(|estimate| estimate.controlled));
     value
+}
+
+/// How the germs were drawn, and what was made of it.
+fn sampling(put: &mut impl FnMut(&str, Value) -> Option<Value>, result: &JobResult) {
+    put("sampling", json!(result.sampling.name()));
+    put("scrambles", json!(result.scrambles));
+    put("control_variate", json!(result.control_variate));
 }
 
 fn errors(errors: Option<EstimatedError>) -> Value {

@@ -85,6 +85,8 @@ fn a_minimal_job_has_the_documented_defaults() {
             realizations: 2747,
             seed: 1,
             sampling: Sampling::MonteCarlo,
+            scrambles: 1,
+            control_variate: false,
             max_failed_fraction: 0.01,
         },
         objective: Objective::Moments,
@@ -130,6 +132,9 @@ fn a_complete_job_means_what_it_says() {
     );
     assert_eq!(given.monte_carlo.realizations, 500);
     assert_eq!(given.monte_carlo.seed, 7);
+    assert_eq!(given.monte_carlo.sampling, Sampling::Sobol);
+    assert_eq!(given.monte_carlo.scrambles, 4);
+    assert!(given.monte_carlo.control_variate);
     assert_eq!(given.monte_carlo.max_failed_fraction, 0.02);
     assert_eq!(given.search.max_evaluations, 300);
     assert_eq!(given.search.cost_tolerance, 1e-9);
@@ -152,7 +157,17 @@ fn values_at_the_edges_are_accepted() {
     for (from, to) in [
         ("count = 12", "count = 3"),
         ("count = 12", "count = 64"),
-        ("realizations = 500", "realizations = 1"),
+        ("realizations = 500", "realizations = 4"),
+        ("scrambles = 4", "scrambles = 1"),
+        ("scrambles = 4", "scrambles = 500"),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1024\nsampling = \"sobol\"\nscrambles = 1024",
+        ),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1\nscrambles = 1",
+        ),
         ("realizations = 500", "realizations = 10000000"),
         ("realizations = 500", "realizations = 10_000"),
         ("seed = 7", "seed = 0"),

@@ -1,6 +1,7 @@
 //! The text of results: exact keys, columns and digits.
 
 use osteon_common::case::Setup;
+use osteon_common::job::Sampling;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
@@ -30,6 +31,7 @@ fn result() -> JobResult {
             velocity: Some(Estimate {
                 moments: moments(3906.27, 0.027083),
                 standard_error: moments(2.0, 3.6e-4),
+                controlled: true,
             }),
             failures: FailureCounts::of(&outcomes()),
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
@@ -39,6 +41,9 @@ fn result() -> JobResult {
         evaluations: 123,
         realizations: 4,
         seed: 9_223_372_036_854_775_807,
+        sampling: Sampling::Sobol,
+        scrambles: 2,
+        control_variate: true,
         solver: SolverSettings::default(),
         picking: Picking::default(),
         version: "0.1.0".to_owned(),
@@ -112,6 +117,7 @@ fn what_is_not_finite_is_null() {
     best.velocity = Some(Estimate {
         moments: moments(f64::NAN, f64::NEG_INFINITY),
         standard_error: moments(f64::NAN, f64::NAN),
+        controlled: false,
     });
     let value: serde_json::Value =
         serde_json::from_str(&results_json::identification(&result, &Setup::default())).unwrap();

@@ -162,7 +162,7 @@ impl Search {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
-        let verdict = Verdict::of(&outcomes, self.specification.monte_carlo.max_failed_fraction);
+        let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
         let cost = match &mut self.plan {
             Plan::Identification { simplex, data } => {
                 let cost = verdict.cost(*data);
@@ -312,7 +312,7 @@ impl Summary {
             best: row.zip(outcomes).map(|(row, outcomes)| BestPoint {
                 point: row.point,
                 cost: row.cost,
-                velocity: statistics::estimate(outcomes),
+                velocity: statistics::estimate(&specification.monte_carlo, &row.point, outcomes),
                 failures: row.failures,
                 estimated_error: row.estimated_error,
                 outcomes: outcomes.to_vec(),
@@ -324,6 +324,9 @@ impl Summary {
             evaluations: self.history.len() as u64,
             realizations: specification.monte_carlo.realizations,
             seed: specification.monte_carlo.seed,
+            sampling: specification.monte_carlo.sampling,
+            scrambles: specification.monte_carlo.scrambles,
+            control_variate: specification.monte_carlo.control_variate,
             solver: specification.setup.solver,
             picking: specification.setup.picking,
             version: version.to_owned(),

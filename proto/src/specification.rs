@@ -182,6 +182,8 @@ fn monte_carlo_to_message(monte_carlo: &MonteCarlo) -> v1::MonteCarlo {
         seed: Some(monte_carlo.seed),
         sampling: Some(monte_carlo.sampling.name().to_owned()),
         max_failed_fraction: Some(monte_carlo.max_failed_fraction),
+        scrambles: Some(monte_carlo.scrambles),
+        control_variate: Some(monte_carlo.control_variate),
     }
 }
 
@@ -200,6 +202,8 @@ fn monte_carlo_from_message(
             "monte_carlo.sampling",
             violations,
         ),
+        scrambles: message.scrambles.unwrap_or(default.scrambles),
+        control_variate: message.control_variate.unwrap_or(default.control_variate),
         max_failed_fraction: message.max_failed_fraction.unwrap_or(default.max_failed_fraction),
     }
 }

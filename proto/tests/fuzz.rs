@@ -61,8 +61,7 @@ fn batches() -> Vec<Vec<u8>> {
     let work = |job: &JobSpecification| Work {
         setup: job.setup,
         point: job.start(),
-        seed: job.monte_carlo.seed,
-        sampling: job.monte_carlo.sampling,
+        germs: job.monte_carlo.germs(),
         first: 17,
         count: 5,
     };
@@ -133,7 +132,7 @@ fn result() -> v1::JobResult {
         best: Some(v1::BestPoint {
             point: row.point,
             cost: Some(1e-11),
-            velocity: Some(v1::Estimate { moments, standard_error }),
+            velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
             failures: row.failures,
             estimated_error: row.estimated_error,
         }),
@@ -144,6 +143,8 @@ fn result() -> v1::JobResult {
         solver: job.solver,
         picking: job.picking,
         version: "0.1.0".to_owned(),
+        sampling: "sobol".to_owned(),
+        scrambles: 2,
         ..v1::JobResult::default()
     }
 }

@@ -3,12 +3,13 @@
 use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
+use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, setups,
+    refinement, setups, variance,
 };
 
-use crate::arguments::{DrawsArguments, Study};
+use crate::arguments::{DrawsArguments, RepetitionsArguments, Study};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::progress::say;
@@ -55,6 +56,7 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
+        Study::Variance(arguments) => over_seeds(arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     });
     let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
@@ -72,6 +74,12 @@ fn over_draws(
     let table = (study.table)(&draws, &say)?;
     let (name, seed) = (study.name, arguments.seed);
     Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
+}
+
+fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, PointError> {
+    let RepetitionsArguments { seeds, seed: first } = arguments;
+    let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
+    Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
 }
 
 /// A table under what makes it again.

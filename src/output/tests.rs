@@ -131,6 +131,29 @@ fn a_failed_propagation_says_why_whenever_it_is_shown() {
 }
 
 #[test]
+fn a_control_variate_that_was_not_used_is_told() {
+    let check = |asked: &str, used: &str, told: bool| {
+        let json = RESULT
+            .replace("\"seed\"", "\"_\"")
+            .replace(
+                "\"evaluations\"",
+                &format!("\"control_variate\": {asked},\n  \"evaluations\""),
+            )
+            .replace(
+                "\"mean\": 3905.9104",
+                &format!("\"controlled\": {used}, \"mean\": 3905.9104"),
+            );
+        for kind in [JobKind::Identification, JobKind::Propagation] {
+            let text = shown(kind, &["dispersion"], &json);
+            assert_eq!(text.contains("moments without the control variate"), told, "{text}");
+        }
+    };
+    check("true", "false", true);
+    check("true", "true", false);
+    check("false", "false", false);
+}
+
+#[test]
 fn a_propagation_shows_moments() {
     insta::assert_snapshot!(shown(JobKind::Propagation, &[], RESULT));
 }

@@ -1,8 +1,9 @@
 //! The meaning of outcomes, and replay.
 
 use osteon_common::case::Setup;
-use osteon_common::job::{MonteCarlo, Objective, Search as SearchSettings};
+use osteon_common::job::{MonteCarlo, Objective, Sampling, Search as SearchSettings};
 use osteon_common::outcome::FailureKind;
+use osteon_common::realization::Ensemble;
 
 use super::*;
 
@@ -215,4 +216,48 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("inadmissible"));
     assert!(search.result(&ending(&search), "1").best.is_none());
+}
+
+/// Velocities that the control variate explains wholly: their moments are the law's whatever the
+/// germs, and a search that is told few of them finds the point that made the data.
+#[test]
+fn a_controlled_search_goes_by_the_moments_of_the_law() {
+    let asked = MonteCarlo {
+        realizations: 16,
+        sampling: Sampling::Sobol,
+        scrambles: 2,
+        control_variate: true,
+        ..MonteCarlo::default()
+    };
+    let explained = |monte_carlo: &MonteCarlo, point: &Point| -> Arc<[Outcome]> {
+        let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
+        let speed = |index| {
+            let bone = ensemble.bone(index).unwrap();
+            (bone.elasticity.rows()[0][0] / bone.density).sqrt()
+        };
+        (0..monte_carlo.realizations).map(|index| Ok(0.99 * speed(index))).collect()
+    };
+    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let other = MonteCarlo { seed: 99, ..asked };
+    let data = statistics::estimate(&other, &truth, &explained(&other, &truth)).unwrap().moments;
+    let Moments { mean, coefficient_of_variation } = data;
+    let specification = Arc::new(JobSpecification {
+        data: Some(Data::Moments { mean, coefficient_of_variation }),
+        monte_carlo: asked,
+        ..specification(400)
+    });
+    let mut search = Search::new(Arc::clone(&specification));
+    let mut again = Search::new(specification);
+    while let Step::Evaluate(point) = search.ask() {
+        search.tell(explained(&asked, &point), ERRORS);
+        again.retell(point, explained(&asked, &point), ERRORS).unwrap();
+    }
+    let result = search.result(&ending(&search), "1");
+    assert_eq!(result.status, Status::Converged);
+    assert_eq!(result, again.result(&ending(&again), "1"));
+    assert_eq!((result.sampling, result.scrambles), (Sampling::Sobol, 2));
+    let best = result.best.unwrap();
+    assert!(best.velocity.unwrap().controlled);
+    assert!((best.point.0[1] / truth.0[1] - 1.0).abs() < 1e-4, "{:?}", best.point);
+    assert!((best.point.dispersion() / truth.dispersion() - 1.0).abs() < 1e-4, "{:?}", best.point);
 }

@@ -369,7 +369,7 @@ impl World {
         else {
             return true;
         };
-        let key = work.point.0.iter().fold(work.seed, |key, x| fake::mix(key ^ x.to_bits()));
+        let key = work.point.0.iter().fold(work.germs.seed, |key, x| fake::mix(key ^ x.to_bits()));
         let lost = self.lost_alone.entry((key, work.first)).or_default();
         *lost += 1;
         *lost <= LOST_ALONE_MAX
@@ -533,7 +533,7 @@ impl World {
 /// What a batch is about.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
     let point = work.point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()));
-    (work.seed, point, work.first, work.count)
+    (work.germs.seed, point, work.first, work.count)
 }
 
 /// One to three clients with small jobs.

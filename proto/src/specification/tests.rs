@@ -63,7 +63,9 @@ prop_compose! {
     fn specification()(
         data in proptest::option::of(data()),
         parameters in parameters(),
-        realizations in 1_u64..=10_000_000,
+        points in 1_u64..=9765,
+        scrambles in proptest::option::of(1_u64..=1024),
+        control_variate: bool,
         seed in 0..1_u64 << 63,
         max_failed_fraction in 0.0..1.0,
         max_evaluations in 1_u64..1000,
@@ -76,10 +78,12 @@ prop_compose! {
             data,
             parameters,
             monte_carlo: MonteCarlo {
-                realizations,
+                realizations: points * scrambles.unwrap_or(1),
                 seed,
+                sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
+                scrambles: scrambles.unwrap_or(1),
+                control_variate,
                 max_failed_fraction,
-                ..MonteCarlo::default()
             },
             objective: Objective::default(),
             search: Search { max_evaluations, initial_step, ..Search::default() },
@@ -190,6 +194,14 @@ fn each_fault_is_named_by_its_path() {
         ["parameters.density"]
     );
     assert_eq!(faults(|m| m.parameters = None).len(), 7);
+    for (sampling, scrambles) in [("monte_carlo", 2), ("sobol", 2), ("sobol", 0), ("sobol", 1025)] {
+        let fields = faults(|m| {
+            let monte_carlo = m.monte_carlo.as_mut().unwrap();
+            monte_carlo.sampling = Some(sampling.to_owned());
+            monte_carlo.scrambles = Some(scrambles);
+        });
+        assert_eq!(fields, ["monte_carlo.scrambles"], "{sampling} {scrambles} of 2747");
+    }
 }
 
 #[test]

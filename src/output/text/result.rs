@@ -58,6 +58,7 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     };
     text.push_str(&format!("; at the best point {}\n\n", failures(value)));
     text.push_str(&moments(value, true));
+    text.push_str(uncontrolled(value));
     text.push('\n');
     text.push_str(&parameters(&point, shown.specification));
     if status != "failed" {
@@ -71,6 +72,7 @@ fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     }
     text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
     text.push_str(&moments(value, false));
+    text.push_str(uncontrolled(value));
 }
 
 fn failures(value: &Value) -> String {
@@ -107,6 +109,16 @@ fn moments(value: &Value, with_data: bool) -> String {
         rows.push(["cost".to_owned(), significant(cost, 4), String::new()]);
     }
     aligned(&rows)
+}
+
+/// That the control variate which was asked for could not be used.
+fn uncontrolled(value: &Value) -> &'static str {
+    match (value["control_variate"].as_bool(), value["velocity"]["controlled"].as_bool()) {
+        (Some(true), Some(false)) => {
+            "moments without the control variate: it takes three realizations or more, and none failed\n"
+        }
+        _ => "",
+    }
 }
 
 /// A number with enough digits to compare it with the data's, and two digits of its standard
