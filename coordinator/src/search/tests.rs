@@ -1,7 +1,7 @@
 //! The meaning of outcomes, and replay.
 
 use osteon_common::case::Setup;
-use osteon_common::job::{MonteCarlo, Objective, Search as SearchSettings};
+use osteon_common::job::{MonteCarlo, Objective, Range, Search as SearchSettings};
 use osteon_common::outcome::FailureKind;
 
 use super::*;
