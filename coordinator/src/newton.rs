@@ -8,8 +8,10 @@
 //! Looked for is, of the points whose moments are the data's, the one nearest to the start in units
 //! of the box. What is believed of the moments (`model.rs`) is the closed form ln √(c1111/ρ), ln δ
 //! with a correction that every evaluation improves; the next point is the believed answer
-//! (`nearest.rs`), looked for from the start and not from where the search is, so that steps add no
-//! detours. The start itself is evaluated first.
+//! (`nearest.rs`). It is looked for from the start and not from where the search is, so that steps
+//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there: what is left to
+//! do is then so little that it does not matter, and corrections that also slid along the points
+//! that match would be longer than what they correct. The start itself is evaluated first.
 //!
 //! # Safeguards
 //!
@@ -39,6 +41,8 @@ use crate::search_box::SearchBox;
 use self::model::{Logarithms, Model, subtract};
 use self::nearest::dot;
 
+pub use self::nearest::nearest;
+
 #[cfg(test)]
 mod tests;
 
@@ -46,6 +50,8 @@ mod tests;
 pub const RADIUS_MAX: f64 = 1.0;
 /// Evaluations in a row that do not halve the cost, before the Jacobian is made anew.
 pub const SLOW_MAX: u32 = 4;
+/// Cost below which the nearest point is found but for corrections: both moments to 1 %.
+pub const NEAR: f64 = 1e-4;
 /// A cost below this fraction of another is progress.
 const PROGRESS: f64 = 0.5;
 /// Step of the differences that measure slopes, in edges of the box.
@@ -99,12 +105,15 @@ enum Renewed {
 pub struct Newton {
     settings: Settings,
     target: Logarithms,
-    start: Vec<f64>,
+    /// From where the nearest point is looked for: the start, later where it nearly is.
+    centre: Vec<f64>,
     model: Model,
     /// The lowest cost of all steps, once one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
     purpose: Purpose,
+    /// Whether the pending step goes all the way.
+    whole: bool,
     /// Longest step for now.
     radius: f64,
     /// The cost to halve, and evaluations since it was halved.
@@ -128,8 +137,9 @@ impl Newton {
             model: Model::new(space, start.clone(), rule),
             base: None,
             pending: start.clone(),
-            start,
+            centre: start,
             purpose: Purpose::Step,
+            whole: false,
             radius: RADIUS_MAX,
             mark: f64::INFINITY,
             slow: 0,
@@ -216,6 +226,9 @@ impl Newton {
         }
         if lowest.is_none_or(|lowest| trial.cost < lowest) {
             self.model.settle_on(&trial.at, trial.found);
+            if self.whole && trial.cost < NEAR {
+                self.centre.clone_from(&trial.at);
+            }
             self.base = Some(trial);
             self.radius = (2.0 * self.radius).min(RADIUS_MAX);
         } else {
@@ -237,7 +250,7 @@ impl Newton {
                 return;
             }
             let anchor = self.anchor();
-            let mut step = subtract(&self.model.nearest(&self.start, self.target), anchor);
+            let mut step = subtract(&self.model.nearest(&self.centre, self.target), anchor);
             let length = norm(&step);
             if length > self.radius {
                 step.iter_mut().for_each(|d| *d *= self.radius / length);
@@ -246,6 +259,7 @@ impl Newton {
                 let moved = anchor.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0));
                 self.pending = moved.collect();
                 self.purpose = Purpose::Step;
+                self.whole = length <= self.radius;
                 return;
             }
             stalled = true;
@@ -309,7 +323,7 @@ impl Newton {
 
     /// Where steps begin.
     fn anchor(&self) -> &[f64] {
-        self.base.as_ref().map_or(&self.start, |base| &base.at)
+        self.base.as_ref().map_or(&self.centre, |base| &base.at)
     }
 }
 

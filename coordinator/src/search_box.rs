@@ -126,8 +126,10 @@ mod tests {
     fn parameters_on_a_bound_are_named() {
         let space = example();
         assert_eq!(space.on_bounds(&space.point(&[0.5, 0.5])), []);
-        let expected =
-            [(Parameter::LongitudinalYoungModulus, Side::Upper), (Parameter::Dispersion, Side::Lower)];
+        let expected = [
+            (Parameter::LongitudinalYoungModulus, Side::Upper),
+            (Parameter::Dispersion, Side::Lower),
+        ];
         assert_eq!(space.on_bounds(&space.point(&[1.0, 0.0])), expected);
     }
 }

@@ -1,11 +1,11 @@
-//! `study`: tables of how the solvers do over many draws.
+//! `study`: tables of how the solvers and the searches do over many draws.
 
 use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
 use osteon_study::{
     Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, setups,
+    refinement, searches, setups,
 };
 
 use crate::arguments::{DrawsArguments, Study};
@@ -34,6 +34,8 @@ const REFINEMENT: OverDraws = OverDraws {
     realizations: refinement::REALIZATIONS,
     table: refinement::table,
 };
+const SEARCHES: OverDraws =
+    OverDraws { name: "searches", realizations: searches::REALIZATIONS, table: searches::table };
 const SETUPS: OverDraws =
     OverDraws { name: "setups", realizations: setups::REALIZATIONS, table: setups::table };
 const DIGEST: OverDraws =
@@ -54,6 +56,7 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
         Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
+        Study::Searches(arguments) => over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     });

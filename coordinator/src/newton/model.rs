@@ -18,12 +18,15 @@ use super::nearest::{Rows, dot, nearest};
 /// Logarithms of mean velocity (m/s) and coefficient of variation.
 pub(super) type Logarithms = [f64; 2];
 
-/// Most linearisations of the closed form on the way to its solution; four to eight are usual.
-const LINEARISATIONS_MAX: usize = 60;
-/// Linearisations after which steps are halved, so that they cannot go to and fro for ever.
-const HALVED_FROM: usize = 12;
+/// Most linearisations of the closed form on the way to its solution; four to eight are usual, where
+/// the points that match are strongly curved a hundred.
+const LINEARISATIONS_MAX: usize = 300;
+/// Steps that turn back, and are longer than this share of the one before, are too long.
+const TURNED_BACK: f64 = 0.3;
+/// Smallest share of a step that is taken for that reason.
+const SHARE_MIN: f64 = 1.0 / 64.0;
 /// A step this small, in units of the box, changes nothing.
-const STEP_MIN: f64 = 1e-13;
+const STEP_MIN: f64 = 1e-12;
 /// Equations met to this are solved.
 const SOLVED: f64 = 1e-8;
 /// Most halvings of a step that leaves the admissible points.
@@ -105,28 +108,36 @@ impl Model {
     ///
     /// The nearest point is found by linearising the model again and again: each linearisation
     /// has a nearest point, and where these come to rest, the way from the start is normal to the
-    /// model's solutions (within the active bounds).
+    /// model's solutions (within the active bounds). Where those are curved more strongly than the
+    /// sphere around the start, whole steps would go to and fro, and shares are taken.
     pub(super) fn nearest(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
         let mut at = self.at.clone();
         for goal in [Goal::Logarithms, Goal::Cost] {
-            for linearisation in 0..LINEARISATIONS_MAX {
-                let Some((rows, right)) = self.linear(goal, &at, target) else { break };
-                let wanted = subtract(&nearest(start, &rows, right), &at);
-                let share = if linearisation < HALVED_FROM { 1.0 } else { 0.5 };
-                let next = self.admissible_step(&at, &wanted, share);
-                let moved = largest(&subtract(&next, &at));
-                at = next;
-                if moved <= STEP_MIN {
-                    break;
-                }
-            }
-            let solved =
-                |(believed, _)| difference(believed, target).iter().all(|d| d.abs() < SOLVED);
-            if self.believed(&at).is_some_and(solved) {
+            self.approach(&mut at, goal, start, target);
+            let missed = self.believed(&at).map(|(believed, _)| difference(believed, target));
+            if missed.is_some_and(|missed| missed.iter().all(|d| d.abs() < SOLVED)) {
                 break;
             }
         }
         at
+    }
+
+    /// Linearises until that comes to rest.
+    fn approach(&self, at: &mut Vec<f64>, goal: Goal, start: &[f64], target: Logarithms) {
+        let mut share = 1.0;
+        let mut before: Vec<f64> = Vec::new();
+        for _ in 0..LINEARISATIONS_MAX {
+            let Some((rows, right)) = self.linear(goal, at, target) else { return };
+            let wanted = subtract(&nearest(start, &rows, right), at);
+            if dot(&wanted, &before) < -TURNED_BACK * dot(&before, &before) && share > SHARE_MIN {
+                share *= 0.5;
+            }
+            *at = self.admissible_step(at, &wanted, share);
+            if largest(&wanted) <= STEP_MIN {
+                return;
+            }
+            before = wanted;
+        }
     }
 
     /// Two equations, linear in the coordinates, that say that `goal` is reached.

@@ -15,7 +15,7 @@ const MET: f64 = 1e-14;
 const CHANGE_MIN: f64 = 1e-13;
 
 /// Two rows of coefficients, one for each equation.
-pub(super) type Rows = [Vec<f64>; 2];
+pub type Rows = [Vec<f64>; 2];
 
 /// Minimises |x - start|² + |rows · x - right|² / `SOFTNESS` over the unit box.
 ///
@@ -24,7 +24,7 @@ pub(super) type Rows = [Vec<f64>; 2];
 /// convex function that is piecewise quadratic, a piece for each set of active bounds. Newton's
 /// method with an exact search along each step ends on it: an active set that may change in many
 /// bounds at once (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2002).
-pub(super) fn nearest(start: &[f64], rows: &Rows, right: [f64; 2]) -> Vec<f64> {
+pub fn nearest(start: &[f64], rows: &Rows, right: [f64; 2]) -> Vec<f64> {
     let dual = Dual { start, rows, right };
     let mut multipliers = [0.0; 2];
     for _ in 0..STEPS_MAX {

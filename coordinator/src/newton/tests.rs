@@ -50,11 +50,23 @@ fn some_free(free: &[usize]) -> SearchBox {
 fn bone(point: &Point) -> Moments {
     let ln = |axis: usize| libm::log(point.0[axis] / OPTIMUM.0[axis]);
     let velocity = libm::exp(bulk_velocity(point).unwrap().logarithm);
-    let wobble = 0.0062 * ln(0) + 0.0047 * ln(3) - 0.0084 * ln(4) + 0.02 * ln(1) * ln(5);
+    let linear = 0.0062 * ln(0) - 0.0042 * ln(1) - 0.0070 * ln(2) + 0.0047 * ln(3)
+        - 0.0084 * ln(4)
+        - 0.0054 * ln(5)
+        - 0.0011 * ln(6);
+    let wobble = linear + 0.01 * ln(1) * ln(5);
     let variation = 0.02 * ln(0) - 0.022 * ln(1) + 0.021 * ln(2) + 0.05 * ln(6) * ln(6);
     Moments {
         mean: 0.986 * velocity * libm::exp(wobble),
         coefficient_of_variation: 0.2632 * point.dispersion() * libm::exp(variation),
+    }
+}
+
+/// The rule, and nothing else.
+fn rule(point: &Point) -> Moments {
+    Moments {
+        mean: libm::exp(bulk_velocity(point).unwrap().logarithm),
+        coefficient_of_variation: 0.26 * point.dispersion(),
     }
 }
 
@@ -98,6 +110,24 @@ fn search(
     }
 }
 
+/// Distance of `at` from the nearest point to the start, of the solutions as they are linearised
+/// there by central differences of the moments themselves; and that point's distance from the start.
+fn off_nearest(space: SearchBox, at: &[f64], moments: &dyn Fn(&Point) -> Moments) -> (f64, f64) {
+    let y = |at: &[f64]| logarithms(moments(&space.point(at)));
+    let mut rows = [vec![0.0; at.len()], vec![0.0; at.len()]];
+    for axis in 0..at.len() {
+        let mut moved = [at.to_vec(), at.to_vec()];
+        moved[0][axis] = (at[axis] - 1e-6).max(0.0);
+        moved[1][axis] = (at[axis] + 1e-6).min(1.0);
+        let [below, above] = moved.each_ref().map(|at| y(at));
+        let width = moved[1][axis] - moved[0][axis];
+        (0..2).for_each(|i| rows[i][axis] = (above[i] - below[i]) / width);
+    }
+    let right = [0, 1].map(|i| dot(&rows[i], at));
+    let expected = nearest::nearest(&space.start(), &rows, right);
+    (norm(&subtract(&expected, at)), norm(&subtract(&expected, &space.start())))
+}
+
 fn in_box(point: &Point) -> [f64; 7] {
     std::array::from_fn(|i| (point.0[i] - BOUNDS[i].0) / (BOUNDS[i].1 - BOUNDS[i].0))
 }
@@ -123,20 +153,20 @@ proptest! {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
-        let y = |at: &[f64]| logarithms(bone(&space.point(at)));
-        let mut rows = [vec![0.0; 7], vec![0.0; 7]];
-        for axis in 0..7 {
-            let mut moved = [found.at.clone(), found.at.clone()];
-            moved[0][axis] -= 1e-6;
-            moved[1][axis] += 1e-6;
-            let [below, above] = moved.map(|at| y(&at));
-            (0..2).for_each(|i| rows[i][axis] = (above[i] - below[i]) / 2e-6);
-        }
-        let right = [0, 1].map(|i| dot(&rows[i], &found.at));
-        let expected = nearest::nearest(&space.start(), &rows, right);
-        let off = norm(&subtract(&expected, &found.at));
-        let distance = norm(&subtract(&expected, &space.start()));
-        prop_assert!(off <= 0.05 * distance + 1e-6, "off by {off} of {distance}: {found:?}");
+        let (off, distance) = off_nearest(space, &found.at, &bone);
+        // The largest of 2000 starts was 4.6 %, the median 1.1 %.
+        prop_assert!(off <= 0.08 * distance + 1e-6, "off by {off} of {distance}: {found:?}");
+    }
+
+    /// Where the closed form is all there is, nothing is left to be learnt: one step, to the point.
+    #[test]
+    fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
+        let space = all_free(&start);
+        prop_assume!(admissible(&space.point(&space.start())));
+        let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
+        prop_assert_eq!(found.stop, Stop::CostReached);
+        let (off, _) = off_nearest(space, &found.at, &rule);
+        prop_assert!(off <= 1e-5, "off by {off}: {found:?}");
     }
 
     /// Whatever is told, it ends, and asks for no more than it may.
@@ -184,10 +214,6 @@ fn a_start_that_matches_is_the_answer() {
 #[test]
 fn what_the_data_leave_free_and_do_not_feel_does_not_move() {
     // By the closed form alone, g_L says nothing.
-    let rule = |point: &Point| Moments {
-        mean: libm::exp(bulk_velocity(point).unwrap().logarithm),
-        coefficient_of_variation: 0.26 * point.dispersion(),
-    };
     let start = [0.3; 7];
     let found = search(all_free(&start), rule(&OPTIMUM), SETTINGS, |p| Some(rule(p)));
     assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 2));
@@ -235,12 +261,12 @@ fn data_that_one_parameter_cannot_match_end_at_the_least_cost() {
 
 #[test]
 fn data_outside_the_bounds_end_on_them() {
-    let far = Moments { mean: 9000.0, coefficient_of_variation: 0.2 };
+    let slow = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
     for start in [0.2, 0.5, 0.6] {
-        let found = search(all_free(&[start; 7]), far, SETTINGS, |point| Some(bone(point)));
+        let found = search(all_free(&[start; 7]), slow, SETTINGS, |point| Some(bone(point)));
         assert_eq!(found.stop, Stop::Settled, "{found:?}");
-        assert_eq!((found.at[0], found.at[6]), (0.0, 1.0), "{found:?}");
-        assert!(found.evaluations < 60, "{found:?}");
+        assert_eq!((found.at[0], found.at[1], found.at[6]), (1.0, 0.0, 1.0), "{found:?}");
+        assert!(found.evaluations < 25, "{found:?}");
     }
 }
 

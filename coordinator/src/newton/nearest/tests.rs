@@ -46,7 +46,9 @@ proptest! {
         prop_assert!(turn > -1e-4, "{turn} at {at:?}");
     }
 
-    /// Least squares over the box: their gradient points out of the box, or nowhere.
+    /// Least squares over the box: their gradient points out of the box, or nowhere. The multipliers
+    /// are as large as what is missed over SOFTNESS, up to 1e11, and so rounding moves what is
+    /// inside the box by 1e-5.
     #[test]
     fn without_a_solution_it_is_the_least_squares(
         (start, _, rows) in problem(),
@@ -57,7 +59,7 @@ proptest! {
         let gradient: Vec<f64> =
             (0..at.len()).map(|i| rows[0][i] * missed[0] + rows[1][i] * missed[1]).collect();
         let least = least_over_the_box(&gradient, &at);
-        prop_assert!(least > -1e-5, "{least} at {at:?}");
+        prop_assert!(least > -1e-4, "{least} at {at:?}");
     }
 }
 
