@@ -41,7 +41,7 @@ use crate::search_box::SearchBox;
 use self::model::{Logarithms, Model, subtract};
 use self::nearest::dot;
 
-pub use self::nearest::nearest;
+pub use self::nearest::{Rows, nearest};
 
 #[cfg(test)]
 mod tests;
