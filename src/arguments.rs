@@ -365,6 +365,8 @@ pub(crate) enum Study {
     Setups(DrawsArguments),
     /// Jumps of the velocity between bones whose elasticity differs by 1e-9
     Continuity(DrawsArguments),
+    /// Evaluations that the methods of search need from ten starts, all seven parameters free
+    Searches(DrawsArguments),
     /// Digest of a batch on every instruction set of this machine
     Digest(DrawsArguments),
     /// How far moments scatter from seed to seed, by sampling and control variate, and how right

@@ -42,9 +42,9 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    let setup = &fetched.specification.setup;
+    let JobSpecification { setup, search, .. } = &fetched.specification;
     match kind {
-        JobKind::Identification => results_json::identification(&fetched.result, setup),
+        JobKind::Identification => results_json::identification(&fetched.result, setup, search),
         JobKind::Propagation => results_json::propagation(&fetched.result, setup),
     }
 }

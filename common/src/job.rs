@@ -149,16 +149,19 @@ pub enum SearchMethod {
     /// The Nelder-Mead simplex (the paper's).
     #[default]
     Simplex,
+    /// Minimum-norm Gauss-Newton steps with Broyden's updates.
+    Newton,
 }
 
 impl SearchMethod {
     /// Every method, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::Simplex];
+    pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simplex => "simplex",
+            Self::Newton => "newton",
         }
     }
 }
@@ -172,21 +175,32 @@ pub struct Search {
     pub max_evaluations: u64,
     /// The search ends when the best cost is at most this.
     pub cost_tolerance: f64,
-    /// The search ends when the simplex is at most this large, as a fraction of the box.
+    /// The search ends when the simplex, or a step without gain, is at most this large, as a
+    /// fraction of the box.
     pub size_tolerance: f64,
-    /// Edge of the first simplex, as a fraction of the box.
+    /// Edge of the first simplex, as a fraction of the box; of no use to other methods.
     pub initial_step: f64,
+}
+
+impl Search {
+    /// The settings that a method has by default.
+    pub fn by(method: SearchMethod) -> Self {
+        Self {
+            method,
+            max_evaluations: 400,
+            cost_tolerance: match method {
+                SearchMethod::Simplex => 1e-10,
+                SearchMethod::Newton => 1e-12,
+            },
+            size_tolerance: 1e-5,
+            initial_step: 0.15,
+        }
+    }
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Self {
-            method: SearchMethod::Simplex,
-            max_evaluations: 400,
-            cost_tolerance: 1e-10,
-            size_tolerance: 1e-5,
-            initial_step: 0.15,
-        }
+        Self::by(SearchMethod::default())
     }
 }
 

@@ -103,6 +103,24 @@ fn a_minimal_job_has_the_documented_defaults() {
 }
 
 #[test]
+fn the_default_tolerance_is_that_of_the_method() {
+    let check = |text: &str, expected: Search| {
+        let given = job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification);
+        assert_eq!(given.search, expected);
+        assert!(job_file::to_toml(&given).contains(&format!(
+            "method = \"{}\"\nmax_evaluations = 400\ncost_tolerance = {:?}\n",
+            expected.method.name(),
+            expected.cost_tolerance
+        )));
+    };
+    let newton = Search { cost_tolerance: 1e-12, ..Search::by(SearchMethod::Newton) };
+    check("[search]\nmethod = \"newton\"\n", newton);
+    let loose = Search { cost_tolerance: 1e-6, ..newton };
+    check("[search]\nmethod = \"newton\"\ncost_tolerance = 1e-6\n", loose);
+    check("[search]\nmethod = \"simplex\"\n", Search::default());
+}
+
+#[test]
 fn a_complete_job_means_what_it_says() {
     let given = job(include_str!("files/job.toml"), Format::Toml, JobKind::Identification);
     assert_eq!(

@@ -150,8 +150,13 @@ fn run() {
             (SAMPLING, "control_variates = true"),
             ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
             ("kind = \"moments\"", "kind = \"likelihood\""),
-            ("method = \"simplex\"", "method = \"newton\""),
             ("method = \"simplex\"", "method = \"annealing\""),
+            (
+                "realizations = 500\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
+                "realizations = 1\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"newton\"",
+            ),
             ("max_evaluations = 300", "max_evaluations = 0"),
             ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
             ("size_tolerance = 1e-4", "size_tolerance = 1"),

@@ -1,7 +1,7 @@
 //! The text of results: exact keys, columns and digits.
 
 use osteon_common::case::Setup;
-use osteon_common::job::Sampling;
+use osteon_common::job::{Sampling, Search, SearchMethod};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
@@ -60,6 +60,10 @@ fn failed() -> JobResult {
     }
 }
 
+fn identified(result: &JobResult) -> String {
+    results_json::identification(result, &Setup::default(), &Search::default())
+}
+
 fn check(name: &str, text: &str) {
     assert!(text.ends_with("}\n"));
     // The sampling's numbers are tested where they are chosen.
@@ -77,11 +81,28 @@ fn check(name: &str, text: &str) {
 
 #[test]
 fn identification() {
-    check("result_identification", &results_json::identification(&result(), &Setup::default()));
-    check(
-        "result_identification_failed",
-        &results_json::identification(&failed(), &Setup::default()),
-    );
+    check("result_identification", &identified(&result()));
+    check("result_identification_failed", &identified(&failed()));
+}
+
+#[test]
+fn the_result_says_how_it_was_searched_and_what_its_point_is() {
+    let check = |method: SearchMethod, cost: f64, expected: &str| {
+        let mut result = result();
+        result.best.as_mut().unwrap().cost = Some(cost);
+        let search = Search { cost_tolerance: 1e-11, ..Search::by(method) };
+        let text = results_json::identification(&result, &Setup::default(), &search);
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["search"]["method"], method.name());
+        assert_eq!(value["search"]["cost_tolerance"], 1e-11);
+        assert_eq!(value["search"]["initial_step"].is_number(), method == SearchMethod::Simplex);
+        let point = value["search"]["point"].as_str().unwrap();
+        assert!(point.contains(expected), "{point}");
+    };
+    check(SearchMethod::Newton, 1e-11, "that match the data, the one nearest to the start");
+    check(SearchMethod::Newton, 2e-11, "the one with the least cost");
+    check(SearchMethod::Simplex, 1e-12, "that match the data, the one where the simplex ended");
+    check(SearchMethod::Simplex, 2e-11, "the one with the least cost");
 }
 
 #[test]
@@ -119,8 +140,7 @@ fn what_is_not_finite_is_null() {
         standard_error: moments(f64::NAN, f64::NAN),
         controlled: false,
     });
-    let value: serde_json::Value =
-        serde_json::from_str(&results_json::identification(&result, &Setup::default())).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&identified(&result)).unwrap();
     assert!(value["cost"].is_null());
     assert!(value["velocity"]["mean"].is_null());
     assert!(value["velocity"]["coefficient_of_variation"].is_null());
@@ -133,9 +153,7 @@ fn the_best_point_is_read_back_to_the_bit() {
     let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
     for point in [POINT, odd] {
         result.best.as_mut().unwrap().point = point;
-        let read =
-            results_json::best_point(&results_json::identification(&result, &Setup::default()))
-                .unwrap();
+        let read = results_json::best_point(&identified(&result)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
     }
 }
@@ -149,15 +167,12 @@ fn a_result_without_a_point_gives_none() {
     check("", "not valid JSON: EOF");
     check("[]", "`parameters.density` is missing; it must be a number");
     check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
-    check(
-        &results_json::identification(&failed(), &Setup::default()),
-        "`parameters.density` is null;",
-    );
+    check(&identified(&failed()), "`parameters.density` is null;");
     check(
         &results_json::propagation(&result(), &Setup::default()),
         "`parameters.density` is missing;",
     );
-    let text = results_json::identification(&result(), &Setup::default());
+    let text = identified(&result());
     check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
 }
 

@@ -8,7 +8,9 @@ use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::document::Format;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::file_error::ContentError;
-use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search};
+use osteon_common::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -132,13 +134,14 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
 }
 
 fn search() -> impl Strategy<Value = Search> {
-    (1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
-        |(max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+    let method = prop::sample::select(SearchMethod::ALL.to_vec());
+    (method, 1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
+        |(method, max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+            method,
             max_evaluations,
             cost_tolerance,
             size_tolerance,
             initial_step,
-            ..Search::default()
         },
     )
 }

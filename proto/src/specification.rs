@@ -219,15 +219,16 @@ fn search_to_message(search: &Search) -> v1::Search {
 }
 
 fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations) -> Search {
-    let default = Search::default();
-    let Some(message) = message else { return default };
+    let Some(message) = message else { return Search::default() };
+    let method = setup::named(
+        message.method.as_deref(),
+        &SearchMethod::ALL.map(|method| (method.name(), method)),
+        "search.method",
+        violations,
+    );
+    let default = Search::by(method);
     Search {
-        method: setup::named(
-            message.method.as_deref(),
-            &SearchMethod::ALL.map(|method| (method.name(), method)),
-            "search.method",
-            violations,
-        ),
+        method,
         max_evaluations: message.max_evaluations.unwrap_or(default.max_evaluations),
         cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),

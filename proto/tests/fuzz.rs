@@ -180,10 +180,9 @@ fn check_result(message: &v1::JobResult) {
     let again = results::from_message(&written, outcomes()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    let setup = jobs()[0].setup;
-    for text in
-        [results_json::identification(&result, &setup), results_json::propagation(&result, &setup)]
-    {
+    let JobSpecification { setup, search, .. } = jobs()[0].clone();
+    let identification = results_json::identification(&result, &setup, &search);
+    for text in [identification, results_json::propagation(&result, &setup)] {
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
 }

@@ -1,4 +1,4 @@
-//! `study`: tables of how the solvers do over many draws.
+//! `study`: tables of how the solvers and the searches do over many draws.
 
 use osteon_common::realization::PointError;
 use osteon_common::version;
@@ -6,7 +6,7 @@ use osteon_solver::Isa;
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, setups, variance,
+    refinement, searches, setups, variance,
 };
 
 use crate::arguments::{DrawsArguments, RepetitionsArguments, Study};
@@ -35,6 +35,8 @@ const REFINEMENT: OverDraws = OverDraws {
     realizations: refinement::REALIZATIONS,
     table: refinement::table,
 };
+const SEARCHES: OverDraws =
+    OverDraws { name: "searches", realizations: searches::REALIZATIONS, table: searches::table };
 const SETUPS: OverDraws =
     OverDraws { name: "setups", realizations: setups::REALIZATIONS, table: setups::table };
 const DIGEST: OverDraws =
@@ -55,6 +57,7 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
         Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
+        Study::Searches(arguments) => over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
         Study::Variance(arguments) => over_seeds(arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),

@@ -1,4 +1,5 @@
 use osteon_common::document::Format as FileFormat;
+use osteon_common::job::{Search, SearchMethod};
 use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::Method;
@@ -87,6 +88,27 @@ fn a_search_says_what_the_data_determine() {
 fn two_searched_parameters_are_determined() {
     let free = ["longitudinal_young_modulus", "dispersion"];
     insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT));
+}
+
+/// `newton` alone says what the other values are, and only where it has matched the data.
+#[test]
+fn a_search_for_the_nearest_point_says_so() {
+    let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
+    let mut specification = specification(JobKind::Identification, &free);
+    specification.search = Search { cost_tolerance: 1e-10, ..Search::by(SearchMethod::Newton) };
+    let shown = |json: &str| {
+        let kind = JobKind::Identification;
+        let result = ShownResult { kind, specification: &specification, json, directory: None };
+        printed(Format::Text, |output| output.result(&result).unwrap())
+    };
+    let nearest = "of the points that match the data, this is the one nearest to the start";
+    assert!(shown(RESULT).contains(nearest), "{}", shown(RESULT));
+    let settled = RESULT
+        .replace("3.21e-11", "3.21e-3")
+        .replace("\"status\": \"converged\"", "\"status\": \"converged\", \"reason\": \"settled\"");
+    let text = shown(&settled);
+    assert!(text.starts_with("Converged: settled\n"), "{text}");
+    assert!(!text.contains(nearest) && text.contains("one of many sets"), "{text}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Measures the solvers against each other: [`check`] on one case, and studies over many draws of
-//! the paper's optimum that end in a [`Table`]; and ways of drawing bones ([`variance`]).
+//! Measures the solvers against each other, the ways of drawing bones ([`variance`]) and the methods of
+//! search ([`searches`]): [`check`] on one case, and studies that end in a [`Table`].
 //!
 //! A study is a function of its draws alone: realizations are computed on all cores and taken
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
@@ -16,6 +16,7 @@ mod generator;
 pub mod methods;
 pub mod models;
 pub mod refinement;
+pub mod searches;
 pub mod setups;
 mod table;
 pub mod variance;

@@ -1,7 +1,9 @@
 //! Rules on data, parameters, the Monte Carlo loop and the search.
 
 use crate::accepted::{Interval, WholeRange};
-use crate::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search};
+use crate::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+};
 use crate::limits;
 use crate::parameters::Parameter;
 use crate::statistics;
@@ -53,6 +55,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     something_to_search(specification, violations);
     monte_carlo(&specification.monte_carlo, violations);
     search(&specification.search, violations);
+    enough_for_the_method(specification, violations);
 }
 
 /// The message for an identification without data.
@@ -221,6 +224,22 @@ fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
             format!("is {scrambles}; it must divide the {realizations} realizations"),
         ),
         _ => {}
+    }
+}
+
+/// One velocity has the coefficient of variation 0, which has no logarithm.
+fn enough_for_the_method(specification: &JobSpecification, violations: &mut Violations) {
+    let realizations = specification.monte_carlo.realizations;
+    if specification.kind == JobKind::Identification
+        && specification.search.method == SearchMethod::Newton
+        && realizations == 1
+        && !known_wrong("monte_carlo.realizations", violations)
+        && !known_wrong("search.method", violations)
+    {
+        violations.add(
+            "monte_carlo.realizations",
+            "is 1; the search \"newton\" needs a coefficient of variation, so at least 2",
+        );
     }
 }
 

@@ -37,13 +37,13 @@ pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
 
 /// The search loop, with defaults where `root` is silent or wrong.
 pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
-    let default = Search::default();
     let keys = ["method", "max_evaluations", "cost_tolerance", "size_tolerance", "initial_step"];
     let table = reader.table(root, "search", &keys);
-    let method =
-        Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &["newton"] };
+    let method = Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &[] };
+    let method = reader.choice(&table, "method", &method).unwrap_or_default();
+    let default = Search::by(method);
     Search {
-        method: reader.choice(&table, "method", &method).unwrap_or(default.method),
+        method,
         max_evaluations: reader
             .whole(&table, "max_evaluations", EVALUATIONS)
             .unwrap_or(default.max_evaluations),
