@@ -72,18 +72,16 @@ impl Dual<'_> {
 
     /// The step to the minimum of the present quadratic piece.
     fn newton_step(&self, multipliers: [f64; 2], gradient: [f64; 2]) -> [f64; 2] {
-        let mut hessian = [[SOFTNESS, 0.0], [0.0, SOFTNESS]];
+        let [mut a, mut b, mut d] = [SOFTNESS, 0.0, SOFTNESS];
         for axis in 0..self.start.len() {
             if (0.0..=1.0).contains(&self.uncut(axis, multipliers)) {
-                for i in 0..2 {
-                    for j in 0..2 {
-                        hessian[i][j] += self.rows[i][axis] * self.rows[j][axis];
-                    }
-                }
+                let [first, second] = [self.rows[0][axis], self.rows[1][axis]];
+                a += first * first;
+                b += first * second;
+                d += second * second;
             }
         }
-        let [[a, b], [_, d]] = hessian;
-        // Cholesky: the pivots stay above zero where the determinant's difference cancels.
+        // The Hessian's Cholesky factor: its pivot stays above zero where the difference cancels.
         let pivot = (d - b * (b / a)).max(SOFTNESS);
         let second = -(gradient[1] - gradient[0] * (b / a)) / pivot;
         [-(gradient[0] + b * second) / a, second]
