@@ -130,7 +130,11 @@ fn told(
     state.changed.insert(id);
     job.progressed = now;
     let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
-    if doubtful && !job.cancelled {
+    if job.mended && job.search.expects(point).is_err() {
+        // What was damaged had been computed wrongly, and this comes of it.
+        job.stored = number;
+        jobs::advance(state, id, now, effects);
+    } else if doubtful && !job.cancelled {
         let realizations = job.record.specification.monte_carlo.realizations;
         match job.search.expects(point) {
             Ok(()) => {
@@ -147,11 +151,6 @@ fn told(
         match job.search.retell(point, outcomes, estimated_error) {
             Ok(()) => {
                 job.workers.extend(workers);
-                jobs::advance(state, id, now, effects);
-            }
-            Err(_) if job.mended => {
-                // What was damaged had been computed wrongly, and this comes of it.
-                job.stored = number;
                 jobs::advance(state, id, now, effects);
             }
             Err(error) => jobs::fail(state, id, &error.into(), now, effects),
