@@ -365,8 +365,13 @@ pub(crate) enum Study {
     Setups(DrawsArguments),
     /// Jumps of the velocity between bones whose elasticity differs by 1e-9
     Continuity(DrawsArguments),
+    /// Evaluations that the methods of search need from ten starts, all seven parameters free
+    Searches(DrawsArguments),
     /// Digest of a batch on every instruction set of this machine
     Digest(DrawsArguments),
+    /// How far moments scatter from seed to seed, by sampling and control variate, and how right
+    /// their standard errors are
+    Variance(RepetitionsArguments),
     /// How the hybrid method's error falls with element size, order and time step
     Convergence,
 }
@@ -383,6 +388,23 @@ pub(crate) struct DrawsArguments {
           value_parser = clap::value_parser!(u64).range(0..=osteon_common::limits::SEED_MAX))]
     pub(crate) seed: u64,
 }
+
+/// Of a study over seeds.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct RepetitionsArguments {
+    /// How many seeds
+    #[arg(long, value_name = "N", default_value_t = osteon_study::variance::SEEDS,
+          value_parser = clap::value_parser!(u64).range(2..=REPETITIONS_MAX))]
+    pub(crate) seeds: u64,
+    /// The first; the others follow it
+    #[arg(long, value_name = "S", default_value_t = 1,
+          value_parser = clap::value_parser!(u64)
+              .range(0..=osteon_common::limits::SEED_MAX - REPETITIONS_MAX))]
+    pub(crate) seed: u64,
+}
+
+/// Most repetitions of a study.
+const REPETITIONS_MAX: u64 = 10_000;
 
 /// Longest span that a command line may ask for, s: a year.
 const SECONDS_MAX: f64 = 366.0 * 86_400.0;

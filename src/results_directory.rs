@@ -11,6 +11,7 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
+use osteon_common::document::Format;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
@@ -41,9 +42,9 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    let setup = &fetched.specification.setup;
+    let JobSpecification { setup, search, .. } = &fetched.specification;
     match kind {
-        JobKind::Identification => results_json::identification(&fetched.result, setup),
+        JobKind::Identification => results_json::identification(&fetched.result, setup, search),
         JobKind::Propagation => results_json::propagation(&fetched.result, setup),
     }
 }
@@ -203,7 +204,11 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 
 /// Refuses a directory whose job is not `specification`, and says where they differ.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    match difference(stored, &job_file::to_toml(specification)) {
+    // A version that did not know a key did what is its default.
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let complete = job_file::parse(stored, Format::Toml, directory, specification.kind)
+        .map_or_else(|_| stored.to_owned(), |there| job_file::to_toml(&there));
+    match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \

@@ -30,6 +30,7 @@ fn help_of_every_command() {
         "study refinement",
         "study setups",
         "study continuity",
+        "study variance",
         "study digest",
         "study convergence",
     ] {

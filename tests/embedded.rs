@@ -21,8 +21,23 @@ use support::{
 
 #[test]
 fn the_digest_does_not_depend_on_who_computes() {
+    check_digest(&job(60, 8));
+    let result = check_digest(&sampled(60, 8));
+    assert_eq!(result["sampling"], "sobol");
+    assert_eq!(result["scrambles"], 3);
+    assert_eq!(result["control_variate"], true);
+    assert_eq!(result["velocity"]["controlled"], true);
+}
+
+/// A job whose germs are Sobol' points, in three scrambles.
+fn sampled(realizations: u32, evaluations: u32) -> String {
+    let sampling = "seed = 7\nsampling = \"sobol\"\nscrambles = 3\ncontrol_variate = true\n";
+    job(realizations, evaluations).replace("seed = 7\n", sampling)
+}
+
+fn check_digest(job: &str) -> Value {
     let scratch = Scratch::new();
-    let job = scratch.write("job.toml", &job(60, 8));
+    let job = scratch.write("job.toml", job);
     let mut results = BTreeSet::new();
     for (workers, threads) in [("1", "1"), ("2", "1"), ("3", "1"), ("1", "2"), ("2", "2")] {
         let arguments =
@@ -37,22 +52,28 @@ fn the_digest_does_not_depend_on_who_computes() {
     let errors = &result["solver"]["estimated_error"];
     let (median, largest) = (errors["median"].as_f64(), errors["largest"].as_f64());
     assert!(0.0 <= median.unwrap() && median <= largest, "{errors}");
+    result
 }
 
 #[test]
 fn propagate_has_the_bits_of_draw_and_simulate() {
+    check_draws(&job(39, 1));
+    check_draws(&sampled(39, 1));
+}
+
+fn check_draws(job: &str) {
     let scratch = Scratch::new();
-    let job = scratch.write("job.toml", &job(40, 1));
+    let job = scratch.write("job.toml", job);
     let out = scratch.path("out");
     let propagated = run(&["propagate", text(&job), "--json", "--out", text(&out)]).json();
-    assert_eq!(propagated["realizations"], 40);
+    assert_eq!(propagated["realizations"], 39);
     let file = fs::read_to_string(out.join("result.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&file).unwrap(), propagated);
 
     let csv = fs::read_to_string(out.join("realizations.csv")).unwrap();
     let rows: Vec<&str> = csv.lines().skip(1).collect();
-    assert_eq!(rows.len(), 40);
-    for index in [0, 1, 17, 39] {
+    assert_eq!(rows.len(), 39);
+    for index in [0, 1, 17, 38] {
         let case = run(&["draw", text(&job), "--index", &index.to_string()]);
         let case = scratch.write(&format!("{index}.toml"), case.succeeded());
         let velocity = run(&["simulate", text(&case), "--json"]).json()["velocity"].clone();
@@ -104,7 +125,7 @@ fn a_finished_directory_is_shown_again_and_another_job_refused() {
 #[test]
 fn the_stored_job_is_complete_and_runs_to_the_same_bits() {
     let scratch = Scratch::new();
-    let job = scratch.write("job.toml", &job(30, 4));
+    let job = scratch.write("job.toml", &sampled(30, 4));
     let (first, second) = (scratch.path("first"), scratch.path("second"));
     run(&["identify", text(&job), "--out", text(&first)]).succeeded();
     run(&["identify", text(&first.join("job.toml")), "--out", text(&second)]).succeeded();

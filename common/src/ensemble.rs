@@ -11,7 +11,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use thiserror::Error;
 
 use crate::elasticity::{Elasticity, NotElastic};
-use crate::special::{GammaQuantile, standard_normal_quantile};
+use crate::special::{GammaQuantile, root_gamma_moments, standard_normal_quantile};
 
 /// The dispersion must be below this, √((n+1)/(n+5)) = √(7/11) for n = 6: then the inverse of the
 /// random matrix has a finite mean square norm (C. Soize, J. Acoust. Soc. Am. 109 (2001)).
@@ -43,6 +43,8 @@ pub struct ElasticityLaw {
 struct Diagonal {
     /// 2 σ² α_j = 1 + (1-j) δ²/7.
     mean_square: f64,
+    /// α_j.
+    shape: f64,
     gamma: GammaQuantile,
 }
 
@@ -63,11 +65,13 @@ impl Germs {
     /// ChaCha20 with 64-bit block counter from 0, the seed as key (little-endian in bytes 0-7, the
     /// rest 0) and the index as stream; each germ is ((next 64 bits >> 11) + ½) 2⁻⁵³.
     pub fn draw(seed: u64, index: u64) -> Self {
-        let mut key = [0; 32];
-        key[..8].copy_from_slice(&seed.to_le_bytes());
-        let mut rng = ChaCha20Rng::from_seed(key);
-        rng.set_stream(index);
+        let mut rng = stream(seed, index);
         Self(std::array::from_fn(|_| uniform(rng.next_u64())))
+    }
+
+    /// The first germ that [`Germs::draw`] gives, that of entry 11.
+    pub(crate) fn first(seed: u64, index: u64) -> f64 {
+        uniform(stream(seed, index).next_u64())
     }
 
     /// Germs of the highest 53 of 64 bits each, as [`Germs::draw`] makes them of its stream.
@@ -87,9 +91,17 @@ impl Germs {
     }
 }
 
+fn stream(seed: u64, index: u64) -> ChaCha20Rng {
+    let mut key = [0; 32];
+    key[..8].copy_from_slice(&seed.to_le_bytes());
+    let mut rng = ChaCha20Rng::from_seed(key);
+    rng.set_stream(index);
+    rng
+}
+
 /// ((bits >> 11) + ½) 2⁻⁵³. The largest of these numbers, 1 - 2⁻⁵⁴, is no double and would round
 /// to 1; it becomes the largest double below 1.
-fn uniform(bits: u64) -> f64 {
+pub(crate) fn uniform(bits: u64) -> f64 {
     const STEP: f64 = 1.0 / (1u64 << 53) as f64;
     (((bits >> 11) as f64 + 0.5) * STEP).min(BELOW_ONE)
 }
@@ -107,9 +119,10 @@ impl ElasticityLaw {
         Ok(Self {
             factor: mean.cholesky(),
             sigma: dispersion / 7.0_f64.sqrt(),
-            diagonal: std::array::from_fn(|j| Diagonal {
-                mean_square: 1.0 - j as f64 * square / 7.0,
-                gamma: GammaQuantile::new(3.5 / square - 0.5 * j as f64),
+            diagonal: std::array::from_fn(|j| {
+                let shape = 3.5 / square - 0.5 * j as f64;
+                let mean_square = 1.0 - j as f64 * square / 7.0;
+                Diagonal { mean_square, shape, gamma: GammaQuantile::new(shape) }
             }),
         })
     }
@@ -136,6 +149,21 @@ impl ElasticityLaw {
         Elasticity::new(c)
     }
 
+    /// c1111 = C11 of the realization whose germ of entry 11 is `germ`, Pa: with [L] and [L_G] upper
+    /// triangular no other germ enters. The bits are those of [`ElasticityLaw::realize`].
+    pub(crate) fn c1111(&self, germ: f64) -> f64 {
+        let root = self.diagonal[0].entry(germ) * self.factor[0][0];
+        root * root
+    }
+
+    /// Mean, √Pa, and variance, Pa, of √c1111 under the law: c1111 is its mean times the square of
+    /// entry 11 of `[L_G]`, that is times V₁/α₁.
+    pub(crate) fn root_c1111_moments(&self) -> (f64, f64) {
+        let (mean, variance) = root_gamma_moments(self.diagonal[0].shape);
+        let root = self.factor[0][0];
+        (root * mean, root * root * variance)
+    }
+
     /// `[L_G]`.
     fn triangle(&self, germs: &Germs) -> [[f64; 6]; 6] {
         let mut triangle = [[0.0; 6]; 6];
@@ -143,13 +171,20 @@ impl ElasticityLaw {
         for (j, (row, diagonal)) in triangle.iter_mut().zip(&self.diagonal).enumerate() {
             for (k, (entry, &u)) in row.iter_mut().skip(j).zip(germs.by_ref()).enumerate() {
                 *entry = if k == 0 {
-                    (diagonal.mean_square * diagonal.gamma.relative_quantile(u)).sqrt()
+                    diagonal.entry(u)
                 } else {
                     self.sigma * standard_normal_quantile(u)
                 };
             }
         }
         triangle
+    }
+}
+
+impl Diagonal {
+    /// The entry with this germ.
+    fn entry(&self, germ: f64) -> f64 {
+        (self.mean_square * self.gamma.relative_quantile(germ)).sqrt()
     }
 }
 

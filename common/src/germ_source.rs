@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::ensemble::Germs;
+use crate::ensemble::{Germs, uniform};
 use crate::sobol::Scramble;
 
 /// What fixes the germs at every index.
@@ -30,7 +30,7 @@ pub enum GermScheme {
 #[derive(Debug, Clone)]
 pub(crate) struct GermMaker {
     source: GermSource,
-    /// Scrambles as they were first asked for: a batch spans few.
+    /// Scrambles, each where its number modulo their count says.
     scrambles: Arc<[OnceLock<Box<Numbered>>; SCRAMBLES_KEPT]>,
 }
 
@@ -41,8 +41,9 @@ struct Numbered {
     scramble: Scramble,
 }
 
-/// Scrambles that a batch of realizations can have at hand; further ones are made again when asked for.
-const SCRAMBLES_KEPT: usize = 4;
+/// Consecutive scrambles that a batch of realizations can have at hand, 4 kB each; one that finds its
+/// place taken is made again whenever it is asked for.
+const SCRAMBLES_KEPT: usize = 64;
 
 impl GermSource {
     /// Independent germs of this seed.
@@ -60,7 +61,7 @@ impl PartialEq for GermMaker {
 
 impl GermMaker {
     pub(crate) fn new(source: GermSource) -> Self {
-        Self { source, scrambles: Arc::default() }
+        Self { source, scrambles: Arc::new([const { OnceLock::new() }; SCRAMBLES_KEPT]) }
     }
 
     /// The germs of one realization.
@@ -76,16 +77,28 @@ impl GermMaker {
         }
     }
 
+    /// Germ 11 of realizations 0, 1, … `count` - 1.
+    pub(crate) fn firsts(&self, count: u64) -> Box<dyn Iterator<Item = f64> + '_> {
+        let seed = self.source.seed;
+        match self.source.scheme {
+            GermScheme::Streams => Box::new((0..count).map(move |index| Germs::first(seed, index))),
+            GermScheme::Sobol { points } => {
+                let points = points.max(1);
+                let of_scramble = move |number| {
+                    let scramble = Scramble::new(seed, number);
+                    let points = points.min(count - number * points);
+                    (0..points).map(move |index| uniform(scramble.first(index)))
+                };
+                Box::new((0..count.div_ceil(points)).flat_map(of_scramble))
+            }
+        }
+    }
+
     fn with_scramble<T>(&self, number: u64, then: impl FnOnce(&Scramble) -> T) -> T {
         let make =
             || Box::new(Numbered { number, scramble: Scramble::new(self.source.seed, number) });
-        for slot in self.scrambles.iter() {
-            let kept = slot.get_or_init(make);
-            if kept.number == number {
-                return then(&kept.scramble);
-            }
-        }
-        then(&make().scramble)
+        let kept = self.scrambles[(number % SCRAMBLES_KEPT as u64) as usize].get_or_init(make);
+        if kept.number == number { then(&kept.scramble) } else { then(&make().scramble) }
     }
 }
 
@@ -108,7 +121,20 @@ mod tests {
             let expected = Germs::from_bits(Scramble::new(9, index / 4).point(index % 4));
             assert_eq!(maker.germs(index), expected, "{index}");
         };
-        (0..40).for_each(check);
-        (0..40).rev().for_each(check);
+        let count = 4 * SCRAMBLES_KEPT as u64 + 10;
+        (0..count).for_each(check);
+        (0..count).rev().for_each(check);
+    }
+
+    #[test]
+    fn the_first_germs_are_those_of_the_realizations() {
+        for scheme in [GermScheme::Streams, GermScheme::Sobol { points: 4 }] {
+            let maker = GermMaker::new(GermSource { seed: 9, scheme });
+            for count in [0, 3, 4, 9] {
+                let firsts: Vec<f64> = maker.firsts(count).collect();
+                let expected = (0..count).map(|index| maker.germs(index).values()[0]);
+                assert!(expected.eq(firsts), "{scheme:?}, {count}");
+            }
+        }
     }
 }

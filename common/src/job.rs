@@ -1,6 +1,7 @@
 //! The specification of a job: everything that its result depends on.
 
 use crate::case::Setup;
+use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
 
 /// What a job does.
@@ -58,16 +59,19 @@ pub enum Sampling {
     /// Independent germs, one ChaCha stream per realization.
     #[default]
     MonteCarlo,
+    /// Scrambled Sobol' points.
+    Sobol,
 }
 
 impl Sampling {
     /// Every sampling, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::MonteCarlo];
+    pub const ALL: [Self; 2] = [Self::MonteCarlo, Self::Sobol];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "monte_carlo",
+            Self::Sobol => "sobol",
         }
     }
 }
@@ -81,6 +85,11 @@ pub struct MonteCarlo {
     pub seed: u64,
     /// How germs are drawn.
     pub sampling: Sampling,
+    /// Independent scrambles of the Sobol' points, among which the realizations are divided evenly:
+    /// 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for independent germs.
+    pub scrambles: u64,
+    /// Whether the moments are corrected by those of √(c1111/ρ), which the law knows.
+    pub control_variate: bool,
     /// An evaluation with a larger fraction of failures is infeasible; 0 to 1.
     pub max_failed_fraction: f64,
 }
@@ -91,8 +100,26 @@ impl Default for MonteCarlo {
             realizations: 2747,
             seed: 1,
             sampling: Sampling::MonteCarlo,
+            scrambles: 1,
+            control_variate: false,
             max_failed_fraction: 0.01,
         }
+    }
+}
+
+impl MonteCarlo {
+    /// Where the germs come from.
+    pub fn germs(&self) -> GermSource {
+        let scheme = match self.sampling {
+            Sampling::MonteCarlo => GermScheme::Streams,
+            Sampling::Sobol => GermScheme::Sobol { points: self.points() },
+        };
+        GermSource { seed: self.seed, scheme }
+    }
+
+    /// Realizations of each scramble.
+    pub fn points(&self) -> u64 {
+        self.realizations / self.scrambles.max(1)
     }
 }
 
@@ -122,16 +149,19 @@ pub enum SearchMethod {
     /// The Nelder-Mead simplex (the paper's).
     #[default]
     Simplex,
+    /// Minimum-norm Gauss-Newton steps with Broyden's updates.
+    Newton,
 }
 
 impl SearchMethod {
     /// Every method, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::Simplex];
+    pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simplex => "simplex",
+            Self::Newton => "newton",
         }
     }
 }
@@ -145,21 +175,32 @@ pub struct Search {
     pub max_evaluations: u64,
     /// The search ends when the best cost is at most this.
     pub cost_tolerance: f64,
-    /// The search ends when the simplex is at most this large, as a fraction of the box.
+    /// The search ends when the simplex, or a step without gain, is at most this large, as a
+    /// fraction of the box.
     pub size_tolerance: f64,
-    /// Edge of the first simplex, as a fraction of the box.
+    /// Edge of the first simplex, as a fraction of the box; of no use to other methods.
     pub initial_step: f64,
+}
+
+impl Search {
+    /// The settings that a method has by default.
+    pub fn by(method: SearchMethod) -> Self {
+        Self {
+            method,
+            max_evaluations: 400,
+            cost_tolerance: match method {
+                SearchMethod::Simplex => 1e-10,
+                SearchMethod::Newton => 1e-12,
+            },
+            size_tolerance: 1e-5,
+            initial_step: 0.15,
+        }
+    }
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Self {
-            method: SearchMethod::Simplex,
-            max_evaluations: 400,
-            cost_tolerance: 1e-10,
-            size_tolerance: 1e-5,
-            initial_step: 0.15,
-        }
+        Self::by(SearchMethod::default())
     }
 }
 

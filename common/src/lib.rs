@@ -8,6 +8,7 @@
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 
 mod accepted;
+pub mod bulk_velocity;
 pub mod case;
 pub mod case_file;
 pub mod check;

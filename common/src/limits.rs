@@ -6,6 +6,8 @@ pub const RECEIVERS_MIN: u32 = 3;
 pub const RECEIVERS_MAX: u32 = 64;
 /// Most realizations of one evaluation.
 pub const REALIZATIONS_MAX: u64 = 10_000_000;
+/// Most scrambles of one evaluation: enough for an error, and made in a blink.
+pub const SCRAMBLES_MAX: u64 = 1024;
 /// Largest seed: 2⁶³ - 1, so that every tool can hold it in a signed integer.
 pub const SEED_MAX: u64 = (1 << 63) - 1;
 /// Most evaluations of one search.

@@ -122,6 +122,11 @@ impl Reader {
         }
     }
 
+    /// Whether a key of `table` was taken for a misspelt `key`.
+    pub(crate) fn is_misspelt(&self, table: &Table<'_>, key: &str) -> bool {
+        self.suggested.contains(&table.path(key))
+    }
+
     /// Records that `key` of `table` is absent, though it is needed.
     pub(crate) fn missing(&mut self, table: &Table<'_>, key: &str, expected: impl fmt::Display) {
         let path = table.path(key);
@@ -161,6 +166,16 @@ impl Reader {
             self.violations.add(table.path(key), accepted.refusal(&value));
         }
         whole
+    }
+
+    /// Whether `key` is true.
+    pub(crate) fn truth(&mut self, table: &Table<'_>, key: &str) -> Option<bool> {
+        let node = table.get(key)?;
+        let Value::Boolean(truth) = node.value else {
+            self.wrong_type(table.path(key), "true or false", &node.value);
+            return None;
+        };
+        Some(truth)
     }
 
     /// The choice that the string `key` names.

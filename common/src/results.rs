@@ -1,5 +1,6 @@
 //! What a job leaves: the result and the history of its evaluations.
 
+use crate::job::Sampling;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::Point;
 use crate::settings::{Picking, SolverSettings};
@@ -49,6 +50,8 @@ pub struct Estimate {
     pub moments: Moments,
     /// Their standard errors: that of the mean in m/s, that of the coefficient of variation.
     pub standard_error: Moments,
+    /// Whether they are those that the control variate gives.
+    pub controlled: bool,
 }
 
 /// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
@@ -96,6 +99,12 @@ pub struct JobResult {
     pub realizations: u64,
     /// Seed of the germs.
     pub seed: u64,
+    /// How germs were drawn.
+    pub sampling: Sampling,
+    /// Scrambles among which the realizations were divided.
+    pub scrambles: u64,
+    /// Whether the control variate was asked for.
+    pub control_variate: bool,
     /// Solver settings that were used.
     pub solver: SolverSettings,
     /// Criterion that was used.

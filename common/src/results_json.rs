@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
+use crate::job::{Search, SearchMethod};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EstimatedError, JobResult, Moments};
@@ -31,8 +32,8 @@ pub enum ResultError {
     },
 }
 
-/// The object of an identification in this setup, with a final newline.
-pub fn identification(result: &JobResult, setup: &Setup) -> String {
+/// The object of an identification in this setup by this search, with a final newline.
+pub fn identification(result: &JobResult, setup: &Setup, by: &Search) -> String {
     let best = result.best.as_ref();
     let point = best.map(|best| best.point);
     let of_point = |parameter| json!(point.map(|point| point.get(parameter)));
@@ -54,6 +55,8 @@ pub fn identification(result: &JobResult, setup: &Setup) -> String {
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
+    sampling(&mut put, result);
+    put("search", search(by, best.and_then(|best| best.cost)));
     let picking = &result.picking;
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
@@ -67,6 +70,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("realizations", json!(result.realizations));
+    sampling(&mut put, result);
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", estimate(best.and_then(|best| best.velocity)));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
@@ -100,6 +104,32 @@ pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
     }
     put("estimated_error", estimated_error);
     Value::Object(object)
+}
+
+/// How a search went, and what its best point is, given the cost there.
+fn search(search: &Search, cost: Option<f64>) -> Value {
+    let mut object = Map::new();
+    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    put("method", json!(search.method.name()));
+    put("max_evaluations", json!(search.max_evaluations));
+    put("cost_tolerance", json!(search.cost_tolerance));
+    put("size_tolerance", json!(search.size_tolerance));
+    if search.method == SearchMethod::Simplex {
+        put("initial_step", json!(search.initial_step));
+    }
+    put("point", json!(cost.map(|cost| meaning(search, cost))));
+    Value::Object(object)
+}
+
+/// What the best point of a search is, by its cost.
+fn meaning(search: &Search, cost: f64) -> &'static str {
+    match search.method {
+        _ if cost > search.cost_tolerance => "of the points evaluated, the one with the least cost",
+        SearchMethod::Simplex => {
+            "of the points that match the data, the one where the simplex ended"
+        }
+        SearchMethod::Newton => "of the points that match the data, the one nearest to the start",
+    }
 }
 
 /// The best point in the text of an identification's `result.json`.
@@ -148,7 +178,15 @@ fn moments(moments: Option<Moments>) -> Value {
 fn estimate(estimate: Option<Estimate>) -> Value {
     let mut value = moments(estimate.map(|estimate| estimate.moments));
     value["standard_error"] = moments(estimate.map(|estimate| estimate.standard_error));
+    value["controlled"] = json!(estimate.map(|estimate| estimate.controlled));
     value
+}
+
+/// How the germs were drawn, and what was made of it.
+fn sampling(put: &mut impl FnMut(&str, Value) -> Option<Value>, result: &JobResult) {
+    put("sampling", json!(result.sampling.name()));
+    put("scrambles", json!(result.scrambles));
+    put("control_variate", json!(result.control_variate));
 }
 
 fn errors(errors: Option<EstimatedError>) -> Value {

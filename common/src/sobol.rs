@@ -88,14 +88,23 @@ impl Scramble {
     pub(crate) fn point(&self, index: u64) -> [u64; GERMS] {
         let mut point = [0; GERMS];
         for (dimension, &germ) in GERM_OF_DIMENSION.iter().enumerate() {
-            let mut coordinate = self.shift[dimension];
-            for (digit, column) in self.columns[dimension].iter().enumerate() {
-                // All ones if the digit is set.
-                coordinate ^= column & ((index >> digit) & 1).wrapping_neg();
-            }
-            point[germ] = coordinate;
+            point[germ] = self.coordinate(dimension, index);
         }
         point
+    }
+
+    /// The coordinate of germ 11 alone, the first in either order.
+    pub(crate) fn first(&self, index: u64) -> u64 {
+        self.coordinate(0, index)
+    }
+
+    fn coordinate(&self, dimension: usize, index: u64) -> u64 {
+        let mut coordinate = self.shift[dimension];
+        for (digit, column) in self.columns[dimension].iter().enumerate() {
+            // All ones if the digit is set.
+            coordinate ^= column & ((index >> digit) & 1).wrapping_neg();
+        }
+        coordinate
     }
 }
 

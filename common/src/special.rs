@@ -6,6 +6,8 @@
 
 mod gamma;
 mod normal;
+mod root_gamma;
 
 pub use gamma::GammaQuantile;
 pub use normal::standard_normal_quantile;
+pub(crate) use root_gamma::root_gamma_moments;

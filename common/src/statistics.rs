@@ -1,10 +1,22 @@
 //! Moments of a set of velocities, their standard errors, and the cost of a point.
 //!
-//! Every sum runs over the index order with Neumaier's compensation: its bits depend on the
-//! values in their order alone, and its rounding error does not grow with their number.
+//! Every sum runs over the index order with Neumaier's compensation, or adds neighbours in pairs:
+//! its bits depend on the values in their order alone, and its rounding error hardly grows with
+//! their number.
 
+mod blocks;
+mod central;
+mod controlled;
+mod sum;
+
+use crate::job::{MonteCarlo, Sampling};
 use crate::outcome::Outcome;
+use crate::parameters::Point;
 use crate::results::{Estimate, Moments};
+
+use self::blocks::Doubled;
+use self::central::{Central, central};
+use self::controlled::Controlled;
 
 /// Mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no velocity.
 ///
@@ -14,19 +26,30 @@ pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
 }
 
-/// Moments over the successes with their standard errors, or `None` if every realization failed.
+/// Moments over the successes of an evaluation at `point` with their standard errors, or `None` if
+/// every realization failed.
 ///
-/// With N successes, s² their variance with division by N - 1, m₂, m₃, m₄ their central moments
-/// and Δ = √m₂ / v: the standard error of the mean is s/√N, and that of Δ is by the delta method,
-/// without the assumption of a normal law,
+/// They are those of the velocities, or, where `monte_carlo` asks for the control variate and no
+/// realization failed, those that the regression on √(c1111/ρ) gives.
+///
+/// Standard errors of independent germs: with N successes, s² their variance with division by N - 1,
+/// m₂, m₃, m₄ their central moments and Δ = √m₂ / v, that of the mean is s/√N, and that of Δ is by
+/// the delta method, without the assumption of a normal law,
 ///
 /// Δ/√N · √((m₄/m₂² - 1)/4 - Δ m₃/m₂^(3/2) + Δ²).
 ///
+/// Of Sobol' points they come from the scatter of parts of the sample: of its scrambles, or, if there
+/// is only one, of its blocks of consecutive points.
+///
 /// It takes at least two different velocities to know an error: with one, both errors are NaN
 /// (unknown); with several equal ones, both are 0, and so is Δ.
-pub fn estimate(outcomes: &[Outcome]) -> Option<Estimate> {
-    let central = central(outcomes.iter().filter_map(|outcome| outcome.ok()))?;
-    Some(Estimate { moments: central.moments(), standard_error: central.standard_error() })
+pub fn estimate(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Option<Estimate> {
+    let sample = Sample::of(monte_carlo, point, outcomes)?;
+    Some(Estimate {
+        moments: sample.moments(),
+        standard_error: sample.standard_error(monte_carlo),
+        controlled: sample.controlled.is_some(),
+    })
 }
 
 /// The paper's cost: (v_exp - v_mod)²/v_exp² + (Δ_exp - Δ_mod)²/Δ_exp².
@@ -47,13 +70,12 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// The verdict on the outcomes of every index of an evaluation: feasible when at least one
-    /// realization succeeded and at most `max_failed_fraction` of all failed.
-    pub fn of(outcomes: &[Outcome], max_failed_fraction: f64) -> Self {
+    /// The verdict on the outcomes of every index of an evaluation at `point`: feasible when at
+    /// least one realization succeeded and at most `max_failed_fraction` of all failed.
+    pub fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Self {
         let failed = outcomes.iter().filter(|outcome| outcome.is_err()).count();
-        let moments = central(outcomes.iter().filter_map(|outcome| outcome.ok()))
-            .map(|central| central.moments());
-        let within = failed as f64 / outcomes.len() as f64 <= max_failed_fraction;
+        let moments = Sample::of(monte_carlo, point, outcomes).map(|sample| sample.moments());
+        let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
         Self { moments, feasible: moments.is_some() && within }
     }
 
@@ -69,85 +91,43 @@ impl Verdict {
     }
 }
 
-/// Mean and central moments of a set.
-struct Central {
-    count: f64,
-    mean: f64,
-    /// m₂, m₃, m₄ with m_p = (1/N) Σ (V_k - v)^p.
-    m2: f64,
-    m3: f64,
-    m4: f64,
+/// The outcomes of an evaluation, and what was made of them.
+struct Sample<'a> {
+    outcomes: &'a [Outcome],
+    central: Central,
+    controlled: Option<Controlled>,
 }
 
-impl Central {
+impl<'a> Sample<'a> {
+    fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &'a [Outcome]) -> Option<Self> {
+        let central = central(outcomes.iter().filter_map(|outcome| outcome.ok()))?;
+        let controlled = Controlled::of(monte_carlo, point, outcomes);
+        Some(Self { outcomes, central, controlled })
+    }
+
     fn moments(&self) -> Moments {
-        Moments { mean: self.mean, coefficient_of_variation: self.m2.sqrt() / self.mean }
+        self.controlled.as_ref().map_or(self.central.moments(), |controlled| controlled.moments)
     }
 
-    fn standard_error(&self) -> Moments {
-        let n = self.count;
-        if n < 2.0 {
-            return Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN };
+    fn standard_error(&self, monte_carlo: &MonteCarlo) -> Moments {
+        let successes = self.central.count;
+        match (monte_carlo.sampling, &self.controlled) {
+            (_, None) if !self.central.scatters() => self.central.standard_error(),
+            (Sampling::MonteCarlo, None) => self.central.standard_error(),
+            (Sampling::MonteCarlo, Some(controlled)) => controlled.standard_error(),
+            (Sampling::Sobol, None) => {
+                let influence = |outcome: &Outcome| match outcome {
+                    Ok(velocity) => self.central.influence(*velocity),
+                    Err(_) => [0.0; 2],
+                };
+                let influences = self.outcomes.iter().map(influence);
+                blocks::standard_error(influences, Doubled::PLAIN, monte_carlo, successes)
+            }
+            (Sampling::Sobol, Some(controlled)) => {
+                let influences = controlled.influences();
+                blocks::standard_error(influences, Doubled::CONTROLLED, monte_carlo, successes)
+            }
         }
-        if self.m2 == 0.0 {
-            return Moments { mean: 0.0, coefficient_of_variation: 0.0 };
-        }
-        let variation = self.m2.sqrt() / self.mean;
-        let skewness = self.m3 / (self.m2 * self.m2.sqrt());
-        let kurtosis = self.m4 / (self.m2 * self.m2);
-        // Of a quadratic form that is never negative; rounding can make it so.
-        let relative =
-            ((kurtosis - 1.0) / 4.0 - variation * skewness + variation * variation).max(0.0).sqrt();
-        Moments {
-            mean: (self.m2 / (n - 1.0)).sqrt(),
-            coefficient_of_variation: variation * relative / n.sqrt(),
-        }
-    }
-}
-
-fn central(velocities: impl Iterator<Item = f64> + Clone) -> Option<Central> {
-    let count = velocities.clone().count();
-    if count == 0 {
-        return None;
-    }
-    let count = count as f64;
-    let mut sum = Sum::default();
-    for velocity in velocities.clone() {
-        sum.add(velocity);
-    }
-    let mean = sum.total() / count;
-    let mut sums = [Sum::default(); 3];
-    for velocity in velocities {
-        let deviation = velocity - mean;
-        let square = deviation * deviation;
-        sums[0].add(square);
-        sums[1].add(square * deviation);
-        sums[2].add(square * square);
-    }
-    let [m2, m3, m4] = sums.map(|sum| sum.total() / count);
-    Some(Central { count, mean, m2, m3, m4 })
-}
-
-/// Neumaier's compensated sum.
-#[derive(Clone, Copy, Default)]
-struct Sum {
-    sum: f64,
-    lost: f64,
-}
-
-impl Sum {
-    fn add(&mut self, value: f64) {
-        let sum = self.sum + value;
-        self.lost += if self.sum.abs() >= value.abs() {
-            (self.sum - sum) + value
-        } else {
-            (value - sum) + self.sum
-        };
-        self.sum = sum;
-    }
-
-    fn total(self) -> f64 {
-        self.sum + self.lost
     }
 }
 
@@ -156,6 +136,17 @@ mod tests {
     use super::*;
     use crate::ensemble::Germs;
     use crate::outcome::FailureKind;
+
+    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+
+    fn plain(outcomes: &[Outcome]) -> Option<Estimate> {
+        estimate(&MonteCarlo::default(), &OPTIMUM, outcomes)
+    }
+
+    fn verdict(outcomes: &[Outcome], max_failed_fraction: f64) -> Verdict {
+        let monte_carlo = MonteCarlo { max_failed_fraction, ..MonteCarlo::default() };
+        Verdict::of(&monte_carlo, &OPTIMUM, outcomes)
+    }
 
     fn close(value: f64, expected: f64) {
         assert!((value - expected).abs() <= 1e-15 * expected.abs(), "{value}, expected {expected}");
@@ -187,34 +178,25 @@ mod tests {
     }
 
     #[test]
-    fn the_sum_does_not_lose_what_is_small() {
-        let mut sum = Sum::default();
-        for value in [1.0, 1e100, 1.0, -1e100] {
-            sum.add(value);
-        }
-        assert_eq!(sum.total(), 2.0);
-    }
-
-    #[test]
     fn failures_do_not_enter_an_estimate() {
         let with = [Ok(3.0), Err(FailureKind::NoArrival), Ok(5.0), Err(FailureKind::NotFinite)];
-        let estimate = estimate(&with).unwrap();
+        let estimate = plain(&with).unwrap();
         close(estimate.moments.mean, 4.0);
         close(estimate.moments.coefficient_of_variation, 0.25);
         // s = √2; of a symmetric two-point law m₄ = m₂² and m₃ = 0: Δ/√N · Δ.
         close(estimate.standard_error.mean, 1.0);
         close(estimate.standard_error.coefficient_of_variation, 0.25 * 0.25 / 2.0_f64.sqrt());
-        assert_eq!(super::estimate(&[Err(FailureKind::NoArrival)]), None);
-        assert_eq!(super::estimate(&[]), None);
+        assert_eq!(plain(&[Err(FailureKind::NoArrival)]), None);
+        assert_eq!(plain(&[]), None);
     }
 
     #[test]
     fn one_velocity_has_no_error_and_equal_ones_have_none() {
-        let one = estimate(&[Ok(3900.0)]).unwrap();
+        let one = plain(&[Ok(3900.0)]).unwrap();
         assert_eq!(one.moments, Moments { mean: 3900.0, coefficient_of_variation: 0.0 });
         assert!(one.standard_error.mean.is_nan());
         assert!(one.standard_error.coefficient_of_variation.is_nan());
-        let equal = estimate(&[Ok(3900.0); 5]).unwrap();
+        let equal = plain(&[Ok(3900.0); 5]).unwrap();
         let zero = Moments { mean: 0.0, coefficient_of_variation: 0.0 };
         assert_eq!(equal.standard_error, zero);
     }
@@ -233,7 +215,7 @@ mod tests {
                 .flat_map(|index| *Germs::draw(seed, index).values())
                 .map(|u| Ok(-libm::log(u)))
                 .collect();
-            let estimate = estimate(&outcomes).unwrap();
+            let estimate = plain(&outcomes).unwrap();
             moments[0].push(estimate.moments.mean);
             moments[1].push(estimate.moments.coefficient_of_variation);
             errors[0] += estimate.standard_error.mean / f64::from(samples);
@@ -264,7 +246,7 @@ mod tests {
                     if k < failed { Err(FailureKind::NoArrival) } else { Ok(3.0 + (k % 2) as f64) }
                 })
                 .collect();
-            let verdict = Verdict::of(&outcomes, fraction);
+            let verdict = verdict(&outcomes, fraction);
             assert_eq!(verdict.feasible, feasible, "{failed} of {total}, {fraction}");
             assert_eq!(verdict.cost(data).is_finite(), feasible);
             assert!(!verdict.cost(data).is_nan());
@@ -283,6 +265,6 @@ mod tests {
     #[test]
     fn a_cost_is_never_nan() {
         let data = Moments { mean: 4.0, coefficient_of_variation: 0.0 };
-        assert_eq!(Verdict::of(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
+        assert_eq!(verdict(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
     }
 }

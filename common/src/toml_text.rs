@@ -139,6 +139,8 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "realizations = {}", monte_carlo.realizations)?;
     writeln!(out, "seed = {}", monte_carlo.seed)?;
     writeln!(out, "sampling = \"{}\"", monte_carlo.sampling.name())?;
+    writeln!(out, "scrambles = {}", monte_carlo.scrambles)?;
+    writeln!(out, "control_variate = {}", monte_carlo.control_variate)?;
     writeln!(out, "max_failed_fraction = {:?}", monte_carlo.max_failed_fraction)?;
     writeln!(out, "\n[objective]")?;
     writeln!(out, "kind = \"{}\"", specification.objective.name())?;

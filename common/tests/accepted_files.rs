@@ -85,6 +85,8 @@ fn a_minimal_job_has_the_documented_defaults() {
             realizations: 2747,
             seed: 1,
             sampling: Sampling::MonteCarlo,
+            scrambles: 1,
+            control_variate: false,
             max_failed_fraction: 0.01,
         },
         objective: Objective::Moments,
@@ -98,6 +100,24 @@ fn a_minimal_job_has_the_documented_defaults() {
     };
     assert_eq!(given, expected);
     assert!(given.check().is_empty());
+}
+
+#[test]
+fn the_default_tolerance_is_that_of_the_method() {
+    let check = |text: &str, expected: Search| {
+        let given = job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification);
+        assert_eq!(given.search, expected);
+        assert!(job_file::to_toml(&given).contains(&format!(
+            "method = \"{}\"\nmax_evaluations = 400\ncost_tolerance = {:?}\n",
+            expected.method.name(),
+            expected.cost_tolerance
+        )));
+    };
+    let newton = Search { cost_tolerance: 1e-12, ..Search::by(SearchMethod::Newton) };
+    check("[search]\nmethod = \"newton\"\n", newton);
+    let loose = Search { cost_tolerance: 1e-6, ..newton };
+    check("[search]\nmethod = \"newton\"\ncost_tolerance = 1e-6\n", loose);
+    check("[search]\nmethod = \"simplex\"\n", Search::default());
 }
 
 #[test]
@@ -130,6 +150,9 @@ fn a_complete_job_means_what_it_says() {
     );
     assert_eq!(given.monte_carlo.realizations, 500);
     assert_eq!(given.monte_carlo.seed, 7);
+    assert_eq!(given.monte_carlo.sampling, Sampling::Sobol);
+    assert_eq!(given.monte_carlo.scrambles, 4);
+    assert!(given.monte_carlo.control_variate);
     assert_eq!(given.monte_carlo.max_failed_fraction, 0.02);
     assert_eq!(given.search.max_evaluations, 300);
     assert_eq!(given.search.cost_tolerance, 1e-9);
@@ -152,7 +175,17 @@ fn values_at_the_edges_are_accepted() {
     for (from, to) in [
         ("count = 12", "count = 3"),
         ("count = 12", "count = 64"),
-        ("realizations = 500", "realizations = 1"),
+        ("realizations = 500", "realizations = 4"),
+        ("scrambles = 4", "scrambles = 1"),
+        ("scrambles = 4", "scrambles = 500"),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1024\nsampling = \"sobol\"\nscrambles = 1024",
+        ),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1\nscrambles = 1",
+        ),
         ("realizations = 500", "realizations = 10000000"),
         ("realizations = 500", "realizations = 10_000"),
         ("seed = 7", "seed = 0"),

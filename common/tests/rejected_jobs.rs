@@ -13,6 +13,8 @@ use osteon_common::job_file;
 use support::pin;
 
 const JOB: &str = include_str!("files/job.toml");
+/// How `JOB` samples its 500 realizations.
+const SAMPLING: &str = "sampling = \"sobol\"\nscrambles = 4\ncontrol_variate = true";
 
 /// `JOB` with the one occurrence of `from` replaced by `to`; an empty `from` appends.
 fn edited(from: &str, to: &str) -> String {
@@ -136,11 +138,25 @@ fn run() {
             ("realizations = 500", "realizations = 10000001"),
             ("realizations = 500", "realizations = 1e3"),
             ("seed = 7", "seed = -1"),
-            ("sampling = \"monte_carlo\"", "sampling = \"sobol\"\nscrambles = 4"),
+            (SAMPLING, "sampling = \"halton\"\nscrambles = 4"),
+            (SAMPLING, "sampling = \"monte_carlo\"\nscrambles = 4"),
+            (SAMPLING, "scrambles = 2"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 3"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 0"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 1025"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 2.0"),
+            (SAMPLING, "control_variate = 1"),
+            (SAMPLING, "control_variate = \"yes\""),
+            (SAMPLING, "control_variates = true"),
             ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
             ("kind = \"moments\"", "kind = \"likelihood\""),
-            ("method = \"simplex\"", "method = \"newton\""),
             ("method = \"simplex\"", "method = \"annealing\""),
+            (
+                "realizations = 500\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
+                "realizations = 1\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"newton\"",
+            ),
             ("max_evaluations = 300", "max_evaluations = 0"),
             ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
             ("size_tolerance = 1e-4", "size_tolerance = 1"),
@@ -188,6 +204,7 @@ fn unknown_keys() {
             ("threshold = 0.06", "treshold = 0.06"),
             ("refinement = 1.5", "refinment = 1.5"),
             ("realizations = 500", "realisations = 500"),
+            ("sampling = \"sobol\"", "samplng = \"sobol\""),
             ("start = 0.1", "strat = 0.1"),
             ("[parameters.dispersion]", "[parameters.dispersoin]"),
             ("kind = \"moments\"", "\"sur prise\" = 1"),

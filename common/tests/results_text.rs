@@ -1,6 +1,7 @@
 //! The text of results: exact keys, columns and digits.
 
 use osteon_common::case::Setup;
+use osteon_common::job::{Sampling, Search, SearchMethod};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
@@ -30,6 +31,7 @@ fn result() -> JobResult {
             velocity: Some(Estimate {
                 moments: moments(3906.27, 0.027083),
                 standard_error: moments(2.0, 3.6e-4),
+                controlled: true,
             }),
             failures: FailureCounts::of(&outcomes()),
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
@@ -39,6 +41,9 @@ fn result() -> JobResult {
         evaluations: 123,
         realizations: 4,
         seed: 9_223_372_036_854_775_807,
+        sampling: Sampling::Sobol,
+        scrambles: 2,
+        control_variate: true,
         solver: SolverSettings::default(),
         picking: Picking::default(),
         version: "0.1.0".to_owned(),
@@ -53,6 +58,10 @@ fn failed() -> JobResult {
         best: None,
         ..result()
     }
+}
+
+fn identified(result: &JobResult) -> String {
+    results_json::identification(result, &Setup::default(), &Search::default())
 }
 
 fn check(name: &str, text: &str) {
@@ -72,11 +81,28 @@ fn check(name: &str, text: &str) {
 
 #[test]
 fn identification() {
-    check("result_identification", &results_json::identification(&result(), &Setup::default()));
-    check(
-        "result_identification_failed",
-        &results_json::identification(&failed(), &Setup::default()),
-    );
+    check("result_identification", &identified(&result()));
+    check("result_identification_failed", &identified(&failed()));
+}
+
+#[test]
+fn the_result_says_how_it_was_searched_and_what_its_point_is() {
+    let check = |method: SearchMethod, cost: f64, expected: &str| {
+        let mut result = result();
+        result.best.as_mut().unwrap().cost = Some(cost);
+        let search = Search { cost_tolerance: 1e-11, ..Search::by(method) };
+        let text = results_json::identification(&result, &Setup::default(), &search);
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["search"]["method"], method.name());
+        assert_eq!(value["search"]["cost_tolerance"], 1e-11);
+        assert_eq!(value["search"]["initial_step"].is_number(), method == SearchMethod::Simplex);
+        let point = value["search"]["point"].as_str().unwrap();
+        assert!(point.contains(expected), "{point}");
+    };
+    check(SearchMethod::Newton, 1e-11, "that match the data, the one nearest to the start");
+    check(SearchMethod::Newton, 2e-11, "the one with the least cost");
+    check(SearchMethod::Simplex, 1e-12, "that match the data, the one where the simplex ended");
+    check(SearchMethod::Simplex, 2e-11, "the one with the least cost");
 }
 
 #[test]
@@ -112,9 +138,9 @@ fn what_is_not_finite_is_null() {
     best.velocity = Some(Estimate {
         moments: moments(f64::NAN, f64::NEG_INFINITY),
         standard_error: moments(f64::NAN, f64::NAN),
+        controlled: false,
     });
-    let value: serde_json::Value =
-        serde_json::from_str(&results_json::identification(&result, &Setup::default())).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&identified(&result)).unwrap();
     assert!(value["cost"].is_null());
     assert!(value["velocity"]["mean"].is_null());
     assert!(value["velocity"]["coefficient_of_variation"].is_null());
@@ -127,9 +153,7 @@ fn the_best_point_is_read_back_to_the_bit() {
     let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
     for point in [POINT, odd] {
         result.best.as_mut().unwrap().point = point;
-        let read =
-            results_json::best_point(&results_json::identification(&result, &Setup::default()))
-                .unwrap();
+        let read = results_json::best_point(&identified(&result)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
     }
 }
@@ -143,15 +167,12 @@ fn a_result_without_a_point_gives_none() {
     check("", "not valid JSON: EOF");
     check("[]", "`parameters.density` is missing; it must be a number");
     check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
-    check(
-        &results_json::identification(&failed(), &Setup::default()),
-        "`parameters.density` is null;",
-    );
+    check(&identified(&failed()), "`parameters.density` is null;");
     check(
         &results_json::propagation(&result(), &Setup::default()),
         "`parameters.density` is missing;",
     );
-    let text = results_json::identification(&result(), &Setup::default());
+    let text = identified(&result());
     check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
 }
 

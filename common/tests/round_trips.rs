@@ -8,7 +8,9 @@ use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::document::Format;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::file_error::ContentError;
-use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Search};
+use osteon_common::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -118,24 +120,28 @@ fn data() -> impl Strategy<Value = Data> {
 }
 
 fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
-    (1_u64..=10_000_000, 0_u64..1 << 63, 0.0..1.0).prop_map(
-        |(realizations, seed, max_failed_fraction)| MonteCarlo {
-            realizations,
+    let scrambles = prop::option::of(1_u64..=1024);
+    (1_u64..=9765, scrambles, 0_u64..1 << 63, any::<bool>(), 0.0..1.0).prop_map(
+        |(points, scrambles, seed, control_variate, max_failed_fraction)| MonteCarlo {
+            realizations: points * scrambles.unwrap_or(1),
             seed,
+            sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
+            scrambles: scrambles.unwrap_or(1),
+            control_variate,
             max_failed_fraction,
-            ..MonteCarlo::default()
         },
     )
 }
 
 fn search() -> impl Strategy<Value = Search> {
-    (1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
-        |(max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+    let method = prop::sample::select(SearchMethod::ALL.to_vec());
+    (method, 1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
+        |(method, max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+            method,
             max_evaluations,
             cost_tolerance,
             size_tolerance,
             initial_step,
-            ..Search::default()
         },
     )
 }
@@ -170,7 +176,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
 /// A number of a specification, replaced by another.
 type Edit = fn(&mut JobSpecification, f64);
 
-const EDITS: [Edit; 14] = [
+const EDITS: [Edit; 16] = [
     |job, x| job.setup.layers.coupling.thickness = x,
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
@@ -185,6 +191,8 @@ const EDITS: [Edit; 14] = [
     |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
     |job, x| job.search.initial_step = x,
     |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
+    |job, x| job.monte_carlo.scrambles = x as u64,
+    |job, _| job.monte_carlo.sampling = Sampling::MonteCarlo,
 ];
 
 /// Brackets of a text that the test itself may read as TOML.

@@ -1,14 +1,15 @@
-//! Jobs, simplex, dispatch, reduction and the public gRPC API of osteon.
+//! Jobs, searches, dispatch, reduction and the public gRPC API of osteon.
 //!
 //! The coordinator is a state ([`state`]), reactions to events ([`event`], [`reactor`]) that are
 //! synchronous and know no clock, and effects ([`effect`]). Around it lies one asynchronous
-//! shell that only moves bytes. [`simplex`] and [`search`] decide the path of a job and know no
-//! worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
+//! shell that only moves bytes. [`search`], [`simplex`] and [`newton`] decide the path of a job and
+//! know no worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
 //! a worker solves.
 
 mod accept;
 pub mod access;
 mod access_layer;
+pub mod ask;
 pub mod audit;
 pub mod config;
 mod core_task;
@@ -25,6 +26,7 @@ pub mod leftover;
 pub mod listen;
 mod losses;
 mod message_body;
+pub mod newton;
 mod observers;
 pub mod open_files;
 mod places;
@@ -32,6 +34,7 @@ mod rate;
 pub mod reactor;
 pub mod sanity;
 pub mod search;
+pub mod search_box;
 mod service_jobs;
 mod service_workers;
 mod shell;

@@ -1,22 +1,26 @@
 //! A job as an ask/tell state machine: which point next, and what its outcomes mean.
 //!
-//! An identification asks the simplex, a propagation evaluates one point. Everything here is a
-//! function of the specification and of the outcomes told: telling the stored evaluations again
-//! rebuilds the same state, to the bit.
+//! An identification asks its method of search, a propagation evaluates one point. Everything here
+//! is a function of the specification and of the outcomes told: telling the stored evaluations
+//! again rebuilds the same state, to the bit.
 
 use std::sync::Arc;
 
 use osteon_common::digest::PathDigest;
-use osteon_common::ensemble::DISPERSION_MAX;
-use osteon_common::job::{Data, JobKind, JobSpecification, Range};
+use osteon_common::job::{Data, JobKind, JobSpecification, SearchMethod};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{BestPoint, EstimatedError, Evaluation, JobResult, Moments, Status};
 use osteon_common::statistics::{self, Verdict};
 use thiserror::Error;
 
-use crate::simplex::{Ask, RESTARTS_MAX, Settings, Simplex, Stop};
+use crate::ask::{Ask, Stop};
+use crate::search_box::{SearchBox, Side, admissible};
+use crate::simplex::RESTARTS_MAX;
 
+use self::method::Method;
+
+mod method;
 #[cfg(test)]
 mod tests;
 
@@ -73,7 +77,7 @@ struct Best {
 
 #[derive(Debug, Clone)]
 enum Plan {
-    Identification { simplex: Simplex, data: Moments },
+    Identification { method: Method, data: Moments },
     Propagation { told: Option<Verdict> },
 }
 
@@ -81,6 +85,7 @@ enum Plan {
 #[derive(Debug, Clone)]
 pub struct Search {
     specification: Arc<JobSpecification>,
+    space: SearchBox,
     plan: Plan,
     digest: PathDigest,
     history: Vec<Evaluation>,
@@ -90,16 +95,21 @@ pub struct Search {
 impl Search {
     /// A search of which nothing is known. The specification has passed its check.
     pub fn new(specification: Arc<JobSpecification>) -> Self {
+        let space = SearchBox::new(specification.parameters);
         let plan = match (specification.kind, &specification.data) {
-            (JobKind::Identification, Some(data)) => Plan::Identification {
-                simplex: Simplex::new(&start(&specification), settings(&specification)),
-                data: data_moments(data),
-            },
+            (JobKind::Identification, Some(data)) => {
+                let data = data_moments(data);
+                Plan::Identification {
+                    method: Method::new(&specification.search, space, data),
+                    data,
+                }
+            }
             // An identification without data has not passed the check.
             (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
         };
         let mut search = Self {
             specification,
+            space,
             plan,
             digest: PathDigest::new(),
             history: Vec::new(),
@@ -147,8 +157,8 @@ impl Search {
     /// The next point, or how the job ends. Asking changes nothing.
     pub fn ask(&self) -> Step {
         match &self.plan {
-            Plan::Identification { simplex, .. } => match simplex.ask() {
-                Ask::Cost(at) => Step::Evaluate(point(&self.specification, at)),
+            Plan::Identification { method, .. } => match method.ask() {
+                Ask::At(at) => Step::Evaluate(self.space.point(at)),
                 Ask::Stopped(stop) => Step::Done(self.ending(stop)),
             },
             Plan::Propagation { told: None } => Step::Evaluate(self.specification.start()),
@@ -162,11 +172,11 @@ impl Search {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
-        let verdict = Verdict::of(&outcomes, self.specification.monte_carlo.max_failed_fraction);
+        let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
         let cost = match &mut self.plan {
-            Plan::Identification { simplex, data } => {
+            Plan::Identification { method, data } => {
                 let cost = verdict.cost(*data);
-                simplex.tell(cost);
+                method.tell(cost, verdict.moments);
                 Some(cost)
             }
             Plan::Propagation { told } => {
@@ -222,21 +232,22 @@ impl Search {
         self.summary().result(&self.specification, ending, version, outcomes)
     }
 
-    /// Refuses points until the simplex is done or asks for an admissible one.
+    /// Refuses points until the method is done or asks for an admissible one.
     fn refuse_inadmissible(&mut self) {
-        if let Plan::Identification { simplex, .. } = &mut self.plan {
-            while let Ask::Cost(at) = simplex.ask() {
-                if admissible(&point(&self.specification, at)) {
+        if let Plan::Identification { method, .. } = &mut self.plan {
+            while let Ask::At(at) = method.ask() {
+                if admissible(&self.space.point(at)) {
                     break;
                 }
-                simplex.refuse();
+                method.refuse();
             }
         }
     }
 
     fn ending(&self, stop: Stop) -> Ending {
         let (status, reason) = match stop {
-            Stop::CostReached | Stop::Settled => (Status::Converged, None),
+            Stop::CostReached => (Status::Converged, None),
+            Stop::Settled => (Status::Converged, self.out_of_reach()),
             Stop::EvaluationsUsedUp if self.best().is_none() => {
                 (Status::Failed, Some(self.no_feasible_point()))
             }
@@ -261,7 +272,39 @@ impl Search {
         Ending { status: Status::Failed, reason: Some(reason) }
     }
 
+    /// Why a search that settled has no lower cost, where its method knows.
+    fn out_of_reach(&self) -> Option<String> {
+        let best =
+            self.best().filter(|_| self.specification.search.method == SearchMethod::Newton)?;
+        let on_bounds = self.space.on_bounds(&best.point);
+        let on_bounds: Vec<String> = on_bounds
+            .iter()
+            .map(|(parameter, side)| match side {
+                Side::Lower => format!("{} on its lower bound", parameter.name()),
+                Side::Upper => format!("{} on its upper bound", parameter.name()),
+            })
+            .collect();
+        let (where_it_is, cure) = if on_bounds.is_empty() {
+            (String::new(), "free more parameters")
+        } else {
+            (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
+        };
+        Some(format!(
+            "settled at a cost of {:.3e}, above cost_tolerance {:?}: no point near the best one{} \
+             matches the data better; {}",
+            best.cost.unwrap_or(f64::NAN),
+            self.specification.search.cost_tolerance,
+            where_it_is,
+            cure
+        ))
+    }
+
     fn no_feasible_point(&self) -> String {
+        if self.best().is_some() {
+            return "every velocity of the points evaluated is the same: their coefficient of \
+                    variation has no logarithm; raise [monte_carlo] realizations"
+                .to_owned();
+        }
         match self.history.first() {
             None => "no feasible point: every point tried is inadmissible; \
                      change the starts or the bounds of [parameters]"
@@ -312,7 +355,7 @@ impl Summary {
             best: row.zip(outcomes).map(|(row, outcomes)| BestPoint {
                 point: row.point,
                 cost: row.cost,
-                velocity: statistics::estimate(outcomes),
+                velocity: statistics::estimate(&specification.monte_carlo, &row.point, outcomes),
                 failures: row.failures,
                 estimated_error: row.estimated_error,
                 outcomes: outcomes.to_vec(),
@@ -324,21 +367,14 @@ impl Summary {
             evaluations: self.history.len() as u64,
             realizations: specification.monte_carlo.realizations,
             seed: specification.monte_carlo.seed,
+            sampling: specification.monte_carlo.sampling,
+            scrambles: specification.monte_carlo.scrambles,
+            control_variate: specification.monte_carlo.control_variate,
             solver: specification.setup.solver,
             picking: specification.setup.picking,
             version: version.to_owned(),
         }
     }
-}
-
-/// Whether realizations can be drawn at `point`.
-fn admissible(point: &Point) -> bool {
-    let dispersion = point.dispersion();
-    point.density() > 0.0
-        && point.density().is_finite()
-        && dispersion > 0.0
-        && dispersion < DISPERSION_MAX
-        && point.constants().elasticity().is_ok()
 }
 
 fn data_moments(data: &Data) -> Moments {
@@ -349,43 +385,4 @@ fn data_moments(data: &Data) -> Moments {
             Moments { mean: *mean, coefficient_of_variation: *coefficient_of_variation }
         }
     }
-}
-
-fn settings(specification: &JobSpecification) -> Settings {
-    let search = &specification.search;
-    Settings {
-        max_evaluations: search.max_evaluations,
-        cost_tolerance: search.cost_tolerance,
-        size_tolerance: search.size_tolerance,
-        initial_step: search.initial_step,
-    }
-}
-
-/// Coordinates of the start in the box of the free parameters.
-fn start(specification: &JobSpecification) -> Vec<f64> {
-    specification.parameters.iter().filter_map(unit_start).collect()
-}
-
-fn unit_start(range: &Range) -> Option<f64> {
-    match *range {
-        Range::Fixed(_) => None,
-        Range::Free { start, lower, upper } => {
-            Some(((start - lower) / (upper - lower)).clamp(0.0, 1.0))
-        }
-    }
-}
-
-/// The point with these coordinates in the box. A coordinate that never moved keeps the bits of
-/// its start.
-fn point(specification: &JobSpecification, at: &[f64]) -> Point {
-    let mut at = at.iter();
-    Point(specification.parameters.map(|range| match range {
-        Range::Fixed(value) => value,
-        Range::Free { start, lower, upper } => match at.next() {
-            Some(u) if Some(*u) != unit_start(&range) => {
-                (lower + u * (upper - lower)).clamp(lower, upper)
-            }
-            _ => start,
-        },
-    }))
 }

@@ -20,6 +20,8 @@
 //! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
 //! - No vertex of the first simplex is feasible: [`Stop::Infeasible`].
 
+use crate::ask::{Ask, Stop};
+
 #[cfg(test)]
 mod tests;
 
@@ -42,30 +44,6 @@ pub struct Settings {
     pub size_tolerance: f64,
     /// Edge of a fresh simplex.
     pub initial_step: f64,
-}
-
-/// Why a search is over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
-    /// The best cost is at most the tolerance.
-    CostReached,
-    /// The simplex collapsed and a fresh one found nothing better; also: nothing is free.
-    Settled,
-    /// As many points were evaluated as allowed.
-    EvaluationsUsedUp,
-    /// Every restart found something better, and there were as many as allowed.
-    RestartsUsedUp,
-    /// No vertex of the first simplex has a finite cost.
-    Infeasible,
-}
-
-/// What the search wants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ask<'a> {
-    /// The cost of this point, coordinates in `[0, 1]`.
-    Cost(&'a [f64]),
-    /// Nothing more.
-    Stopped(Stop),
 }
 
 /// A point with its cost.
@@ -136,7 +114,7 @@ impl Simplex {
     pub fn ask(&self) -> Ask<'_> {
         match self.stop {
             Some(stop) => Ask::Stopped(stop),
-            None => Ask::Cost(&self.pending),
+            None => Ask::At(&self.pending),
         }
     }
 

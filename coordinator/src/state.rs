@@ -313,8 +313,7 @@ impl State {
         Some(Work {
             setup: specification.setup,
             point: evaluation.point,
-            seed: specification.monte_carlo.seed,
-            sampling: specification.monte_carlo.sampling,
+            germs: specification.monte_carlo.germs(),
             first: assignment.indices.first,
             count: u32::try_from(assignment.indices.count).ok()?,
         })

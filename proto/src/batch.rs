@@ -2,6 +2,7 @@
 
 use osteon_common::case::Setup;
 use osteon_common::check;
+use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::job::Sampling;
 use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX, SEED_MAX};
 use osteon_common::outcome::{self, Solved};
@@ -20,10 +21,8 @@ pub struct Work {
     pub setup: Setup,
     /// The point (a, δ).
     pub point: Point,
-    /// Seed of the germs.
-    pub seed: u64,
-    /// How germs are drawn.
-    pub sampling: Sampling,
+    /// Where the germs come from.
+    pub germs: GermSource,
     /// Index of the first realization.
     pub first: u64,
     /// How many, 1 to [`BATCH_REALIZATIONS_MAX`].
@@ -33,6 +32,10 @@ pub struct Work {
 /// The message of batch number `batch`.
 pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
     let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&work.setup);
+    let (sampling, points) = match work.germs.scheme {
+        GermScheme::Streams => (Sampling::MonteCarlo, 0),
+        GermScheme::Sobol { points } => (Sampling::Sobol, points),
+    };
     v1::Batch {
         batch,
         layers: Some(layers),
@@ -40,10 +43,11 @@ pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
         picking: Some(picking),
         solver: Some(solver),
         point: work.point.0.to_vec(),
-        seed: work.seed,
-        sampling: work.sampling.name().to_owned(),
+        seed: work.germs.seed,
+        sampling: sampling.name().to_owned(),
         first: work.first,
         count: work.count,
+        points_per_scramble: points,
     }
 }
 
@@ -75,8 +79,22 @@ pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
         &mut violations,
     );
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
-    let (point, seed) = (point(&message.point)?, message.seed);
-    Ok(Work { setup, point, seed, sampling, first: message.first, count: message.count })
+    let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
+    let point = point(&message.point)?;
+    Ok(Work { setup, point, germs, first: message.first, count: message.count })
+}
+
+/// How the germs are made of the seed.
+fn scheme(message: &v1::Batch, sampling: Sampling) -> Result<GermScheme, Malformed> {
+    let points = message.points_per_scramble;
+    let allowed = match (sampling, points) {
+        (Sampling::MonteCarlo, 0) => return Ok(GermScheme::Streams),
+        (Sampling::MonteCarlo, _) => "it must be 0 without scrambles",
+        (Sampling::Sobol, 1..=REALIZATIONS_MAX) => return Ok(GermScheme::Sobol { points }),
+        (Sampling::Sobol, _) => "it must be 1 to 10^7",
+    };
+    let field = "points_per_scramble";
+    Err(Malformed::OutOfRange { field, value: points as f64, allowed })
 }
 
 /// The answer to batch number `batch`: its realizations in index order, and the wall time, s,
@@ -158,8 +176,7 @@ mod tests {
     const WORK: fn(f64, u64, u64, u32) -> Work = |density, seed, first, count| Work {
         setup: Setup::default(),
         point: Point([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
-        seed,
-        sampling: Sampling::MonteCarlo,
+        germs: GermSource::streams(seed),
         first,
         count,
     };
@@ -172,8 +189,12 @@ mod tests {
             seed in 0..=SEED_MAX,
             first in 0..REALIZATIONS_MAX - u64::from(BATCH_REALIZATIONS_MAX),
             count in 1..=BATCH_REALIZATIONS_MAX,
+            points in proptest::option::of(1..=REALIZATIONS_MAX),
         ) {
-            let work = WORK(density, seed, first, count);
+            let mut work = WORK(density, seed, first, count);
+            if let Some(points) = points {
+                work.germs.scheme = GermScheme::Sobol { points };
+            }
             let message = to_message(number, &work);
             prop_assert_eq!(message.batch, number);
             prop_assert_eq!(from_message(&message), Ok(work));
@@ -251,6 +272,15 @@ mod tests {
         assert_eq!(field(refused(|batch| batch.first = REALIZATIONS_MAX - 9)), "first");
         assert_eq!(field(refused(|batch| batch.first = u64::MAX)), "first");
         assert_eq!(field(refused(|batch| batch.seed = SEED_MAX + 1)), "seed");
+        let points = |sampling: &str, points| {
+            field(refused(|batch| {
+                batch.sampling = sampling.to_owned();
+                batch.points_per_scramble = points;
+            }))
+        };
+        assert_eq!(points("monte_carlo", 1), "points_per_scramble");
+        assert_eq!(points("sobol", 0), "points_per_scramble");
+        assert_eq!(points("sobol", REALIZATIONS_MAX + 1), "points_per_scramble");
         assert_eq!(field(refused(|batch| batch.point.clear())), "point");
         assert_eq!(field(refused(|batch| batch.point[6] = f64::NAN)), "point");
     }

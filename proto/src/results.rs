@@ -1,7 +1,7 @@
 //! Results and the history of a job as messages.
 
-use osteon_common::job::JobKind;
-use osteon_common::limits::REALIZATIONS_MAX;
+use osteon_common::job::{JobKind, MonteCarlo, Sampling};
+use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::results::{
     BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
@@ -34,6 +34,9 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         solver: Some(setup::solver_to_message(&result.solver)),
         picking: Some(setup::picking_to_message(&result.picking)),
         version: result.version.clone(),
+        sampling: result.sampling.name().to_owned(),
+        scrambles: result.scrambles,
+        control_variate: result.control_variate,
     }
 }
 
@@ -50,6 +53,7 @@ pub fn from_message(
         None => None,
     };
     let (solver, picking) = settings_from_message(message)?;
+    let (sampling, scrambles) = sampling_from_message(message)?;
     Ok(JobResult {
         status: status_from_message(message.status)?
             .ok_or(Malformed::Missing { field: "status" })?,
@@ -60,6 +64,9 @@ pub fn from_message(
         evaluations: message.evaluations,
         realizations: message.realizations,
         seed: message.seed,
+        sampling,
+        scrambles,
+        control_variate: message.control_variate,
         solver,
         picking,
         version: message.version.clone(),
@@ -157,6 +164,26 @@ fn settings_from_message(message: &v1::JobResult) -> Result<(SolverSettings, Pic
     violations.into_result((solver, picking)).map_err(Malformed::InvalidSetup)
 }
 
+/// Sampling and scrambles; an older version, which had no choice, says nothing of them.
+fn sampling_from_message(message: &v1::JobResult) -> Result<(Sampling, u64), Malformed> {
+    let default = MonteCarlo::default();
+    let sampling = match message.sampling.as_str() {
+        "" => default.sampling,
+        name => {
+            let named = Sampling::ALL.into_iter().find(|sampling| sampling.name() == name);
+            named.ok_or(Malformed::UnknownName { field: "sampling" })?
+        }
+    };
+    match message.scrambles {
+        0 => Ok((sampling, default.scrambles)),
+        scrambles @ 1..=SCRAMBLES_MAX => Ok((sampling, scrambles)),
+        scrambles => {
+            let (value, allowed) = (scrambles as f64, "it must be at most 1024");
+            Err(Malformed::OutOfRange { field: "scrambles", value, allowed })
+        }
+    }
+}
+
 fn moments_to_message(moments: &Moments) -> v1::Moments {
     v1::Moments { mean: moments.mean, coefficient_of_variation: moments.coefficient_of_variation }
 }
@@ -169,6 +196,7 @@ fn estimate_to_message(estimate: &Estimate) -> v1::Estimate {
     v1::Estimate {
         moments: Some(moments_to_message(&estimate.moments)),
         standard_error: Some(moments_to_message(&estimate.standard_error)),
+        controlled: estimate.controlled,
     }
 }
 
@@ -179,6 +207,7 @@ fn estimate_from_message(message: &v1::Estimate) -> Result<Estimate, Malformed> 
     Ok(Estimate {
         moments: moments_from_message(moments),
         standard_error: moments_from_message(standard_error),
+        controlled: message.controlled,
     })
 }
 
@@ -262,12 +291,15 @@ mod tests {
         fn best()(
             point in point(),
             cost in cost(),
-            velocity in proptest::option::of((moments(), moments())),
+            velocity in proptest::option::of((moments(), moments(), any::<bool>())),
             failures in failures(),
             estimated_error in estimated_error(),
         ) -> BestPoint {
-            let velocity =
-                velocity.map(|(moments, standard_error)| Estimate { moments, standard_error });
+            let velocity = velocity.map(|(moments, standard_error, controlled)| Estimate {
+                moments,
+                standard_error,
+                controlled,
+            });
             let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
             BestPoint { point, cost, velocity, failures, estimated_error, outcomes }
         }
@@ -282,6 +314,9 @@ mod tests {
             evaluations: u64,
             realizations: u64,
             seed: u64,
+            sampling in 0..Sampling::ALL.len(),
+            scrambles in 1..=SCRAMBLES_MAX,
+            control_variate: bool,
         ) -> JobResult {
             JobResult {
                 status: Status::ALL[status],
@@ -292,6 +327,9 @@ mod tests {
                 evaluations,
                 realizations,
                 seed,
+                sampling: Sampling::ALL[sampling],
+                scrambles,
+                control_variate,
                 solver: SolverSettings::default(),
                 picking: Picking::default(),
                 version: "0.1.0".to_owned(),
@@ -339,6 +377,14 @@ mod tests {
             let errors = v1::EstimatedError { median, largest: 1.0 };
             assert!(errors_from_message(errors).is_err(), "{median}");
         }
+        let sampling = |name: &str, scrambles| {
+            let sampling = name.to_owned();
+            sampling_from_message(&v1::JobResult { sampling, scrambles, ..Default::default() })
+        };
+        assert_eq!(sampling("", 0), Ok((Sampling::MonteCarlo, 1)));
+        assert_eq!(sampling("sobol", SCRAMBLES_MAX), Ok((Sampling::Sobol, SCRAMBLES_MAX)));
+        assert_eq!(sampling("dice", 1), Err(Malformed::UnknownName { field: "sampling" }));
+        assert!(sampling("sobol", SCRAMBLES_MAX + 1).is_err());
         let unknown = [v1::FailureCount { code: 6, count: 1 }];
         assert!(failures_from_message(&unknown).is_err());
         let many = |count| failures_from_message(&[v1::FailureCount { code: 1, count }]);

@@ -182,6 +182,8 @@ fn monte_carlo_to_message(monte_carlo: &MonteCarlo) -> v1::MonteCarlo {
         seed: Some(monte_carlo.seed),
         sampling: Some(monte_carlo.sampling.name().to_owned()),
         max_failed_fraction: Some(monte_carlo.max_failed_fraction),
+        scrambles: Some(monte_carlo.scrambles),
+        control_variate: Some(monte_carlo.control_variate),
     }
 }
 
@@ -200,6 +202,8 @@ fn monte_carlo_from_message(
             "monte_carlo.sampling",
             violations,
         ),
+        scrambles: message.scrambles.unwrap_or(default.scrambles),
+        control_variate: message.control_variate.unwrap_or(default.control_variate),
         max_failed_fraction: message.max_failed_fraction.unwrap_or(default.max_failed_fraction),
     }
 }
@@ -215,15 +219,16 @@ fn search_to_message(search: &Search) -> v1::Search {
 }
 
 fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations) -> Search {
-    let default = Search::default();
-    let Some(message) = message else { return default };
+    let Some(message) = message else { return Search::default() };
+    let method = setup::named(
+        message.method.as_deref(),
+        &SearchMethod::ALL.map(|method| (method.name(), method)),
+        "search.method",
+        violations,
+    );
+    let default = Search::by(method);
     Search {
-        method: setup::named(
-            message.method.as_deref(),
-            &SearchMethod::ALL.map(|method| (method.name(), method)),
-            "search.method",
-            violations,
-        ),
+        method,
         max_evaluations: message.max_evaluations.unwrap_or(default.max_evaluations),
         cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),

@@ -61,8 +61,7 @@ fn batches() -> Vec<Vec<u8>> {
     let work = |job: &JobSpecification| Work {
         setup: job.setup,
         point: job.start(),
-        seed: job.monte_carlo.seed,
-        sampling: job.monte_carlo.sampling,
+        germs: job.monte_carlo.germs(),
         first: 17,
         count: 5,
     };
@@ -133,7 +132,7 @@ fn result() -> v1::JobResult {
         best: Some(v1::BestPoint {
             point: row.point,
             cost: Some(1e-11),
-            velocity: Some(v1::Estimate { moments, standard_error }),
+            velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
             failures: row.failures,
             estimated_error: row.estimated_error,
         }),
@@ -144,6 +143,8 @@ fn result() -> v1::JobResult {
         solver: job.solver,
         picking: job.picking,
         version: "0.1.0".to_owned(),
+        sampling: "sobol".to_owned(),
+        scrambles: 2,
         ..v1::JobResult::default()
     }
 }
@@ -179,10 +180,9 @@ fn check_result(message: &v1::JobResult) {
     let again = results::from_message(&written, outcomes()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    let setup = jobs()[0].setup;
-    for text in
-        [results_json::identification(&result, &setup), results_json::propagation(&result, &setup)]
-    {
+    let JobSpecification { setup, search, .. } = jobs()[0].clone();
+    let identification = results_json::identification(&result, &setup, &search);
+    for text in [identification, results_json::propagation(&result, &setup)] {
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
 }

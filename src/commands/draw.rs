@@ -35,7 +35,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
         None => specification.start(),
     };
     let ensemble =
-        Ensemble::new(&point, specification.monte_carlo.seed).map_err(Failure::bad_input)?;
+        Ensemble::drawn(&point, specification.monte_carlo.germs()).map_err(Failure::bad_input)?;
     let bone = ensemble.bone(index).map_err(|error| {
         Failure::failed(anyhow::Error::new(error).context(format!(
             "realization {index} is no elasticity in floating point (failure not_finite)"

@@ -1,14 +1,15 @@
-//! `study`: tables of how the solvers do over many draws.
+//! `study`: tables of how the solvers and the searches do over many draws.
 
 use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
+use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, setups,
+    refinement, searches, setups, variance,
 };
 
-use crate::arguments::{DrawsArguments, Study};
+use crate::arguments::{DrawsArguments, RepetitionsArguments, Study};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::progress::say;
@@ -34,6 +35,8 @@ const REFINEMENT: OverDraws = OverDraws {
     realizations: refinement::REALIZATIONS,
     table: refinement::table,
 };
+const SEARCHES: OverDraws =
+    OverDraws { name: "searches", realizations: searches::REALIZATIONS, table: searches::table };
 const SETUPS: OverDraws =
     OverDraws { name: "setups", realizations: setups::REALIZATIONS, table: setups::table };
 const DIGEST: OverDraws =
@@ -54,7 +57,9 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
         Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
+        Study::Searches(arguments) => over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
+        Study::Variance(arguments) => over_seeds(arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     });
     let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
@@ -72,6 +77,12 @@ fn over_draws(
     let table = (study.table)(&draws, &say)?;
     let (name, seed) = (study.name, arguments.seed);
     Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
+}
+
+fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, PointError> {
+    let RepetitionsArguments { seeds, seed: first } = arguments;
+    let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
+    Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
 }
 
 /// A table under what makes it again.

@@ -1,4 +1,5 @@
 use osteon_common::document::Format as FileFormat;
+use osteon_common::job::{Search, SearchMethod};
 use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::Method;
@@ -89,6 +90,27 @@ fn two_searched_parameters_are_determined() {
     insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT));
 }
 
+/// `newton` alone says what the other values are, and only where it has matched the data.
+#[test]
+fn a_search_for_the_nearest_point_says_so() {
+    let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
+    let mut specification = specification(JobKind::Identification, &free);
+    specification.search = Search { cost_tolerance: 1e-10, ..Search::by(SearchMethod::Newton) };
+    let shown = |json: &str| {
+        let kind = JobKind::Identification;
+        let result = ShownResult { kind, specification: &specification, json, directory: None };
+        printed(Format::Text, |output| output.result(&result).unwrap())
+    };
+    let nearest = "of the points that match the data, this is the one nearest to the start";
+    assert!(shown(RESULT).contains(nearest), "{}", shown(RESULT));
+    let settled = RESULT
+        .replace("3.21e-11", "3.21e-3")
+        .replace("\"status\": \"converged\"", "\"status\": \"converged\", \"reason\": \"settled\"");
+    let text = shown(&settled);
+    assert!(text.starts_with("Converged: settled\n"), "{text}");
+    assert!(!text.contains(nearest) && text.contains("one of many sets"), "{text}");
+}
+
 #[test]
 fn a_failed_search_says_why() {
     let failed = r#"{"status": "failed", "reason": "no point was feasible", "digest": "00",
@@ -128,6 +150,29 @@ fn a_failed_propagation_says_why_whenever_it_is_shown() {
     let text = shown(JobKind::Propagation, &[], &failed);
     let expected = "Failed: 1201 of 2747 realizations failed; max_failed_fraction is 0.01\n";
     assert!(text.starts_with(expected), "{text}");
+}
+
+#[test]
+fn a_control_variate_that_was_not_used_is_told() {
+    let check = |asked: &str, used: &str, told: bool| {
+        let json = RESULT
+            .replace("\"seed\"", "\"_\"")
+            .replace(
+                "\"evaluations\"",
+                &format!("\"control_variate\": {asked},\n  \"evaluations\""),
+            )
+            .replace(
+                "\"mean\": 3905.9104",
+                &format!("\"controlled\": {used}, \"mean\": 3905.9104"),
+            );
+        for kind in [JobKind::Identification, JobKind::Propagation] {
+            let text = shown(kind, &["dispersion"], &json);
+            assert_eq!(text.contains("moments without the control variate"), told, "{text}");
+        }
+    };
+    check("true", "false", true);
+    check("true", "true", false);
+    check("false", "false", false);
 }
 
 #[test]

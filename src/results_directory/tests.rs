@@ -1,4 +1,4 @@
-use osteon_common::document::Format;
+use osteon_common::job::Sampling;
 use osteon_common::results::JobResult;
 use osteon_common::settings::{Picking, SolverSettings};
 
@@ -31,6 +31,9 @@ fn fetched(status: Status) -> Fetched {
         evaluations: 0,
         realizations: 2747,
         seed: 1,
+        sampling: Sampling::MonteCarlo,
+        scrambles: 1,
+        control_variate: false,
         solver: SolverSettings::default(),
         picking: Picking::default(),
         version: "0".to_owned(),
@@ -58,6 +61,26 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         directory.forget_request();
         assert_ne!(directory.request().unwrap(), request, "{status:?}");
     }
+}
+
+/// Older versions wrote jobs with fewer keys.
+#[test]
+fn a_directory_of_an_older_version_belongs_to_the_same_job() {
+    let scratch = tempfile::tempdir().unwrap();
+    let directory = ResultsDirectory::open(scratch.path()).unwrap();
+    let specification = specification();
+    let text =
+        directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    let job = job_file::to_toml(&specification);
+    let older = job.replace("scrambles = 1\n", "").replace("control_variate = false\n", "");
+    assert!(older.len() + 30 < job.len(), "{job}");
+    fs::write(scratch.path().join(JOB), &older).unwrap();
+    let stored = |specification| ResultsDirectory::stored(scratch.path(), specification);
+    assert_eq!(stored(&specification).unwrap(), Some(text));
+    let mut other = specification.clone();
+    other.monte_carlo.control_variate = true;
+    let refusal = stored(&other).unwrap_err().to_string();
+    assert!(refusal.contains("`control_variate = true` here"), "{refusal}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
-//! Measures the solvers against each other: [`check`] on one case, and studies over many draws of
-//! the paper's optimum that end in a [`Table`].
+//! Measures the solvers against each other, the ways of drawing bones ([`variance`]) and the methods of
+//! search ([`searches`]): [`check`] on one case, and studies that end in a [`Table`].
 //!
-//! A study is a function of its [`Draws`] alone: realizations are computed on all cores and taken
+//! A study is a function of its draws alone: realizations are computed on all cores and taken
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
 
 pub mod accuracy;
@@ -16,8 +16,10 @@ mod generator;
 pub mod methods;
 pub mod models;
 pub mod refinement;
+pub mod searches;
 pub mod setups;
 mod table;
+pub mod variance;
 
 pub use difference::{Difference, difference};
 pub use draws::{Draws, OPTIMUM};

@@ -17,7 +17,7 @@ const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
 /// Mean models of each row, unless chosen otherwise.
 pub const REALIZATIONS: u64 = 1000;
 /// Bounds of the seven parameters.
-const BOUNDS: [(f64, f64); 7] = [
+pub(crate) const BOUNDS: [(f64, f64); 7] = [
     (1500.0, 2000.0),
     (12e9, 25e9),
     (0.2, 0.45),
@@ -59,7 +59,7 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<Measured>, PointError> 
 }
 
 /// Mean model and dispersion of one bone: uniform within the bounds, the first that is admissible.
-fn mean_model(seed: u64, index: u64) -> Point {
+pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
     let mut generator = Generator::of_index(seed, index);
     let mut drawn = || Point(BOUNDS.map(|(from, to)| generator.between(from, to)));
     for _ in 1..TRIES_MAX {

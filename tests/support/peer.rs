@@ -88,7 +88,7 @@ pub(crate) fn solve(work: &Work) -> Vec<Solved> {
     let solver = Solver::new(&work.setup);
     let mut workspace = Workspace::default();
     let indices = work.first..work.first + u64::from(work.count);
-    let Ok(ensemble) = Ensemble::new(&work.point, work.seed) else {
+    let Ok(ensemble) = Ensemble::drawn(&work.point, work.germs) else {
         return indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect();
     };
     let realization = |index| {

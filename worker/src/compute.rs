@@ -1,6 +1,6 @@
 //! Realizations on the cores of this worker.
 //!
-//! Realization i of a batch is drawn by [`Ensemble`] from (point, seed, i), and solved by
+//! Realization i of a batch is drawn by [`Ensemble`] from (point, germs, i), and solved by
 //! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or what was
 //! computed before. A drawn tensor that is not positive definite in floating point, or a point
 //! from which nothing can be drawn, is the failure `not_finite` of each realization concerned.
@@ -104,11 +104,11 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved
     }
     let indices = work.first..work.first + u64::from(work.count);
     let panicked = |index: u64, payload: Box<dyn std::any::Any + Send>| Interrupted::Panicked {
-        case: Box::new(PanickedCase { index, seed: work.seed, point: work.point }),
+        case: Box::new(PanickedCase { index, germs: work.germs, point: work.point }),
         message: panic_message(payload.as_ref()),
     };
     let prepared = catch_unwind(AssertUnwindSafe(|| {
-        (solvers.get(&work.setup), Ensemble::new(&work.point, work.seed))
+        (solvers.get(&work.setup), Ensemble::drawn(&work.point, work.germs))
     }));
     let (solver, ensemble) = prepared.map_err(|payload| panicked(work.first, payload))?;
     let Ok(ensemble) = ensemble else {

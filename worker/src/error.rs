@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::malformed::Malformed;
@@ -78,15 +79,19 @@ pub enum WorkerError {
 pub struct PanickedCase {
     /// Index of the realization.
     pub index: u64,
-    /// Seed of the germs.
-    pub seed: u64,
+    /// Where the germs come from.
+    pub germs: GermSource,
     /// The point (a, δ).
     pub point: Point,
 }
 
 impl fmt::Display for PanickedCase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "realization {} of seed {} at", self.index, self.seed)?;
+        write!(f, "realization {} of seed {}", self.index, self.germs.seed)?;
+        if let GermScheme::Sobol { points } = self.germs.scheme {
+            write!(f, " (sobol, {points} points per scramble)")?;
+        }
+        f.write_str(" at")?;
         for (i, parameter) in Parameter::ALL.into_iter().enumerate() {
             let comma = if i == 0 { "" } else { "," };
             write!(f, "{comma} {} = {:?}", parameter.name(), self.point.get(parameter))?;

@@ -1,7 +1,9 @@
 //! Rules on data, parameters, the Monte Carlo loop and the search.
 
 use crate::accepted::{Interval, WholeRange};
-use crate::job::{Data, JobKind, JobSpecification, MonteCarlo, Range, Search};
+use crate::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+};
 use crate::limits;
 use crate::parameters::Parameter;
 use crate::statistics;
@@ -13,6 +15,8 @@ use super::{known_wrong, number, setup, whole};
 pub(crate) const REALIZATIONS: WholeRange = WholeRange::new(1, limits::REALIZATIONS_MAX);
 /// Range of `monte_carlo.seed`.
 pub(crate) const SEED: WholeRange = WholeRange::new(0, limits::SEED_MAX);
+/// Range of `monte_carlo.scrambles`.
+pub(crate) const SCRAMBLES: WholeRange = WholeRange::new(1, limits::SCRAMBLES_MAX);
 /// Range of `search.max_evaluations`.
 pub(crate) const EVALUATIONS: WholeRange = WholeRange::new(1, limits::EVALUATIONS_MAX);
 /// What a measured velocity accepts.
@@ -51,6 +55,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     something_to_search(specification, violations);
     monte_carlo(&specification.monte_carlo, violations);
     search(&specification.search, violations);
+    enough_for_the_method(specification, violations);
 }
 
 /// The message for an identification without data.
@@ -189,12 +194,53 @@ fn something_to_search(specification: &JobSpecification, violations: &mut Violat
 fn monte_carlo(monte_carlo: &MonteCarlo, violations: &mut Violations) {
     whole("monte_carlo.realizations", monte_carlo.realizations, REALIZATIONS, violations);
     whole("monte_carlo.seed", monte_carlo.seed, SEED, violations);
+    scrambles(monte_carlo, violations);
     number(
         "monte_carlo.max_failed_fraction",
         monte_carlo.max_failed_fraction,
         Interval::from_to(0.0, 1.0, ""),
         violations,
     );
+}
+
+fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
+    const FIELD: &str = "monte_carlo.scrambles";
+    let MonteCarlo { realizations, scrambles, .. } = *monte_carlo;
+    whole(FIELD, scrambles, SCRAMBLES, violations);
+    let around = [FIELD, "monte_carlo.sampling", "monte_carlo.realizations"];
+    if around.iter().any(|field| known_wrong(field, violations)) {
+        return;
+    }
+    match monte_carlo.sampling {
+        Sampling::MonteCarlo if scrambles != 1 => violations.add(
+            FIELD,
+            format!(
+                "is {scrambles}; it must be 1 with the sampling \"monte_carlo\", as only the points \
+                 of \"sobol\" are scrambled"
+            ),
+        ),
+        Sampling::Sobol if realizations % scrambles != 0 => violations.add(
+            FIELD,
+            format!("is {scrambles}; it must divide the {realizations} realizations"),
+        ),
+        _ => {}
+    }
+}
+
+/// One velocity has the coefficient of variation 0, which has no logarithm.
+fn enough_for_the_method(specification: &JobSpecification, violations: &mut Violations) {
+    let realizations = specification.monte_carlo.realizations;
+    if specification.kind == JobKind::Identification
+        && specification.search.method == SearchMethod::Newton
+        && realizations == 1
+        && !known_wrong("monte_carlo.realizations", violations)
+        && !known_wrong("search.method", violations)
+    {
+        violations.add(
+            "monte_carlo.realizations",
+            "is 1; the search \"newton\" needs a coefficient of variation, so at least 2",
+        );
+    }
 }
 
 fn search(search: &Search, violations: &mut Violations) {

@@ -1,27 +1,27 @@
 //! `[monte_carlo]`, `[objective]` and `[search]`.
 
-use crate::check::{EVALUATIONS, REALIZATIONS, SEED};
+use crate::check::{EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED};
 use crate::job::{MonteCarlo, Objective, Sampling, Search, SearchMethod};
 use crate::reader::{Choice, Reader, Table};
 
 /// The Monte Carlo loop, with defaults where `root` is silent or wrong.
 pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
     let default = MonteCarlo::default();
-    let keys = ["realizations", "seed", "sampling", "scrambles", "max_failed_fraction"];
+    let keys =
+        ["realizations", "seed", "sampling", "scrambles", "control_variate", "max_failed_fraction"];
     let table = reader.table(root, "monte_carlo", &keys);
-    if table.has("scrambles") {
-        reader.violations.add(
-            table.path("scrambles"),
-            "belongs to the sampling \"sobol\", which this version does not offer; leave it out",
-        );
-    }
-    let sampling = Choice { all: &Sampling::ALL, name: Sampling::name, reserved: &["sobol"] };
+    let sampling = Choice { all: &Sampling::ALL, name: Sampling::name, reserved: &[] };
+    let scrambles = reader.whole(&table, "scrambles", SCRAMBLES).unwrap_or(default.scrambles);
+    // What they must agree with is not known: that it is misspelt is all there is to say.
+    let alone = ["realizations", "sampling"].iter().any(|key| reader.is_misspelt(&table, key));
     MonteCarlo {
         realizations: reader
             .whole(&table, "realizations", REALIZATIONS)
             .unwrap_or(default.realizations),
         seed: reader.whole(&table, "seed", SEED).unwrap_or(default.seed),
         sampling: reader.choice(&table, "sampling", &sampling).unwrap_or(default.sampling),
+        scrambles: if alone { default.scrambles } else { scrambles },
+        control_variate: reader.truth(&table, "control_variate").unwrap_or(default.control_variate),
         max_failed_fraction: reader
             .number(&table, "max_failed_fraction")
             .unwrap_or(default.max_failed_fraction),
@@ -37,13 +37,13 @@ pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
 
 /// The search loop, with defaults where `root` is silent or wrong.
 pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
-    let default = Search::default();
     let keys = ["method", "max_evaluations", "cost_tolerance", "size_tolerance", "initial_step"];
     let table = reader.table(root, "search", &keys);
-    let method =
-        Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &["newton"] };
+    let method = Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &[] };
+    let method = reader.choice(&table, "method", &method).unwrap_or_default();
+    let default = Search::by(method);
     Search {
-        method: reader.choice(&table, "method", &method).unwrap_or(default.method),
+        method,
         max_evaluations: reader
             .whole(&table, "max_evaluations", EVALUATIONS)
             .unwrap_or(default.max_evaluations),

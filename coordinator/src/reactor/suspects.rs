@@ -137,7 +137,7 @@ fn lethal(state: &State, job: JobId, now: Duration) -> Option<Failure> {
 
 /// A realization as a complete case file. What is no elasticity is never solved, and kills nobody.
 fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
-    let ensemble = Ensemble::new(point, specification.monte_carlo.seed).ok();
+    let ensemble = Ensemble::drawn(point, specification.monte_carlo.germs()).ok();
     let bone = ensemble.and_then(|ensemble| ensemble.bone(index).ok());
     let case = bone.map(|bone| Case { setup: specification.setup, bone });
     case.map_or_else(String::new, |case| case_file::to_toml(&case))

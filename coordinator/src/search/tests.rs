@@ -1,8 +1,11 @@
 //! The meaning of outcomes, and replay.
 
 use osteon_common::case::Setup;
-use osteon_common::job::{MonteCarlo, Objective, Search as SearchSettings};
+use osteon_common::job::{
+    MonteCarlo, Objective, Range, Sampling, Search as SearchSettings, SearchMethod,
+};
 use osteon_common::outcome::FailureKind;
+use osteon_common::realization::Ensemble;
 
 use super::*;
 
@@ -66,6 +69,64 @@ fn an_identification_finds_what_made_the_data() {
     assert_eq!(result.evaluations, search.history().len() as u64);
 }
 
+/// The same by `newton`.
+fn by_newton(max_evaluations: u64) -> JobSpecification {
+    let search = SearchSettings { max_evaluations, ..SearchSettings::by(SearchMethod::Newton) };
+    JobSpecification { search, ..specification(max_evaluations) }
+}
+
+#[test]
+fn newton_finds_what_made_the_data() {
+    let (search, _) = run(&by_newton(400));
+    let ending = ending(&search);
+    assert_eq!(ending, Ending { status: Status::Converged, reason: None });
+    let best = search.best().unwrap();
+    assert!(best.cost.unwrap() <= 1e-12);
+    assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-5, "{best:?}");
+    assert!((best.point.dispersion() / 0.12 - 1.0).abs() < 1e-5, "{best:?}");
+    assert!(search.evaluations() < 12, "{}", search.evaluations());
+}
+
+#[test]
+fn newton_says_why_it_settled_above_its_tolerance() {
+    let mut job = by_newton(400);
+    job.data = Some(Data::Moments { mean: 2000.0, coefficient_of_variation: 0.03 });
+    let (search, _) = run(&job);
+    let Ending { status, reason } = ending(&search);
+    let reason = reason.unwrap();
+    assert_eq!(status, Status::Converged);
+    assert!(reason.contains("settled at a cost of 1.037e-1"), "{reason}");
+    assert!(reason.contains("(longitudinal_young_modulus on its lower bound)"), "{reason}");
+    assert!(reason.contains("widen the bounds"), "{reason}");
+    // The simplex says nothing of the kind: it may have collapsed anywhere.
+    let job = JobSpecification { search: specification(400).search, ..job };
+    assert_eq!(self::ending(&run(&job).0).reason, None);
+}
+
+#[test]
+fn newton_leaves_out_points_that_are_not_admissible() {
+    let mut job = by_newton(60);
+    job.parameters[1] = Range::Fixed(9e9);
+    job.parameters[2] = Range::Free { start: 0.45, lower: 0.1, upper: 1.5 };
+    let (search, told) = run(&job);
+    assert!(told.iter().all(|(point, _)| point.constants().violated().is_empty()), "{told:?}");
+    assert_eq!(ending(&search).status, Status::Converged);
+    job.parameters[0] = Range::Fixed(-1.0);
+    let search = Search::new(Arc::new(job));
+    assert_eq!((ending(&search).status, search.evaluations()), (Status::Failed, 0));
+}
+
+#[test]
+fn velocities_that_are_all_the_same_are_no_use_to_newton() {
+    let mut search = Search::new(Arc::new(by_newton(60)));
+    while let Step::Evaluate(_) = search.ask() {
+        search.tell([Ok(3900.0); 4].into(), ERRORS);
+    }
+    let Ending { status, reason } = ending(&search);
+    assert_eq!(status, Status::Failed);
+    assert!(reason.unwrap().contains("raise [monte_carlo] realizations"));
+}
+
 #[test]
 fn the_best_evaluated_point_is_returned_and_not_the_last() {
     for max_evaluations in 2..30 {
@@ -89,8 +150,13 @@ fn the_first_point_has_the_bits_of_the_start() {
 
 #[test]
 fn a_replay_of_any_part_of_the_path_goes_on_the_same_way() {
-    let specification = specification(40);
-    let (full, told) = run(&specification);
+    for specification in [specification(40), by_newton(40)] {
+        replay_of_any_part(&specification);
+    }
+}
+
+fn replay_of_any_part(specification: &JobSpecification) {
+    let (full, told) = run(specification);
     for length in 0..=told.len() {
         let mut search = Search::new(Arc::new(specification.clone()));
         for (point, outcomes) in &told[..length] {
@@ -215,4 +281,48 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("inadmissible"));
     assert!(search.result(&ending(&search), "1").best.is_none());
+}
+
+/// Velocities that the control variate explains wholly: their moments are the law's whatever the
+/// germs, and a search that is told few of them finds the point that made the data.
+#[test]
+fn a_controlled_search_goes_by_the_moments_of_the_law() {
+    let asked = MonteCarlo {
+        realizations: 16,
+        sampling: Sampling::Sobol,
+        scrambles: 2,
+        control_variate: true,
+        ..MonteCarlo::default()
+    };
+    let explained = |monte_carlo: &MonteCarlo, point: &Point| -> Arc<[Outcome]> {
+        let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
+        let speed = |index| {
+            let bone = ensemble.bone(index).unwrap();
+            (bone.elasticity.rows()[0][0] / bone.density).sqrt()
+        };
+        (0..monte_carlo.realizations).map(|index| Ok(0.99 * speed(index))).collect()
+    };
+    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let other = MonteCarlo { seed: 99, ..asked };
+    let data = statistics::estimate(&other, &truth, &explained(&other, &truth)).unwrap().moments;
+    let Moments { mean, coefficient_of_variation } = data;
+    let specification = Arc::new(JobSpecification {
+        data: Some(Data::Moments { mean, coefficient_of_variation }),
+        monte_carlo: asked,
+        ..specification(400)
+    });
+    let mut search = Search::new(Arc::clone(&specification));
+    let mut again = Search::new(specification);
+    while let Step::Evaluate(point) = search.ask() {
+        search.tell(explained(&asked, &point), ERRORS);
+        again.retell(point, explained(&asked, &point), ERRORS).unwrap();
+    }
+    let result = search.result(&ending(&search), "1");
+    assert_eq!(result.status, Status::Converged);
+    assert_eq!(result, again.result(&ending(&again), "1"));
+    assert_eq!((result.sampling, result.scrambles), (Sampling::Sobol, 2));
+    let best = result.best.unwrap();
+    assert!(best.velocity.unwrap().controlled);
+    assert!((best.point.0[1] / truth.0[1] - 1.0).abs() < 1e-4, "{:?}", best.point);
+    assert!((best.point.dispersion() / truth.dispersion() - 1.0).abs() < 1e-4, "{:?}", best.point);
 }

@@ -27,7 +27,7 @@ fn minimise(start: &[f64], settings: Settings, cost: impl Fn(&[f64]) -> f64) -> 
     let (mut best, mut at, mut told) = (f64::INFINITY, start.to_vec(), Vec::new());
     loop {
         let point = match simplex.ask() {
-            Ask::Cost(point) => point.to_vec(),
+            Ask::At(point) => point.to_vec(),
             Ask::Stopped(stop) => {
                 let (evaluations, restarts) = (simplex.evaluations(), simplex.restarts());
                 assert_eq!(evaluations, told.len() as u64);
@@ -135,7 +135,7 @@ fn a_simplex_pinned_to_a_bound_is_not_reported_as_converged() {
     };
     let mut simplex = Simplex::new(&[0.01, 0.1, 0.1, 0.1], SETTINGS);
     let (mut best, mut at_first_collapse) = (f64::INFINITY, f64::NAN);
-    while let Ask::Cost(at) = simplex.ask() {
+    while let Ask::At(at) = simplex.ask() {
         let cost = pinned(at);
         best = best.min(cost);
         simplex.tell(cost);
@@ -204,7 +204,7 @@ fn refused_points_are_not_counted_and_end_the_search() {
     let mut simplex = Simplex::new(&[0.5; 7], SETTINGS);
     simplex.tell(1.0);
     let mut refusals = 0;
-    while let Ask::Cost(_) = simplex.ask() {
+    while let Ask::At(_) = simplex.ask() {
         simplex.refuse();
         refusals += 1;
         assert!(refusals < 10_000, "refusing never ends");
@@ -246,7 +246,7 @@ proptest! {
         let mut simplex = Simplex::new(&start, Settings { max_evaluations: 250, ..SETTINGS });
         let mut again = simplex.clone();
         for (number, cost) in costs.iter().cycle().take(1000).enumerate() {
-            if let Ask::Cost(at) = simplex.ask() {
+            if let Ask::At(at) = simplex.ask() {
                 prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)), "{:?}", at);
             }
             let refuse = number % 7 == 3;

@@ -119,7 +119,7 @@ pub(crate) fn solved(work: &Work) -> Vec<Solved> {
 
 /// The realization at one index.
 fn realization(work: &Work, index: u64) -> Solved {
-    let noise = mix(work.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let noise = mix(work.germs.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if noise.is_multiple_of(29) {
         return Solved::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
     }
@@ -161,8 +161,7 @@ pub(crate) fn evaluation(
     let work = |first| Work {
         setup: specification.setup,
         point,
-        seed: specification.monte_carlo.seed,
-        sampling: specification.monte_carlo.sampling,
+        germs: specification.monte_carlo.germs(),
         first,
         count: 1,
     };

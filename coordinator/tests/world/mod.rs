@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::JobSpecification;
+use osteon_common::job::{JobSpecification, Search, SearchMethod};
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
@@ -369,7 +369,7 @@ impl World {
         else {
             return true;
         };
-        let key = work.point.0.iter().fold(work.seed, |key, x| fake::mix(key ^ x.to_bits()));
+        let key = work.point.0.iter().fold(work.germs.seed, |key, x| fake::mix(key ^ x.to_bits()));
         let lost = self.lost_alone.entry((key, work.first)).or_default();
         *lost += 1;
         *lost <= LOST_ALONE_MAX
@@ -533,7 +533,18 @@ impl World {
 /// What a batch is about.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
     let point = work.point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()));
-    (work.seed, point, work.first, work.count)
+    (work.germs.seed, point, work.first, work.count)
+}
+
+/// An identification, one in three by `newton`, which takes two realizations at least.
+fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobSpecification {
+    let mut specification = fake::identification(realizations, evaluations, seed);
+    if method == 0 {
+        specification.monte_carlo.realizations = realizations.max(2);
+        let by = Search::by(SearchMethod::Newton);
+        specification.search = Search { max_evaluations: evaluations, ..by };
+    }
+    specification
 }
 
 /// One to three clients with small jobs.
@@ -542,7 +553,7 @@ fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
         .map(|number| {
             let specification = match draw(4) {
                 0 => fake::propagation(1 + draw(60), 4 * seed + number),
-                _ => fake::identification(1 + draw(40), 2 + draw(12), 4 * seed + number),
+                _ => searched(draw(3), 1 + draw(40), 2 + draw(12), 4 * seed + number),
             };
             let request_id = format!("request {number}");
             let cancels = draw(6) == 0;

@@ -63,9 +63,12 @@ prop_compose! {
     fn specification()(
         data in proptest::option::of(data()),
         parameters in parameters(),
-        realizations in 1_u64..=10_000_000,
+        points in 2_u64..=9765,
+        scrambles in proptest::option::of(1_u64..=1024),
+        control_variate: bool,
         seed in 0..1_u64 << 63,
         max_failed_fraction in 0.0..1.0,
+        method in proptest::sample::select(SearchMethod::ALL.to_vec()),
         max_evaluations in 1_u64..1000,
         initial_step in 0.01..0.5,
         solver in solver(),
@@ -76,13 +79,15 @@ prop_compose! {
             data,
             parameters,
             monte_carlo: MonteCarlo {
-                realizations,
+                realizations: points * scrambles.unwrap_or(1),
                 seed,
+                sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
+                scrambles: scrambles.unwrap_or(1),
+                control_variate,
                 max_failed_fraction,
-                ..MonteCarlo::default()
             },
             objective: Objective::default(),
-            search: Search { max_evaluations, initial_step, ..Search::default() },
+            search: Search { max_evaluations, initial_step, ..Search::by(method) },
         }
     }
 }
@@ -131,6 +136,16 @@ fn absent_messages_take_the_defaults() {
         ..sparse
     };
     assert_eq!(from_message(&with_empty_messages), from_message(&message()));
+}
+
+#[test]
+fn the_default_tolerance_is_that_of_the_method() {
+    let mut message = message();
+    let method = Some("newton".to_owned());
+    message.search = Some(v1::Search { method, ..Default::default() });
+    let specification = from_message(&message).unwrap();
+    assert_eq!(specification.search, Search::by(SearchMethod::Newton));
+    assert_eq!(specification.search.cost_tolerance, 1e-12);
 }
 
 /// The fields at fault after `change`, in the order they are reported.
@@ -190,6 +205,14 @@ fn each_fault_is_named_by_its_path() {
         ["parameters.density"]
     );
     assert_eq!(faults(|m| m.parameters = None).len(), 7);
+    for (sampling, scrambles) in [("monte_carlo", 2), ("sobol", 2), ("sobol", 0), ("sobol", 1025)] {
+        let fields = faults(|m| {
+            let monte_carlo = m.monte_carlo.as_mut().unwrap();
+            monte_carlo.sampling = Some(sampling.to_owned());
+            monte_carlo.scrambles = Some(scrambles);
+        });
+        assert_eq!(fields, ["monte_carlo.scrambles"], "{sampling} {scrambles} of 2747");
+    }
 }
 
 #[test]

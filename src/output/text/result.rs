@@ -1,7 +1,7 @@
 //! The table of a result, made from the text of `result.json`: a result that was stored looks as
 //! one that was just computed.
 
-use osteon_common::job::{JobKind, JobSpecification, Range};
+use osteon_common::job::{JobKind, JobSpecification, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results_json;
 use serde_json::Value;
@@ -58,10 +58,13 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     };
     text.push_str(&format!("; at the best point {}\n\n", failures(value)));
     text.push_str(&moments(value, true));
+    text.push_str(uncontrolled(value));
     text.push('\n');
     text.push_str(&parameters(&point, shown.specification));
     if status != "failed" {
-        text.push_str(&uniqueness(&point, shown.specification));
+        let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
+        let matches = cost <= shown.specification.search.cost_tolerance;
+        text.push_str(&uniqueness(&point, shown.specification, matches));
     }
 }
 
@@ -71,6 +74,7 @@ fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     }
     text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
     text.push_str(&moments(value, false));
+    text.push_str(uncontrolled(value));
 }
 
 fn failures(value: &Value) -> String {
@@ -109,6 +113,16 @@ fn moments(value: &Value, with_data: bool) -> String {
     aligned(&rows)
 }
 
+/// That the control variate which was asked for could not be used.
+fn uncontrolled(value: &Value) -> &'static str {
+    match (value["control_variate"].as_bool(), value["velocity"]["controlled"].as_bool()) {
+        (Some(true), Some(false)) => {
+            "moments without the control variate: it takes three realizations or more, and none failed\n"
+        }
+        _ => "",
+    }
+}
+
 /// A number with enough digits to compare it with the data's, and two digits of its standard
 /// error.
 fn with_error(number: f64, error: f64, unit: &str) -> String {
@@ -141,8 +155,8 @@ fn scale(parameter: Parameter) -> (f64, &'static str) {
     }
 }
 
-/// Which of the found numbers the data determine.
-fn uniqueness(point: &Point, specification: &JobSpecification) -> String {
+/// Which of the found numbers the data determine, and what the others are.
+fn uniqueness(point: &Point, specification: &JobSpecification, matches: bool) -> String {
     let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
     let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
     let dispersion = free(Parameter::Dispersion);
@@ -158,10 +172,16 @@ fn uniqueness(point: &Point, specification: &JobSpecification) -> String {
     } else {
         String::new()
     };
+    let others = if matches && specification.search.method == SearchMethod::Newton {
+        "of the points that match the data, this is the one nearest to the start\n\
+         (distances in units of the bounds)."
+    } else {
+        "the other values are one of many sets that match the data equally well."
+    };
     format!(
         "\nTwo moments cannot fix {searched} parameters. The data determine only\n    \
          {speed}{dispersion};\n\
-         the other values are one of many sets that match the data equally well.\n\
+         {others}\n\
          Fix what is known from elsewhere (`fixed = …`) to narrow them down.\n"
     )
 }

@@ -1,7 +1,7 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use osteon_common::job::Sampling;
+use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
 
 use super::*;
@@ -10,7 +10,7 @@ const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495,
 const DEADLINE: Duration = Duration::from_secs(60);
 
 fn work(point: Point, first: u64, count: u32) -> Work {
-    Work { setup: Setup::default(), point, seed: 5, sampling: Sampling::MonteCarlo, first, count }
+    Work { setup: Setup::default(), point, germs: GermSource::streams(5), first, count }
 }
 
 fn solved(threads: u32, work: Work) -> Vec<Solved> {
@@ -36,15 +36,18 @@ fn outcomes_do_not_depend_on_threads_or_batches() {
 #[test]
 fn outcomes_are_those_of_the_solver_alone() {
     let solver = Solver::new(&Setup::default());
-    let ensemble = Ensemble::new(&POINT, 5).unwrap();
-    let expected: Vec<_> = (3..7)
-        .map(|index| {
-            let bone = ensemble.bone(index).unwrap();
-            let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
-            Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
-        })
-        .collect();
-    assert_eq!(solved(2, work(POINT, 3, 4)), expected);
+    for scheme in [GermScheme::Streams, GermScheme::Sobol { points: 5 }] {
+        let germs = GermSource { seed: 5, scheme };
+        let ensemble = Ensemble::drawn(&POINT, germs).unwrap();
+        let expected: Vec<_> = (3..7)
+            .map(|index| {
+                let bone = ensemble.bone(index).unwrap();
+                let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
+                Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+            })
+            .collect();
+        assert_eq!(solved(2, Work { germs, ..work(POINT, 3, 4) }), expected, "{scheme:?}");
+    }
 }
 
 #[test]

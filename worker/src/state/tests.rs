@@ -1,5 +1,5 @@
 use osteon_common::case::Setup;
-use osteon_common::job::Sampling;
+use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::parameters::Point;
 
@@ -74,8 +74,7 @@ fn work() -> Work {
     Work {
         setup: Setup::default(),
         point: POINT,
-        seed: 1,
-        sampling: Sampling::MonteCarlo,
+        germs: GermSource::streams(1),
         first: 10,
         count: 2,
     }
@@ -276,7 +275,7 @@ fn what_cannot_be_read_or_computed_ends_the_worker() {
     let mut worker = Recorder::attached();
     worker.batch(4);
     worker.expect(&[compute(1, 4)]);
-    let case = Box::new(PanickedCase { index: 11, seed: 1, point: POINT });
+    let case = Box::new(PanickedCase { index: 11, germs: GermSource::streams(1), point: POINT });
     let (panicked, failed) = (case.clone(), case);
     let message = || "index out of bounds".to_owned();
     worker.event(Event::Computed(

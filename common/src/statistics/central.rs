@@ -1,0 +1,79 @@
+//! Mean and central moments of a set, and what follows for independent values.
+
+use super::sum::Sum;
+use crate::results::Moments;
+
+/// Mean and central moments of a set.
+pub(super) struct Central {
+    /// How many.
+    pub(super) count: f64,
+    mean: f64,
+    /// m₂, m₃, m₄ with m_p = (1/N) Σ (V_k - v)^p.
+    m2: f64,
+    m3: f64,
+    m4: f64,
+}
+
+impl Central {
+    pub(super) fn moments(&self) -> Moments {
+        Moments { mean: self.mean, coefficient_of_variation: self.m2.sqrt() / self.mean }
+    }
+
+    /// Whether there are different values.
+    pub(super) fn scatters(&self) -> bool {
+        self.m2 > 0.0
+    }
+
+    /// What one value adds to N times mean and coefficient of variation, to first order.
+    pub(super) fn influence(&self, value: f64) -> [f64; 2] {
+        let deviation = value - self.mean;
+        let variation = self.m2.sqrt() / self.mean;
+        let relative = 0.5 * (deviation * deviation / self.m2 - 1.0) - deviation / self.mean;
+        [deviation, variation * relative]
+    }
+
+    /// The standard errors of independent values.
+    pub(super) fn standard_error(&self) -> Moments {
+        let n = self.count;
+        if n < 2.0 {
+            return Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN };
+        }
+        if self.m2 == 0.0 {
+            return Moments { mean: 0.0, coefficient_of_variation: 0.0 };
+        }
+        let variation = self.m2.sqrt() / self.mean;
+        let skewness = self.m3 / (self.m2 * self.m2.sqrt());
+        let kurtosis = self.m4 / (self.m2 * self.m2);
+        // Of a quadratic form that is never negative; rounding can make it so.
+        let relative =
+            ((kurtosis - 1.0) / 4.0 - variation * skewness + variation * variation).max(0.0).sqrt();
+        Moments {
+            mean: (self.m2 / (n - 1.0)).sqrt(),
+            coefficient_of_variation: variation * relative / n.sqrt(),
+        }
+    }
+}
+
+/// Those of a set, or `None` if it is empty.
+pub(super) fn central(velocities: impl Iterator<Item = f64> + Clone) -> Option<Central> {
+    let count = velocities.clone().count();
+    if count == 0 {
+        return None;
+    }
+    let count = count as f64;
+    let mut sum = Sum::default();
+    for velocity in velocities.clone() {
+        sum.add(velocity);
+    }
+    let mean = sum.total() / count;
+    let mut sums = [Sum::default(); 3];
+    for velocity in velocities {
+        let deviation = velocity - mean;
+        let square = deviation * deviation;
+        sums[0].add(square);
+        sums[1].add(square * deviation);
+        sums[2].add(square * square);
+    }
+    let [m2, m3, m4] = sums.map(|sum| sum.total() / count);
+    Some(Central { count, mean, m2, m3, m4 })
+}

@@ -1,0 +1,62 @@
+//! The methods of search behind one face.
+
+use osteon_common::job::{Search, SearchMethod};
+use osteon_common::results::Moments;
+
+use crate::ask::Ask;
+use crate::newton::{self, Newton};
+use crate::search_box::SearchBox;
+use crate::simplex::{self, Simplex};
+
+/// A method under way.
+#[derive(Debug, Clone)]
+pub(super) enum Method {
+    Simplex(Simplex),
+    Newton(Box<Newton>),
+}
+
+impl Method {
+    /// The method that `search` names, at its start.
+    pub(super) fn new(search: &Search, space: SearchBox, data: Moments) -> Self {
+        let Search { max_evaluations, cost_tolerance, size_tolerance, initial_step, .. } = *search;
+        match search.method {
+            SearchMethod::Simplex => {
+                let settings = simplex::Settings {
+                    max_evaluations,
+                    cost_tolerance,
+                    size_tolerance,
+                    initial_step,
+                };
+                Self::Simplex(Simplex::new(&space.start(), settings))
+            }
+            SearchMethod::Newton => {
+                let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
+                Self::Newton(Box::new(Newton::new(space, data, settings)))
+            }
+        }
+    }
+
+    /// The next point, or why there is none.
+    pub(super) fn ask(&self) -> Ask<'_> {
+        match self {
+            Self::Simplex(simplex) => simplex.ask(),
+            Self::Newton(newton) => newton.ask(),
+        }
+    }
+
+    /// Takes cost and moments of the point asked for.
+    pub(super) fn tell(&mut self, cost: f64, moments: Option<Moments>) {
+        match self {
+            Self::Simplex(simplex) => simplex.tell(cost),
+            Self::Newton(newton) => newton.tell(cost, moments),
+        }
+    }
+
+    /// The point asked for is inadmissible.
+    pub(super) fn refuse(&mut self) {
+        match self {
+            Self::Simplex(simplex) => simplex.refuse(),
+            Self::Newton(newton) => newton.refuse(),
+        }
+    }
+}

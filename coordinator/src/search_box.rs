@@ -1,0 +1,135 @@
+//! The box of the free parameters, in units of its edges: each coordinate goes from 0 at the lower
+//! bound to 1 at the upper.
+
+use osteon_common::ensemble::DISPERSION_MAX;
+use osteon_common::job::Range;
+use osteon_common::parameters::{Parameter, Point};
+
+/// The ranges that a search moves in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchBox {
+    ranges: [Range; 7],
+}
+
+/// A bound that a point lies on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The lower.
+    Lower,
+    /// The upper.
+    Upper,
+}
+
+/// A point this near to a bound, in units of the box, lies on it.
+const ON_BOUND: f64 = 1e-9;
+
+impl SearchBox {
+    /// The box of these ranges of [`Parameter::ALL`]; they have passed their check.
+    pub fn new(ranges: [Range; 7]) -> Self {
+        Self { ranges }
+    }
+
+    /// Coordinates of the start.
+    pub fn start(&self) -> Vec<f64> {
+        self.ranges.iter().filter_map(unit_start).collect()
+    }
+
+    /// The point with these coordinates. A coordinate that never moved keeps the bits of its
+    /// start.
+    pub fn point(&self, at: &[f64]) -> Point {
+        let mut at = at.iter();
+        Point(self.ranges.map(|range| match range {
+            Range::Fixed(value) => value,
+            Range::Free { start, lower, upper } => match at.next() {
+                Some(u) if Some(*u) != unit_start(&range) => {
+                    (lower + u * (upper - lower)).clamp(lower, upper)
+                }
+                _ => start,
+            },
+        }))
+    }
+
+    /// Derivatives with respect to the coordinates, of derivatives with respect to
+    /// [`Parameter::ALL`].
+    pub fn per_edge(&self, gradient: &[f64; 7]) -> Vec<f64> {
+        let slopes = self.ranges.iter().zip(gradient).filter_map(|(range, slope)| match *range {
+            Range::Fixed(_) => None,
+            Range::Free { lower, upper, .. } => Some(slope * (upper - lower)),
+        });
+        slopes.collect()
+    }
+
+    /// The free parameters that lie on a bound at `point`.
+    pub fn on_bounds(&self, point: &Point) -> Vec<(Parameter, Side)> {
+        let side = |parameter: Parameter| match self.ranges[parameter as usize] {
+            Range::Fixed(_) => None,
+            Range::Free { lower, upper, .. } => {
+                let at = (point.get(parameter) - lower) / (upper - lower);
+                match at {
+                    _ if at < ON_BOUND => Some((parameter, Side::Lower)),
+                    _ if at > 1.0 - ON_BOUND => Some((parameter, Side::Upper)),
+                    _ => None,
+                }
+            }
+        };
+        Parameter::ALL.into_iter().filter_map(side).collect()
+    }
+}
+
+/// Whether realizations can be drawn at `point`.
+pub fn admissible(point: &Point) -> bool {
+    let dispersion = point.dispersion();
+    point.density() > 0.0
+        && point.density().is_finite()
+        && dispersion > 0.0
+        && dispersion < DISPERSION_MAX
+        && point.constants().elasticity().is_ok()
+}
+
+fn unit_start(range: &Range) -> Option<f64> {
+    match *range {
+        Range::Fixed(_) => None,
+        Range::Free { start, lower, upper } => {
+            Some(((start - lower) / (upper - lower)).clamp(0.0, 1.0))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> SearchBox {
+        let mut ranges = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+        ranges[1] = Range::Free { start: 15.2e9, lower: 12e9, upper: 25e9 };
+        ranges[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
+        SearchBox::new(ranges)
+    }
+
+    #[test]
+    fn coordinates_are_those_of_the_free_parameters() {
+        let space = example();
+        assert_eq!(space.start().len(), 2);
+        assert_eq!(space.point(&space.start()).0[1].to_bits(), 15.2e9_f64.to_bits());
+        let corner = space.point(&[0.0, 1.0]);
+        assert_eq!((corner.0[1], corner.0[6], corner.0[0]), (12e9, 0.3, 1598.8));
+    }
+
+    #[test]
+    fn slopes_are_those_along_an_edge() {
+        let slopes = example().per_edge(&[9.0, 1e-9, 9.0, 9.0, 9.0, 9.0, 2.0]);
+        assert!((slopes[0] - 13.0).abs() < 1e-12 && (slopes[1] - 0.56).abs() < 1e-12);
+        assert_eq!(slopes.len(), 2);
+    }
+
+    #[test]
+    fn parameters_on_a_bound_are_named() {
+        let space = example();
+        assert_eq!(space.on_bounds(&space.point(&[0.5, 0.5])), []);
+        let expected = [
+            (Parameter::LongitudinalYoungModulus, Side::Upper),
+            (Parameter::Dispersion, Side::Lower),
+        ];
+        assert_eq!(space.on_bounds(&space.point(&[1.0, 0.0])), expected);
+    }
+}
