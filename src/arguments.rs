@@ -372,6 +372,10 @@ pub(crate) enum Study {
     /// How far moments scatter from seed to seed, by sampling and control variate, and how right
     /// their standard errors are
     Variance(RepetitionsArguments),
+    /// Whether an identification finds again what made its data, over known parameter sets
+    Twins(TwinsArguments),
+    /// How many intervals hold the truth, over data sets of a hundred velocities
+    Coverage(TwinsArguments),
     /// How the hybrid method's error falls with element size, order and time step
     Convergence,
 }
@@ -400,6 +404,20 @@ pub(crate) struct RepetitionsArguments {
     #[arg(long, value_name = "S", default_value_t = 1,
           value_parser = clap::value_parser!(u64)
               .range(0..=osteon_common::limits::SEED_MAX - REPETITIONS_MAX))]
+    pub(crate) seed: u64,
+}
+
+/// Of a study of data that are made.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct TwinsArguments {
+    /// Parameter sets, or data sets [default: the study's own]
+    #[arg(long, value_name = "N",
+          value_parser = clap::value_parser!(u64).range(1..=REPETITIONS_MAX))]
+    pub(crate) repetitions: Option<u64>,
+    /// Seed of the parameter sets, the data and the germs
+    #[arg(long, value_name = "S", default_value_t = 1,
+          value_parser = clap::value_parser!(u64)
+              .range(0..=osteon_common::limits::SEED_MAX - 1_000_000_000))]
     pub(crate) seed: u64,
 }
 

@@ -26,6 +26,8 @@ const JOB: &str = "job.toml";
 const RESULT: &str = "result.json";
 const HISTORY: &str = "history.csv";
 const REALIZATIONS: &str = "realizations.csv";
+const GROUPS: &str = "groups.csv";
+const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
 const STORE: &str = "store";
@@ -164,6 +166,13 @@ impl ResultsDirectory {
             if kind == JobKind::Identification {
                 let history = results_csv::history(&fetched.specification, &fetched.history);
                 write(&self.path.join(HISTORY), &history)?;
+            }
+            if !fetched.result.groups.is_empty() {
+                let Fetched { specification, result, history } = fetched;
+                let groups = results_csv::groups(specification, result, history);
+                write(&self.path.join(GROUPS), &groups)?;
+                let comparison = results_csv::comparison(specification, result, history);
+                write(&self.path.join(COMPARISON), &comparison)?;
             }
             let outcomes = fetched.result.best.as_ref().map(|best| best.outcomes.as_slice());
             let realizations = results_csv::realizations(outcomes.unwrap_or_default());

@@ -1,11 +1,12 @@
-//! Results as CSV: `history.csv` and `realizations.csv`.
+//! Results as CSV: `history.csv` and `realizations.csv`, of groups `groups.csv` and `comparison.csv`.
 
 use std::fmt::{self, Write as _};
 
+use crate::inference::{Inference, Known, Quantity, inference};
 use crate::job::{Data, JobSpecification};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
-use crate::results::Evaluation;
+use crate::results::{Evaluation, GroupResult, JobResult};
 
 /// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
 /// number and its moments; with groups or several starts, also which of them it was for.
@@ -58,6 +59,118 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
         }
     }
     write!(out, ",{}", evaluation.failures.total())
+}
+
+/// Most groups of which each is compared with each other; more are compared with the first.
+const COMPARED_MAX: usize = 200;
+
+/// The text of `groups.csv`: one row per group, with what is identified of it (m/s; dimensionless) and
+/// the ends of its confidence intervals, empty where they are unknown.
+pub fn groups(
+    specification: &JobSpecification,
+    result: &JobResult,
+    history: &[Evaluation],
+) -> String {
+    let quantities = ["bulk_velocity", "dispersion"];
+    let columns = quantities.map(|name| format!("{name},{name}_lower,{name}_upper"));
+    let parameters = Parameter::ALL.map(|parameter| format!("best_{}", parameter.name()));
+    let columns = [columns.join(","), parameters.join(",")].join(",");
+    let mut out = format!("group,velocities,status,cost,{columns}\n");
+    for (set, group) in result.groups.iter().enumerate() {
+        let found = found(specification, set, group, history);
+        let data = specification.data.as_ref();
+        let count = data.and_then(|data| data.velocities(set)).map_or(0, <[f64]>::len);
+        let cost = group.best.as_ref().and_then(|best| best.cost);
+        let mut fields = vec![
+            field(&group.name),
+            count.to_string(),
+            group.status.name().to_owned(),
+            number(cost),
+        ];
+        for quantity in quantities_of(found.as_ref()) {
+            let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
+            fields.push(number(quantity.map(|quantity| quantity.value)));
+            fields.extend([0, 1].map(|end| number(interval.map(|ends| ends[end]))));
+        }
+        let point = group.best.as_ref().map(|best| best.point);
+        fields.extend(Parameter::ALL.map(|name| number(point.map(|point| point.get(name)))));
+        out.push_str(&fields.join(","));
+        out.push('\n');
+    }
+    out
+}
+
+/// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
+/// identified, the first less the second, and the ends of their confidence intervals, each of level
+/// [`crate::inference::LEVEL`] by itself; empty where they are unknown.
+///
+/// The noise of sampling, which all groups share, is counted in both: intervals are rather too wide.
+pub fn comparison(
+    specification: &JobSpecification,
+    result: &JobResult,
+    history: &[Evaluation],
+) -> String {
+    let mut out = "first,second".to_owned();
+    for name in ["bulk_velocity", "dispersion"] {
+        out.push_str(&format!(
+            ",{name}_difference,{name}_difference_lower,{name}_difference_upper"
+        ));
+    }
+    out.push('\n');
+    let groups = &result.groups;
+    let found: Vec<_> = groups
+        .iter()
+        .enumerate()
+        .map(|(set, group)| found(specification, set, group, history))
+        .collect();
+    for first in 0..groups.len() {
+        if first > 0 && groups.len() > COMPARED_MAX {
+            break;
+        }
+        for second in first + 1..groups.len() {
+            let mut fields = vec![field(&groups[first].name), field(&groups[second].name)];
+            let pairs = quantities_of(found[first].as_ref())
+                .into_iter()
+                .zip(quantities_of(found[second].as_ref()));
+            for pair in pairs {
+                fields.extend(difference(pair).map(number));
+            }
+            out.push_str(&fields.join(","));
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// Difference of two quantities, and the ends of its interval.
+fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<f64>; 3] {
+    let Some((first, second)) = first.zip(second) else { return [None; 3] };
+    let difference = first.value - second.value;
+    let Some((one, other)) = first.known.zip(second.known) else {
+        return [Some(difference), None, None];
+    };
+    // Half the length of each interval counts the degrees of freedom of its data.
+    let half = |known: Known| 0.5 * (known.interval[1] - known.interval[0]);
+    let reach = libm::hypot(half(one), half(other));
+    [Some(difference), Some(difference - reach), Some(difference + reach)]
+}
+
+fn found(
+    specification: &JobSpecification,
+    set: usize,
+    group: &GroupResult,
+    history: &[Evaluation],
+) -> Option<Inference> {
+    group.best.as_ref().and_then(|best| inference(specification, set, best, history))
+}
+
+fn quantities_of(found: Option<&Inference>) -> [Option<Quantity>; 2] {
+    [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
+}
+
+/// A number, if there is one that is finite.
+fn number(value: Option<f64>) -> String {
+    value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 
 /// The text of `realizations.csv`: one row per index; the velocity (m/s) is empty where there is

@@ -3,13 +3,14 @@
 use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
+use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
     refinement, searches, setups, variance,
 };
 
-use crate::arguments::{DrawsArguments, RepetitionsArguments, Study};
+use crate::arguments::{DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::progress::say;
@@ -60,6 +61,10 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
         Study::Searches(arguments) => over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
         Study::Variance(arguments) => over_seeds(arguments, isa),
+        Study::Twins(arguments) => over_twins("twins", twins::SETS, twins::table, arguments, isa),
+        Study::Coverage(arguments) => {
+            over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
+        }
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     });
     let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
@@ -83,6 +88,19 @@ fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, Point
     let RepetitionsArguments { seeds, seed: first } = arguments;
     let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
     Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
+}
+
+fn over_twins(
+    name: &str,
+    repetitions: u64,
+    table: fn(&Twins, Progress<'_>) -> Result<Table, PointError>,
+    arguments: TwinsArguments,
+    isa: Isa,
+) -> Result<String, PointError> {
+    let repetitions = arguments.repetitions.unwrap_or(repetitions);
+    let seed = arguments.seed;
+    let table = table(&Twins { repetitions, seed, isa }, &say)?;
+    Ok(titled(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
 }
 
 /// A table under what makes it again.

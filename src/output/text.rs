@@ -1,6 +1,8 @@
 //! Output for people.
 
 mod check;
+mod groups;
+mod identified;
 mod result;
 mod solver;
 

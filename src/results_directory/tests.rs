@@ -28,6 +28,7 @@ fn fetched(status: Status) -> Fetched {
         digest: "00".to_owned(),
         best: None,
         data: None,
+        groups: Vec::new(),
         evaluations: 0,
         realizations: 2747,
         seed: 1,

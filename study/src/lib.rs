@@ -13,12 +13,14 @@ pub mod digest;
 mod draws;
 pub mod failures;
 mod generator;
+mod identify;
 pub mod methods;
 pub mod models;
 pub mod refinement;
 pub mod searches;
 pub mod setups;
 mod table;
+pub mod twins;
 pub mod variance;
 
 pub use difference::{Difference, difference};

@@ -6,18 +6,16 @@ use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
 };
-use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::realization::{Ensemble, PointError};
+use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
 use osteon_coordinator::newton;
 use osteon_coordinator::search::{Search as Driven, Step};
-use osteon_solver::{Isa, Solver, Workspace};
-use rayon::prelude::*;
 
 use crate::Progress;
-use crate::draws::{Draws, OPTIMUM, arrival, not_elastic};
+use crate::draws::{Draws, OPTIMUM};
+use crate::identify::outcomes;
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
 
@@ -153,20 +151,6 @@ fn found(
     })
 }
 
-fn outcomes(point: &Point, monte_carlo: &MonteCarlo, isa: Isa) -> Result<Vec<Outcome>, PointError> {
-    let ensemble = Ensemble::new(point, monte_carlo.seed)?;
-    let solver = Solver::with_isa(&Setup::default(), isa);
-    let solved = (0..monte_carlo.realizations).into_par_iter().map_init(
-        Workspace::default,
-        |workspace, index| {
-            let bone = ensemble.bone(index).map_err(not_elastic);
-            let arrival = arrival(&solver, &bone, workspace);
-            arrival.map(|arrival| arrival.velocity).map_err(|failure| failure.kind)
-        },
-    );
-    Ok(solved.collect())
-}
-
 fn cells(found: &Found, data: Moments, draws: &Draws) -> Result<Vec<String>, PointError> {
     let mut cells = vec![
         found.status.name().to_owned(),
@@ -244,6 +228,8 @@ fn distance(a: &Point, b: &Point) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use osteon_solver::Isa;
+
     use super::*;
 
     /// Every start is admissible; `newton` matches the data to 1e-10 within ten evaluations from nine

@@ -6,7 +6,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results_json;
 use serde_json::Value;
 
-use super::{aligned, significant, solver};
+use super::{aligned, groups, identified, significant, solver};
 use crate::output::ShownResult;
 use crate::verdict;
 
@@ -50,6 +50,10 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     }
     let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
     text.push_str(&format!("\n{evaluations} evaluations of {realizations} realizations"));
+    if let Some(groups) = value["groups"].as_array() {
+        text.push_str(&groups::table(groups));
+        return;
+    }
     // Without a finite cost a point says nothing about the data.
     let feasible = value["cost"].is_number();
     let Some(point) = results_json::best_point(shown.json).ok().filter(|_| feasible) else {
@@ -65,6 +69,7 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
         let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
         let matches = cost <= shown.specification.search.cost_tolerance;
         text.push_str(&uniqueness(&point, shown.specification, matches));
+        text.push_str(&identified::text(value));
     }
 }
 
@@ -147,7 +152,7 @@ fn parameters(point: &Point, specification: &JobSpecification) -> String {
 }
 
 /// Factor and unit that make a parameter readable.
-fn scale(parameter: Parameter) -> (f64, &'static str) {
+pub(super) fn scale(parameter: Parameter) -> (f64, &'static str) {
     match parameter.unit() {
         "Pa" => (1e-9, " GPa"),
         "" => (1.0, ""),
