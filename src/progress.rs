@@ -122,7 +122,9 @@ pub(crate) fn describe(snapshot: &JobSnapshot) -> String {
         parts.push(format!("waiting: {}", snapshot.waiting_for));
     }
     if let Some(cost) = snapshot.best_cost.filter(|cost| cost.is_finite()) {
-        parts.push(format!("best cost {cost:.2e}"));
+        // Logarithms of likelihoods differ in their last digits.
+        let digits = if cost.abs() < 1.0 { format!("{cost:.2e}") } else { format!("{cost:.6}") };
+        parts.push(format!("best cost {digits}"));
     }
     if running {
         parts.push(format!("{:.0} realizations/s", snapshot.realizations_per_second));

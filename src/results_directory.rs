@@ -42,10 +42,10 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    let JobSpecification { setup, search, .. } = &fetched.specification;
+    let (result, specification) = (&fetched.result, &fetched.specification);
     match kind {
-        JobKind::Identification => results_json::identification(&fetched.result, setup, search),
-        JobKind::Propagation => results_json::propagation(&fetched.result, setup),
+        JobKind::Identification => results_json::identification(result, specification),
+        JobKind::Propagation => results_json::propagation(result, &specification.setup),
     }
 }
 

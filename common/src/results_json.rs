@@ -7,10 +7,11 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::job::{Search, SearchMethod};
+use crate::data_statistics::{CONFIDENCE, Interval, moment_intervals};
+use crate::job::{Data, JobSpecification, Objective, SearchMethod};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::results::{Estimate, EstimatedError, JobResult, Moments};
+use crate::results::{BestPoint, Estimate, EstimatedError, JobResult, Moments};
 use crate::sampling;
 use crate::settings::Method;
 
@@ -32,8 +33,9 @@ pub enum ResultError {
     },
 }
 
-/// The object of an identification in this setup by this search, with a final newline.
-pub fn identification(result: &JobResult, setup: &Setup, by: &Search) -> String {
+/// The object of the identification that `specification` asks for, with a final newline.
+pub fn identification(result: &JobResult, specification: &JobSpecification) -> String {
+    let JobSpecification { setup, objective, .. } = specification;
     let best = result.best.as_ref();
     let point = best.map(|best| best.point);
     let of_point = |parameter| json!(point.map(|point| point.get(parameter)));
@@ -44,19 +46,23 @@ pub fn identification(result: &JobResult, setup: &Setup, by: &Search) -> String 
         put("reason", json!(reason));
     }
     put("digest", json!(result.digest));
+    put("objective", json!(objective.name()));
     put("cost", json!(best.and_then(|best| best.cost)));
+    if *objective == Objective::Likelihood {
+        put("cost_standard_error", json!(best.and_then(|best| best.cost_error)));
+    }
     let mean_model = Parameter::ALL.into_iter().filter(|&name| name != Parameter::Dispersion);
     let parameters = mean_model.map(|name| (name.name().to_owned(), of_point(name)));
     put("parameters", Value::Object(parameters.collect()));
     put("dispersion", of_point(Parameter::Dispersion));
-    put("velocity", estimate(best.and_then(|best| best.velocity)));
-    put("data", moments(result.data));
+    put("velocity", velocity(best));
+    put("data", data(result, specification));
     put("evaluations", json!(result.evaluations));
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
     sampling(&mut put, result);
-    put("search", search(by, best.and_then(|best| best.cost)));
+    put("search", search(specification, best.and_then(|best| best.cost)));
     let picking = &result.picking;
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
@@ -72,7 +78,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     put("realizations", json!(result.realizations));
     sampling(&mut put, result);
     put("failures", failures(best.map(|best| best.failures)));
-    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("velocity", velocity(best));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("digest", json!(result.digest));
     text(object)
@@ -107,24 +113,30 @@ pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
 }
 
 /// How a search went, and what its best point is, given the cost there.
-fn search(search: &Search, cost: Option<f64>) -> Value {
+fn search(specification: &JobSpecification, cost: Option<f64>) -> Value {
+    let search = &specification.search;
+    // A likelihood has no cost that is low enough.
+    let by_moments = specification.objective == Objective::Moments;
+    let tolerance = by_moments.then_some(search.cost_tolerance);
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("method", json!(search.method.name()));
     put("max_evaluations", json!(search.max_evaluations));
-    put("cost_tolerance", json!(search.cost_tolerance));
+    put("cost_tolerance", json!(tolerance));
     put("size_tolerance", json!(search.size_tolerance));
     if search.method == SearchMethod::Simplex {
         put("initial_step", json!(search.initial_step));
     }
-    put("point", json!(cost.map(|cost| meaning(search, cost))));
+    put("point", json!(cost.map(|cost| meaning(search.method, cost, tolerance))));
     Value::Object(object)
 }
 
-/// What the best point of a search is, by its cost.
-fn meaning(search: &Search, cost: f64) -> &'static str {
-    match search.method {
-        _ if cost > search.cost_tolerance => "of the points evaluated, the one with the least cost",
+/// What the best point of a search is, by its cost and what is low enough.
+fn meaning(method: SearchMethod, cost: f64, tolerance: Option<f64>) -> &'static str {
+    match method {
+        _ if tolerance.is_none_or(|tolerance| cost > tolerance) => {
+            "of the points evaluated, the one with the least cost"
+        }
         SearchMethod::Simplex => {
             "of the points that match the data, the one where the simplex ended"
         }
@@ -173,6 +185,34 @@ fn moments(moments: Option<Moments>) -> Value {
         "mean": moments.map(|moments| moments.mean),
         "coefficient_of_variation": moments.map(|moments| moments.coefficient_of_variation),
     })
+}
+
+/// Moments at the best point, and what failures may have done to them.
+fn velocity(best: Option<&BestPoint>) -> Value {
+    let mut value = estimate(best.and_then(|best| best.velocity));
+    value["failure_bias"] = moments(best.and_then(|best| best.failure_bias));
+    value
+}
+
+/// Moments of the data, and where velocities are known what they say of themselves and of the model.
+fn data(result: &JobResult, specification: &JobSpecification) -> Value {
+    let mut value = moments(result.data);
+    if let Some(Data::Velocities(velocities)) = &specification.data {
+        let intervals = moment_intervals(velocities);
+        let ends = |interval: Interval| json!([interval.low, interval.high]);
+        let interval = intervals.map(|found| {
+            json!({
+                "mean": ends(found.mean),
+                "coefficient_of_variation": ends(found.coefficient_of_variation),
+                "level": CONFIDENCE,
+            })
+        });
+        value["interval"] = json!(interval);
+        let test = result.best.as_ref().and_then(|best| best.kolmogorov);
+        let test = test.map(|test| json!({"distance": test.distance, "p_value": test.p_value}));
+        value["kolmogorov"] = json!(test);
+    }
+    value
 }
 
 fn estimate(estimate: Option<Estimate>) -> Value {

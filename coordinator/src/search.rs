@@ -7,11 +7,12 @@
 use std::sync::Arc;
 
 use osteon_common::digest::PathDigest;
-use osteon_common::job::{Data, JobKind, JobSpecification, SearchMethod};
+use osteon_common::data_statistics::kolmogorov_test;
+use osteon_common::job::{Data, JobKind, JobSpecification, Objective, SearchMethod};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{BestPoint, EstimatedError, Evaluation, JobResult, Moments, Status};
-use osteon_common::statistics::{self, Verdict};
+use osteon_common::statistics::{self, Verdict, likelihood_cost, likelihood_error};
 use thiserror::Error;
 
 use crate::ask::{Ask, Stop};
@@ -100,7 +101,7 @@ impl Search {
             (JobKind::Identification, Some(data)) => {
                 let data = data_moments(data);
                 Plan::Identification {
-                    method: Method::new(&specification.search, space, data),
+                    method: Method::new(&specification, space, data),
                     data,
                 }
             }
@@ -175,7 +176,14 @@ impl Search {
         let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
         let cost = match &mut self.plan {
             Plan::Identification { method, data } => {
-                let cost = verdict.cost(*data);
+                let cost = match (self.specification.objective, &self.specification.data) {
+                    (Objective::Likelihood, Some(Data::Velocities(measured))) => {
+                        let monte_carlo = &self.specification.monte_carlo;
+                        let outcomes = &outcomes;
+                        likelihood_cost(&verdict, monte_carlo, &point, outcomes, measured)
+                    }
+                    _ => verdict.cost(*data),
+                };
                 method.tell(cost, verdict.moments);
                 Some(cost)
             }
@@ -305,6 +313,14 @@ impl Search {
                     variation has no logarithm; raise [monte_carlo] realizations"
                 .to_owned();
         }
+        // Without a law a point has no likelihood, whether or not realizations failed.
+        if self.specification.objective == Objective::Likelihood
+            && self.history.first().is_some_and(|row| row.failures.total() == 0)
+        {
+            return "every velocity of the first point is the same: they have no law; raise \
+                    [monte_carlo] realizations"
+                .to_owned();
+        }
         match self.history.first() {
             None => "no feasible point: every point tried is inadmissible; \
                      change the starts or the bounds of [parameters]"
@@ -348,18 +364,12 @@ impl Summary {
         outcomes: Option<&[Outcome]>,
     ) -> JobResult {
         let row = self.history.iter().find(|row| Some(row.number) == self.best);
+        let best = row.zip(outcomes);
         JobResult {
             status: ending.status,
             reason: ending.reason.clone(),
             digest: self.digest.clone(),
-            best: row.zip(outcomes).map(|(row, outcomes)| BestPoint {
-                point: row.point,
-                cost: row.cost,
-                velocity: statistics::estimate(&specification.monte_carlo, &row.point, outcomes),
-                failures: row.failures,
-                estimated_error: row.estimated_error,
-                outcomes: outcomes.to_vec(),
-            }),
+            best: best.map(|(row, outcomes)| best_point(specification, row, outcomes)),
             data: match (specification.kind, &specification.data) {
                 (JobKind::Identification, Some(data)) => Some(data_moments(data)),
                 (JobKind::Propagation | JobKind::Identification, _) => None,
@@ -374,6 +384,34 @@ impl Summary {
             picking: specification.setup.picking,
             version: version.to_owned(),
         }
+    }
+}
+
+/// The evaluation `row` as a best point, given its outcomes.
+fn best_point(
+    specification: &JobSpecification,
+    row: &Evaluation,
+    outcomes: &[Outcome],
+) -> BestPoint {
+    let JobSpecification { monte_carlo, objective, .. } = specification;
+    let measured = match &specification.data {
+        Some(Data::Velocities(measured)) => Some(measured),
+        Some(Data::Moments { .. }) | None => None,
+    };
+    let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
+    BestPoint {
+        point: row.point,
+        cost: row.cost,
+        cost_error: by_likelihood.and_then(|measured| {
+            likelihood_error(monte_carlo, &row.point, outcomes, measured)
+        }),
+        velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
+        failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
+        kolmogorov: measured
+            .and_then(|measured| kolmogorov_test(measured, outcomes, monte_carlo.sampling)),
+        failures: row.failures,
+        estimated_error: row.estimated_error,
+        outcomes: outcomes.to_vec(),
     }
 }
 

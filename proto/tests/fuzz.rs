@@ -135,6 +135,9 @@ fn result() -> v1::JobResult {
             velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
             failures: row.failures,
             estimated_error: row.estimated_error,
+            cost_error: Some(1e-3),
+            failure_bias: Some(v1::Moments { mean: -1.0, coefficient_of_variation: 1e-3 }),
+            kolmogorov: Some(v1::KolmogorovTest { distance: 0.1, p_value: 0.3 }),
         }),
         data: moments,
         evaluations: 3,
@@ -180,9 +183,9 @@ fn check_result(message: &v1::JobResult) {
     let again = results::from_message(&written, outcomes()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    let JobSpecification { setup, search, .. } = jobs()[0].clone();
-    let identification = results_json::identification(&result, &setup, &search);
-    for text in [identification, results_json::propagation(&result, &setup)] {
+    let job = jobs()[0].clone();
+    let identification = results_json::identification(&result, &job);
+    for text in [identification, results_json::propagation(&result, &job.setup)] {
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
 }

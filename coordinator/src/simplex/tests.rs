@@ -6,7 +6,7 @@ use super::*;
 
 const SETTINGS: Settings = Settings {
     max_evaluations: 2000,
-    cost_tolerance: 1e-10,
+    costs: Costs::Squares { tolerance: 1e-10 },
     size_tolerance: 1e-5,
     initial_step: 0.15,
 };
