@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use osteon_common::digest::PathDigest;
 use osteon_common::data_statistics::kolmogorov_test;
+use osteon_common::digest::PathDigest;
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective, SearchMethod};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
@@ -100,10 +100,7 @@ impl Search {
         let plan = match (specification.kind, &specification.data) {
             (JobKind::Identification, Some(data)) => {
                 let data = data_moments(data);
-                Plan::Identification {
-                    method: Method::new(&specification, space, data),
-                    data,
-                }
+                Plan::Identification { method: Method::new(&specification, space, data), data }
             }
             // An identification without data has not passed the check.
             (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
@@ -402,9 +399,8 @@ fn best_point(
     BestPoint {
         point: row.point,
         cost: row.cost,
-        cost_error: by_likelihood.and_then(|measured| {
-            likelihood_error(monte_carlo, &row.point, outcomes, measured)
-        }),
+        cost_error: by_likelihood
+            .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
         velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
         failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
         kolmogorov: measured

@@ -70,12 +70,8 @@ impl Parabola {
         if deviation.is_nan() || deviation <= 0.0 {
             return None;
         }
-        let mut fit = Self {
-            speed: (mean, deviation),
-            skewness: 0.0,
-            coefficients: [0.0; 3],
-            residual: 0.0,
-        };
+        let mut fit =
+            Self { speed: (mean, deviation), skewness: 0.0, coefficients: [0.0; 3], residual: 0.0 };
         fit.skewness = average(pairs().map(|(_, speed)| {
             let t = (speed - mean) / deviation;
             t * t * t
@@ -115,7 +111,8 @@ impl Parabola {
             })
         };
         let mean = average(all().map(|(velocity, _)| velocity));
-        let square = |(velocity, scatter): (f64, f64)| (velocity - mean).mul_add(velocity - mean, scatter);
+        let square =
+            |(velocity, scatter): (f64, f64)| (velocity - mean).mul_add(velocity - mean, scatter);
         let variance = average(all().map(square));
         Moments { mean, coefficient_of_variation: variance.sqrt() / mean }
     }
@@ -129,4 +126,54 @@ fn average(values: impl Iterator<Item = f64>) -> f64 {
         count += 1;
     }
     sum.total() / count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::FailureKind;
+    use crate::statistics::moments;
+
+    const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+
+    /// Velocities that are a parabola of the speed, those of a speed below `least` failed.
+    fn outcomes(count: u64, least: f64) -> (Vec<f64>, Vec<Outcome>) {
+        let ensemble = Ensemble::drawn(&POINT, MonteCarlo::default().germs()).unwrap();
+        let velocity = |speed: f64| 100.0 + 0.9 * speed + 1e-5 * speed * speed;
+        let speeds: Vec<f64> = ensemble.longitudinal_speeds(count).collect();
+        let outcome = |&speed: &f64| {
+            if speed < least { Err(FailureKind::NoArrival) } else { Ok(velocity(speed)) }
+        };
+        let outcomes = speeds.iter().map(outcome).collect();
+        (speeds.into_iter().map(velocity).collect(), outcomes)
+    }
+
+    #[test]
+    fn what_the_speed_explains_comes_back() {
+        let (all, outcomes) = outcomes(300, 3500.0);
+        let failed = outcomes.iter().filter(|outcome| outcome.is_err()).count();
+        assert!((5..60).contains(&failed), "{failed}");
+        let successes: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.ok()).collect();
+        let bias = failure_bias(&MonteCarlo::default(), &POINT, &outcomes).unwrap();
+        let (all, found) = (moments(&all).unwrap(), moments(&successes).unwrap());
+        let mean = all.mean - found.mean;
+        let variation = all.coefficient_of_variation - found.coefficient_of_variation;
+        assert!((bias.mean - mean).abs() < 1e-9 * all.mean, "{bias:?}, {mean}");
+        assert!((bias.coefficient_of_variation - variation).abs() < 1e-10, "{bias:?}, {variation}");
+        assert!(mean < -10.0 && variation > 1e-3, "{mean} {variation}");
+    }
+
+    #[test]
+    fn without_failures_there_is_no_bias_and_with_few_successes_it_is_not_known() {
+        let of = |outcomes: &[Outcome]| failure_bias(&MonteCarlo::default(), &POINT, outcomes);
+        let none = Some(Moments { mean: 0.0, coefficient_of_variation: 0.0 });
+        let (_, mut outcomes) = outcomes(11, 0.0);
+        assert_eq!(of(&outcomes), none);
+        assert_eq!(of(&outcomes[..1]), none);
+        outcomes[3] = Err(FailureKind::NotFinite);
+        assert!(of(&outcomes).is_some_and(|bias| bias.mean.abs() > 0.0));
+        assert_eq!(of(&outcomes[..10]), None);
+        assert_eq!(of(&[Err(FailureKind::NoArrival); 20]), None);
+        assert_eq!(of(&[]), None);
+    }
 }

@@ -39,7 +39,10 @@ impl KernelDensity {
     }
 
     /// Σ w_j K(x_j - y) as a function of y for pairs (x_j, w_j), K the kernel with integral 1.
-    pub(super) fn reversed(&self, weighted: impl Iterator<Item = (f64, f64)>) -> impl Fn(f64) -> f64 {
+    pub(super) fn reversed(
+        &self,
+        weighted: impl Iterator<Item = (f64, f64)>,
+    ) -> impl Fn(f64) -> f64 {
         let step = self.grid.step;
         let smoothed = self.grid.smoothed(weighted.map(|(place, weight)| (place, weight / step)));
         let grid = self.grid;
@@ -157,7 +160,8 @@ mod tests {
         for width in [0.05, 0.3, 2.0] {
             let density = KernelDensity::of(&values, width);
             let exact = |x: f64| {
-                values.iter().map(|value| normal(x - value, width)).sum::<f64>() / values.len() as f64
+                values.iter().map(|value| normal(x - value, width)).sum::<f64>()
+                    / values.len() as f64
             };
             for k in -200..1000 {
                 let x = 0.01 * f64::from(k);

@@ -220,8 +220,7 @@ impl<'a> Law<'a> {
             let score = self.score(velocity);
             let parts = self.parts(score);
             let weight = 1.0 / (count * parts.density());
-            for (gradient, (value, slope)) in
-                gradients.iter_mut().zip([parts.kernels, parts.floor])
+            for (gradient, (value, slope)) in gradients.iter_mut().zip([parts.kernels, parts.floor])
             {
                 gradient.mean.add(weight * slope / self.deviation);
                 gradient.deviation.add(weight * score.mul_add(slope, value));

@@ -259,3 +259,16 @@ proptest! {
         prop_assert!(simplex.evaluations() <= 250);
     }
 }
+
+/// Costs of any sign, none of which is low enough to stop, down to differences that count as equal.
+#[test]
+fn logarithms_are_minimised_by_their_differences() {
+    let costs = Costs::Logarithms { equal: 1e-9 };
+    for offset in [-1000.0, 0.0, 1000.0] {
+        let settings = Settings { costs, ..SETTINGS };
+        let found = minimise(&[0.8, 0.9], settings, |at| sphere(at) + offset);
+        assert_eq!(found.stop, Stop::Settled, "{offset}");
+        // Of an offset of 1000 rounding leaves differences of 1e-13.
+        assert!(found.at.iter().all(|u| (u - 0.3).abs() < 1e-5), "{offset}: {:?}", found.at);
+    }
+}

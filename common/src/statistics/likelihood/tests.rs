@@ -90,9 +90,8 @@ fn the_maximum_is_unbiased_to_well_under_the_sampling_error() {
             model.iter_mut().for_each(|velocity| *velocity = MEAN + ratio * (*velocity - mean));
             let outcomes = outcomes(&model);
             let [kernels, floor] = law(&outcomes).gradients(&measured);
-            let slope = |mean, deviation| {
-                kernels.along(mean, deviation) + floor.along(mean, deviation)
-            };
+            let slope =
+                |mean, deviation| kernels.along(mean, deviation) + floor.along(mean, deviation);
             found[0].push(-slope(DEVIATION, 0.0));
             found[1].push(-0.5 * slope(0.0, 1.0));
         }
