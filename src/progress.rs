@@ -202,6 +202,14 @@ mod tests {
     }
 
     #[test]
+    fn a_likelihoods_cost_has_the_digits_that_change() {
+        for (cost, expected) in [(6.071647123, "best cost 6.071647,"), (-2.5, "best cost -2.500000,")] {
+            let line = describe(&JobSnapshot { best_cost: Some(cost), ..snapshot() });
+            assert!(line.contains(expected), "{line}");
+        }
+    }
+
+    #[test]
     fn what_is_not_known_is_not_said() {
         let begun = JobSnapshot {
             evaluations: 0,

@@ -226,7 +226,7 @@ fn exceeded(x: f64) -> f64 {
     }
     let term = |k: usize| {
         let j = (k + 1) as f64;
-        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         sign * libm::exp(-2.0 * j * j * x * x)
     };
     (2.0 * (0..SERIES_TERMS).map(term).sum::<f64>()).clamp(0.0, 1.0)
