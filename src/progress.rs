@@ -203,7 +203,9 @@ mod tests {
 
     #[test]
     fn a_likelihoods_cost_has_the_digits_that_change() {
-        for (cost, expected) in [(6.071647123, "best cost 6.071647,"), (-2.5, "best cost -2.500000,")] {
+        for (cost, expected) in
+            [(6.071647123, "best cost 6.071647,"), (-2.5, "best cost -2.500000,")]
+        {
             let line = describe(&JobSnapshot { best_cost: Some(cost), ..snapshot() });
             assert!(line.contains(expected), "{line}");
         }
