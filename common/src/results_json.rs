@@ -7,13 +7,14 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::data_statistics::{CONFIDENCE, Interval, moment_intervals};
 use crate::job::{Data, JobSpecification, Objective, SearchMethod};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::results::{BestPoint, Estimate, EstimatedError, JobResult, Moments};
+use crate::results::{Estimate, EstimatedError, JobResult, Moments};
 use crate::sampling;
 use crate::settings::Method;
+
+mod measured;
 
 /// Why a text is no `result.json` with a best point.
 #[derive(Debug, Error)]
@@ -55,8 +56,12 @@ pub fn identification(result: &JobResult, specification: &JobSpecification) -> S
     let parameters = mean_model.map(|name| (name.name().to_owned(), of_point(name)));
     put("parameters", Value::Object(parameters.collect()));
     put("dispersion", of_point(Parameter::Dispersion));
-    put("velocity", velocity(best));
-    put("data", data(result, specification));
+    put("velocity", measured::model(best));
+    let velocities = match &specification.data {
+        Some(Data::Velocities(velocities)) => Some(velocities.as_slice()),
+        Some(Data::Moments { .. }) | None => None,
+    };
+    put("data", measured::data(result.data, velocities, best));
     put("evaluations", json!(result.evaluations));
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
@@ -78,7 +83,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     put("realizations", json!(result.realizations));
     sampling(&mut put, result);
     put("failures", failures(best.map(|best| best.failures)));
-    put("velocity", velocity(best));
+    put("velocity", measured::model(best));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("digest", json!(result.digest));
     text(object)
@@ -185,34 +190,6 @@ fn moments(moments: Option<Moments>) -> Value {
         "mean": moments.map(|moments| moments.mean),
         "coefficient_of_variation": moments.map(|moments| moments.coefficient_of_variation),
     })
-}
-
-/// Moments at the best point, and what failures may have done to them.
-fn velocity(best: Option<&BestPoint>) -> Value {
-    let mut value = estimate(best.and_then(|best| best.velocity));
-    value["failure_bias"] = moments(best.and_then(|best| best.failure_bias));
-    value
-}
-
-/// Moments of the data, and where velocities are known what they say of themselves and of the model.
-fn data(result: &JobResult, specification: &JobSpecification) -> Value {
-    let mut value = moments(result.data);
-    if let Some(Data::Velocities(velocities)) = &specification.data {
-        let intervals = moment_intervals(velocities);
-        let ends = |interval: Interval| json!([interval.low, interval.high]);
-        let interval = intervals.map(|found| {
-            json!({
-                "mean": ends(found.mean),
-                "coefficient_of_variation": ends(found.coefficient_of_variation),
-                "level": CONFIDENCE,
-            })
-        });
-        value["interval"] = json!(interval);
-        let test = result.best.as_ref().and_then(|best| best.kolmogorov);
-        let test = test.map(|test| json!({"distance": test.distance, "p_value": test.p_value}));
-        value["kolmogorov"] = json!(test);
-    }
-    value
 }
 
 fn estimate(estimate: Option<Estimate>) -> Value {
