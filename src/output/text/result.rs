@@ -156,7 +156,8 @@ fn failure_bias(value: &Value) -> String {
         format!("{}{}", if number < 0.0 { "-" } else { "+" }, significant(number.abs(), digits))
     };
     format!(
-        "with velocities as expected of their tensors the failed realizations would add {} m/s to the mean\n         and {} to the coefficient of variation\n",
+        "with velocities as expected of their tensors the failed realizations would add {} m/s to the mean\n\
+         and {} to the coefficient of variation\n",
         signed(mean, 2),
         signed(variation, 2)
     )
