@@ -11,7 +11,7 @@ use osteon_common::statistics::{failure_bias, moments};
 use osteon_solver::{Solver, Workspace};
 
 const MONTE_CARLO: MonteCarlo = MonteCarlo {
-    realizations: 600,
+    realizations: 2000,
     seed: 1,
     sampling: Sampling::MonteCarlo,
     scrambles: 1,
