@@ -11,7 +11,7 @@ use osteon_common::statistics::{failure_bias, moments};
 use osteon_solver::{Solver, Workspace};
 
 const MONTE_CARLO: MonteCarlo = MonteCarlo {
-    realizations: 2000,
+    realizations: 1000,
     seed: 1,
     sampling: Sampling::MonteCarlo,
     scrambles: 1,
@@ -55,18 +55,20 @@ fn difference(a: Moments, b: Moments) -> [f64; 2] {
 /// fail by themselves: there the bias of all failures, less that of these, is compared.
 #[test]
 fn the_bias_of_failures_is_what_the_slowest_draws_make() {
-    for (dispersion, part) in [(0.1029, 0.03), (0.3, 0.005), (0.3, 0.03), (0.3, 0.1), (0.6, 0.03)] {
+    for (dispersion, parts) in [(0.1029, &[0.03][..]), (0.3, &[0.03, 0.1]), (0.6, &[0.03])] {
         let point = at(dispersion);
         let all = outcomes(&point);
-        let cut = without_slowest(&all, part);
-        let [whole, rest] = [&all, &cut].map(|outcomes| moments(&velocities(outcomes)).unwrap());
-        let truth = difference(whole, rest);
-        let [before, after] =
-            [&all, &cut].map(|outcomes| failure_bias(&MONTE_CARLO, &point, outcomes).unwrap());
-        let found = difference(after, before);
-        for (found, truth) in found.into_iter().zip(truth) {
-            let off = (found / truth - 1.0).abs();
-            assert!(off < 0.1, "{dispersion}, {part}: {found}, in truth {truth}");
+        let before = failure_bias(&MONTE_CARLO, &point, &all).unwrap();
+        for &part in parts {
+            let cut = without_slowest(&all, part);
+            let after = failure_bias(&MONTE_CARLO, &point, &cut).unwrap();
+            let [whole, rest] =
+                [&all, &cut].map(|outcomes| moments(&velocities(outcomes)).unwrap());
+            let truth = difference(whole, rest);
+            for (found, truth) in difference(after, before).into_iter().zip(truth) {
+                let off = (found / truth - 1.0).abs();
+                assert!(off < 0.1, "{dispersion}, {part}: {found}, in truth {truth}");
+            }
         }
         let failed = all.iter().any(Result::is_err);
         assert_eq!(failed, dispersion == 0.6);
