@@ -122,7 +122,9 @@ pub(crate) fn describe(snapshot: &JobSnapshot) -> String {
         parts.push(format!("waiting: {}", snapshot.waiting_for));
     }
     if let Some(cost) = snapshot.best_cost.filter(|cost| cost.is_finite()) {
-        parts.push(format!("best cost {cost:.2e}"));
+        // Logarithms of likelihoods differ in their last digits.
+        let digits = if cost.abs() < 1.0 { format!("{cost:.2e}") } else { format!("{cost:.6}") };
+        parts.push(format!("best cost {digits}"));
     }
     if running {
         parts.push(format!("{:.0} realizations/s", snapshot.realizations_per_second));
@@ -197,6 +199,16 @@ mod tests {
             "evaluation 42 of at most 400, best cost 1.25e-5, 1000 realizations/s, 1.0 s to 16 min left, \
              3906.3 m/s, CV 0.02708, 1747/2747 realizations"
         );
+    }
+
+    #[test]
+    fn a_likelihoods_cost_has_the_digits_that_change() {
+        for (cost, expected) in
+            [(6.071647123, "best cost 6.071647,"), (-2.5, "best cost -2.500000,")]
+        {
+            let line = describe(&JobSnapshot { best_cost: Some(cost), ..snapshot() });
+            assert!(line.contains(expected), "{line}");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ mod solutions;
 mod tests;
 
 use crate::bulk_velocity::bulk_velocity;
-use crate::job::{JobSpecification, Range};
+use crate::job::{JobSpecification, Objective, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, Moments};
 
@@ -129,7 +129,8 @@ fn is_matched(
         let difference = libm::log(model / data);
         difference * difference <= 9.0 * noise.covariance()[axis][axis]
     };
-    best.cost.is_some_and(|cost| cost <= specification.search.cost_tolerance)
+    let by_moments = specification.objective == Objective::Moments;
+    best.cost.is_some_and(|cost| by_moments && cost <= specification.search.cost_tolerance)
         || (within(model.mean, data.mean, 0)
             && within(model.coefficient_of_variation, data.coefficient_of_variation, 1))
 }

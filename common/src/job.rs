@@ -179,16 +179,19 @@ pub enum Objective {
     /// The paper's cost: relative squared errors of mean and coefficient of variation.
     #[default]
     Moments,
+    /// Minus the mean log likelihood of the measured velocities under the law of the model's.
+    Likelihood,
 }
 
 impl Objective {
     /// Every objective, in the order of a user's file.
-    pub const ALL: [Self; 1] = [Self::Moments];
+    pub const ALL: [Self; 2] = [Self::Moments, Self::Likelihood];
 
     /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Moments => "moments",
+            Self::Likelihood => "likelihood",
         }
     }
 }
@@ -223,7 +226,8 @@ pub struct Search {
     pub method: SearchMethod,
     /// Most evaluations (points whose realizations are run).
     pub max_evaluations: u64,
-    /// The search ends when the best cost is at most this.
+    /// The search ends when the best cost is at most this; of no use to a likelihood, whose least cost
+    /// nobody knows beforehand.
     pub cost_tolerance: f64,
     /// The search ends when the simplex, or a step without gain, is at most this large, as a
     /// fraction of the box.

@@ -12,6 +12,7 @@ pub mod bulk_velocity;
 pub mod case;
 pub mod case_file;
 pub mod check;
+pub mod data_statistics;
 pub mod digest;
 pub mod document;
 pub mod elasticity;

@@ -1,5 +1,6 @@
 //! What a job leaves: the result and the history of its evaluations.
 
+use crate::data_statistics::KolmogorovTest;
 use crate::job::Sampling;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
@@ -164,8 +165,16 @@ pub struct BestPoint {
     pub point: Point,
     /// Its cost; `None` for a propagation.
     pub cost: Option<f64>,
+    /// Standard error of a likelihood's cost; `None` of other costs.
+    pub cost_error: Option<f64>,
     /// Its moments with standard errors, unless every realization failed.
     pub velocity: Option<Estimate>,
+    /// What the failed realizations would change the moments by, had they the velocities that are
+    /// expected of their tensors; `None` where that cannot be known.
+    pub failure_bias: Option<Moments>,
+    /// Whether the measured velocities can be of the model's law; `None` where only moments were measured,
+    /// and for a propagation.
+    pub kolmogorov: Option<KolmogorovTest>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
     /// Estimated errors of the successes, unless there are none, or they are not known.

@@ -17,6 +17,7 @@ use crate::settings::Method;
 use self::found::Asked;
 
 mod found;
+mod measured;
 
 /// Why a text is no `result.json` with a best point.
 #[derive(Debug, Error)]
@@ -51,8 +52,12 @@ pub fn identification(
         put("reason", json!(reason));
     }
     put("digest", json!(result.digest));
-    found::point(&mut put, best);
-    put("data", moments(result.data));
+    put("objective", json!(specification.objective.name()));
+    found::point(&mut put, specification, best);
+    if result.groups.is_empty() {
+        let velocities = specification.data.as_ref().and_then(|data| data.velocities(0));
+        put("data", measured::data(result.data, velocities, best));
+    }
     put("evaluations", json!(result.evaluations));
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
@@ -81,7 +86,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     put("realizations", json!(result.realizations));
     sampling(&mut put, result);
     put("failures", failures(best.map(|best| best.failures)));
-    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("velocity", measured::model(best));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
     put("digest", json!(result.digest));
     text(object)

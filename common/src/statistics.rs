@@ -7,6 +7,9 @@
 mod blocks;
 mod central;
 mod controlled;
+mod failure_bias;
+mod kernel_density;
+mod likelihood;
 mod sum;
 
 use crate::job::{MonteCarlo, Sampling};
@@ -17,7 +20,10 @@ use crate::results::{Estimate, Moments};
 use self::blocks::Doubled;
 use self::central::{Central, central};
 use self::controlled::Controlled;
-use self::sum::Sum;
+
+pub use self::failure_bias::failure_bias;
+pub use self::likelihood::{likelihood_cost, likelihood_error};
+pub(crate) use self::sum::Sum;
 
 /// Mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no velocity.
 ///
@@ -138,18 +144,24 @@ impl<'a> Sample<'a> {
             (_, None) if !self.central.scatters() => self.central.standard_error(),
             (Sampling::MonteCarlo, None) => self.central.standard_error(),
             (Sampling::MonteCarlo, Some(controlled)) => controlled.standard_error(),
-            (Sampling::Sobol, None) => {
-                let influence = |outcome: &Outcome| match outcome {
-                    Ok(velocity) => self.central.influence(*velocity),
-                    Err(_) => [0.0; 2],
-                };
-                let influences = self.outcomes.iter().map(influence);
-                blocks::standard_error(influences, Doubled::PLAIN, monte_carlo, successes)
+            (Sampling::Sobol, controlled) => {
+                let doubled =
+                    if controlled.is_some() { Doubled::CONTROLLED } else { Doubled::PLAIN };
+                blocks::standard_error(self.influences(), doubled, monte_carlo, successes)
             }
-            (Sampling::Sobol, Some(controlled)) => {
-                let influences = controlled.influences();
-                blocks::standard_error(influences, Doubled::CONTROLLED, monte_carlo, successes)
-            }
+        }
+    }
+
+    /// What each realization adds to N times mean and coefficient of variation, to first order, in
+    /// index order; nothing where it failed.
+    fn influences(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
+        let influence = |outcome: &Outcome| match outcome {
+            Ok(velocity) => self.central.influence(*velocity),
+            Err(_) => [0.0; 2],
+        };
+        match &self.controlled {
+            Some(controlled) => Box::new(controlled.influences()),
+            None => Box::new(self.outcomes.iter().map(influence)),
         }
     }
 }

@@ -149,7 +149,17 @@ fn run() {
             (SAMPLING, "control_variate = \"yes\""),
             (SAMPLING, "control_variates = true"),
             ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
+            ("kind = \"moments\"", "kind = \"entropy\""),
             ("kind = \"moments\"", "kind = \"likelihood\""),
+            (
+                "kind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
+                "kind = \"likelihood\"\n\n[search]\nmethod = \"newton\"",
+            ),
+            (
+                "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4\n\
+                 control_variate = true\nmax_failed_fraction = 0.02\n\n[objective]\nkind = \"moments\"",
+                "realizations = 1\nseed = 7\nmax_failed_fraction = 0.02\n\n[objective]\nkind = \"likelihood\"",
+            ),
             ("method = \"simplex\"", "method = \"annealing\""),
             (
                 "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4\n\
@@ -203,6 +213,22 @@ fn data() {
             (given, "velocities = \"v.csv\"\ngroup = 3"),
         ],
     );
+}
+
+#[test]
+fn a_likelihood_needs_the_velocities_themselves() {
+    let moments = edited(
+        "velocities = [3900.5, 4000, 3950.25]",
+        "mean = 3900.0\ncoefficient_of_variation = 0.03",
+    );
+    let text = moments.replace("kind = \"moments\"", "kind = \"likelihood\"");
+    let refused = refusal(&text, JobKind::Identification);
+    assert!(refused.contains("objective.kind"), "{refused}");
+    for key in ["data.velocities", "data.mean", "data.coefficient_of_variation"] {
+        assert!(refused.contains(key), "{refused}");
+    }
+    assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");
+    assert_eq!(refusal(&moments, JobKind::Identification), "ACCEPTED");
 }
 
 #[test]

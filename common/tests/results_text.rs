@@ -3,8 +3,11 @@
 use std::path::Path;
 
 use osteon_common::case::Setup;
+use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
-use osteon_common::job::{Data, Group, JobKind, JobSpecification, Sampling, Search, SearchMethod};
+use osteon_common::job::{
+    Data, Group, JobKind, JobSpecification, Objective, Sampling, Search, SearchMethod,
+};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
@@ -31,11 +34,14 @@ fn result() -> JobResult {
         best: Some(BestPoint {
             point: POINT,
             cost: Some(4.5e-11),
+            cost_error: None,
             velocity: Some(Estimate {
                 moments: moments(3906.27, 0.027083),
                 standard_error: moments(2.0, 3.6e-4),
                 controlled: true,
             }),
+            failure_bias: Some(moments(-12.5, 2.5e-4)),
+            kolmogorov: Some(KolmogorovTest { distance: 0.25, p_value: 0.75 }),
             failures: FailureCounts::of(&outcomes()),
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
             outcomes: outcomes(),
@@ -120,6 +126,27 @@ fn the_result_says_how_it_was_searched_and_what_its_point_is() {
     check(SearchMethod::Newton, 2e-11, "the one with the least cost");
     check(SearchMethod::Simplex, 1e-12, "that match the data, the one where the simplex ended");
     check(SearchMethod::Simplex, 2e-11, "the one with the least cost");
+}
+
+#[test]
+fn a_likelihood_has_an_error_and_no_tolerance() {
+    let mut result = result();
+    let best = result.best.as_mut().unwrap();
+    (best.cost, best.cost_error) = (Some(6.0625), Some(0.0025));
+    let job = JobSpecification {
+        objective: Objective::Likelihood,
+        data: Some(Data::Velocities(vec![3900.0, 3950.0, 3925.5])),
+        ..specification()
+    };
+    check("result_likelihood", &results_json::identification(&result, &job, &[]));
+    // Moments of measured velocities are searched with their tolerance, and the velocities are tested too.
+    let job = JobSpecification { objective: Objective::Moments, ..job };
+    let text = results_json::identification(&result, &job, &[]);
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(value.get("cost_standard_error").is_none());
+    assert_eq!(value["search"]["cost_tolerance"], 1e-10);
+    assert_eq!(value["data"]["kolmogorov"]["p_value"], 0.75);
+    assert_eq!(value["data"]["interval"]["level"], 0.95);
 }
 
 #[test]

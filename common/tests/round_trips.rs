@@ -9,7 +9,8 @@ use osteon_common::document::Format;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::file_error::ContentError;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
@@ -169,16 +170,20 @@ fn job() -> impl Strategy<Value = JobSpecification> {
         range(0.2, 0.5),
         range(0.02, 0.3),
     );
-    (any::<bool>(), setup(), data(), parameters, monte_carlo(), search()).prop_map(
-        |(identification, setup, data, parameters, monte_carlo, search)| {
+    let objective = prop::sample::select(Objective::ALL.to_vec());
+    (any::<bool>(), setup(), data(), parameters, monte_carlo(), search(), objective).prop_map(
+        |(identification, setup, data, parameters, monte_carlo, search, objective)| {
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
+            let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
+            let searched = has_law && search.method == SearchMethod::Simplex;
+            let objective = if searched { objective } else { Objective::Moments };
             JobSpecification {
                 kind: KINDS[usize::from(!identification)],
                 setup,
                 data: identification.then_some(data),
                 parameters: [rho, e_l, nu_l, g_l, e_t, nu_t, delta],
                 monte_carlo,
-                objective: Default::default(),
+                objective,
                 search,
             }
         },

@@ -6,15 +6,16 @@
 
 use std::sync::Arc;
 
+use osteon_common::data_statistics::kolmogorov_test;
 use osteon_common::digest::PathDigest;
-use osteon_common::job::{Data, JobKind, JobSpecification};
+use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments,
-    Role, Status,
+    BestPoint, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments, Role,
+    Status,
 };
-use osteon_common::statistics::{self, Verdict};
+use osteon_common::statistics::{self, Verdict, likelihood_error};
 use thiserror::Error;
 
 use self::identification::Identification;
@@ -260,12 +261,19 @@ impl Summary {
         outcomes: &[Outcome],
     ) -> Option<BestPoint> {
         let row = self.history.iter().find(|row| row.number == number)?;
-        let velocity: Option<Estimate> =
-            statistics::estimate(&specification.monte_carlo, &row.point, outcomes);
+        let JobSpecification { monte_carlo, objective, .. } = specification;
+        let data = specification.data.as_ref();
+        let measured = data.and_then(|data| data.velocities(row.role.group as usize));
+        let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
         Some(BestPoint {
             point: row.point,
             cost: row.cost,
-            velocity,
+            cost_error: by_likelihood
+                .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
+            velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
+            failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
+            kolmogorov: measured
+                .and_then(|measured| kolmogorov_test(measured, outcomes, monte_carlo.sampling)),
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),

@@ -10,13 +10,14 @@
 //!
 //! # When it stops
 //!
-//! - The best cost is at most `cost_tolerance`: [`Stop::CostReached`].
+//! - The best cost is at most the tolerance, where there is one: [`Stop::CostReached`].
 //! - The simplex has collapsed: its largest extent is at most `size_tolerance` and its costs
-//!   differ by at most `cost_tolerance` plus a thousandth of the best cost, or, whatever the
-//!   costs, the extent is at most a thousandth of `size_tolerance`. A collapse is no proof of a
-//!   minimum: a simplex can flatten against a bound. So the search begins again at the best point
-//!   with a fresh simplex, and only a restart that lowers the best cost by less than a thousandth
-//!   ends it: [`Stop::Settled`]. Restarts are bounded: [`Stop::RestartsUsedUp`].
+//!   differ by at most the tolerance plus a thousandth of the best cost (logarithms: by at most what
+//!   counts as equal), or, whatever the costs, the extent is at most a thousandth of
+//!   `size_tolerance`. A collapse is no proof of a minimum: a simplex can flatten against a bound. So
+//!   the search begins again at the best point with a fresh simplex, and only a restart that lowers
+//!   the best cost by less than a thousandth (logarithms: as above) ends it: [`Stop::Settled`].
+//!   Restarts are bounded: [`Stop::RestartsUsedUp`].
 //! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
 //! - No vertex of the first simplex is feasible: [`Stop::Infeasible`].
 
@@ -27,19 +28,57 @@ mod tests;
 
 /// Restarts after a collapse, at most.
 pub const RESTARTS_MAX: u32 = 10;
-/// A restart must lower the best cost by this fraction to count as progress; costs of a simplex
-/// that differ by less than this fraction of the best are equal.
+/// A restart must lower a cost of squares by this fraction to count as progress; such costs of a
+/// simplex that differ by less than this fraction of the best are equal.
 const PROGRESS: f64 = 1e-3;
 /// The smallest extent that rounding lets a simplex in the unit box have.
 const EXTENT_MIN: f64 = 1e-14;
+
+/// What costs are, and how they compare.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Costs {
+    /// Sums of squares, at least 0, that compare by their ratio.
+    Squares {
+        /// Stop when the best cost is at most this.
+        tolerance: f64,
+    },
+    /// Of any sign, without a value to be reached, that compare by their difference.
+    Logarithms {
+        /// Costs that differ by at most this are equal.
+        equal: f64,
+    },
+}
+
+impl Costs {
+    /// Whether a cost is as low as can be asked for.
+    fn reached(self, cost: f64) -> bool {
+        matches!(self, Self::Squares { tolerance } if cost <= tolerance)
+    }
+
+    /// The difference from `cost`, finite, that is progress.
+    fn progress(self, cost: f64) -> f64 {
+        match self {
+            Self::Squares { .. } => PROGRESS * cost.abs(),
+            Self::Logarithms { equal } => equal,
+        }
+    }
+
+    /// The largest difference of costs of a flat simplex around `cost`.
+    fn flat(self, cost: f64) -> f64 {
+        match self {
+            Self::Squares { tolerance } => tolerance + PROGRESS * cost.abs(),
+            Self::Logarithms { equal } => equal,
+        }
+    }
+}
 
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Most points to evaluate.
     pub max_evaluations: u64,
-    /// Stop when the best cost is at most this.
-    pub cost_tolerance: f64,
+    /// What costs are.
+    pub costs: Costs,
     /// The simplex has collapsed when its largest extent is at most this.
     pub size_tolerance: f64,
     /// Edge of a fresh simplex.
@@ -159,7 +198,7 @@ impl Simplex {
 
     /// One step of the algorithm: the pending point has this cost.
     fn take(&mut self, cost: f64) {
-        if cost <= self.settings.cost_tolerance {
+        if self.settings.costs.reached(cost) {
             self.stop = Some(Stop::CostReached);
             return;
         }
@@ -279,10 +318,10 @@ impl Simplex {
 
     fn collapsed(&self) -> bool {
         let extent = self.extent();
-        let Settings { cost_tolerance, size_tolerance, .. } = self.settings;
+        let Settings { costs, size_tolerance, .. } = self.settings;
         let best = self.vertices[0].cost;
         // The worst cost may be infinite, the best is not: no NaN.
-        let flat = self.worst().cost - best <= cost_tolerance + PROGRESS * best.abs();
+        let flat = self.worst().cost - best <= costs.flat(best);
         (extent <= size_tolerance && flat) || extent <= (PROGRESS * size_tolerance).max(EXTENT_MIN)
     }
 
@@ -300,7 +339,8 @@ impl Simplex {
     /// Begins again at the best vertex, if the simplex that collapsed had made progress.
     fn restart(&mut self) {
         let best = self.vertices[0].clone();
-        let progress = best.cost < self.cost_at_restart - PROGRESS * self.cost_at_restart.abs();
+        let before = self.cost_at_restart;
+        let progress = best.cost < before - self.settings.costs.progress(before);
         if self.cost_at_restart.is_finite() && !progress {
             self.stop = Some(Stop::Settled);
         } else if self.restarts == RESTARTS_MAX {

@@ -1,5 +1,6 @@
 //! Results and the history of a job as messages.
 
+use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::job::{JobKind, MonteCarlo, Sampling};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
@@ -84,7 +85,10 @@ fn best_to_message(best: &BestPoint) -> v1::BestPoint {
     v1::BestPoint {
         point: best.point.0.to_vec(),
         cost: best.cost,
+        cost_error: best.cost_error,
         velocity: best.velocity.as_ref().map(estimate_to_message),
+        failure_bias: best.failure_bias.as_ref().map(moments_to_message),
+        kolmogorov: best.kolmogorov.map(test_to_message),
         failures: failures_to_message(&best.failures),
         estimated_error: best.estimated_error.map(errors_to_message),
     }
@@ -216,7 +220,10 @@ fn best_from_message(
     Ok(BestPoint {
         point: batch::point(&message.point)?,
         cost: message.cost,
+        cost_error: message.cost_error,
         velocity,
+        failure_bias: message.failure_bias.as_ref().map(moments_from_message),
+        kolmogorov: message.kolmogorov.as_ref().map(test_from_message),
         failures: failures_from_message(&message.failures)?,
         estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
         outcomes,
@@ -277,6 +284,14 @@ fn estimate_from_message(message: &v1::Estimate) -> Result<Estimate, Malformed> 
         standard_error: moments_from_message(standard_error),
         controlled: message.controlled,
     })
+}
+
+fn test_to_message(test: KolmogorovTest) -> v1::KolmogorovTest {
+    v1::KolmogorovTest { distance: test.distance, p_value: test.p_value }
+}
+
+fn test_from_message(message: &v1::KolmogorovTest) -> KolmogorovTest {
+    KolmogorovTest { distance: message.distance, p_value: message.p_value }
 }
 
 fn errors_to_message(errors: EstimatedError) -> v1::EstimatedError {

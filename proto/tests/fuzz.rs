@@ -135,6 +135,9 @@ fn result() -> v1::JobResult {
         velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
         failures: row.failures,
         estimated_error: row.estimated_error,
+        cost_error: Some(1e-3),
+        failure_bias: Some(v1::Moments { mean: -1.0, coefficient_of_variation: 1e-3 }),
+        kolmogorov: Some(v1::KolmogorovTest { distance: 0.1, p_value: 0.3 }),
     };
     v1::JobResult {
         status: v1::JobStatus::Converged.into(),

@@ -1,5 +1,5 @@
 use osteon_common::document::Format as FileFormat;
-use osteon_common::job::{Search, SearchMethod};
+use osteon_common::job::{Objective, Search, SearchMethod};
 use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::Method;
@@ -109,6 +109,34 @@ fn a_search_for_the_nearest_point_says_so() {
     let text = shown(&settled);
     assert!(text.starts_with("Converged: settled\n"), "{text}");
     assert!(!text.contains(nearest) && text.contains("one of many sets"), "{text}");
+}
+
+/// What measured velocities say, and what failures may have done.
+#[test]
+fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
+    let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
+    let mut specification = specification(JobKind::Identification, &free);
+    specification.objective = Objective::Likelihood;
+    let json = RESULT
+        .replace(
+            "\"cost\": 3.21e-11",
+            r#""objective": "likelihood", "cost": 6.071647, "cost_standard_error": 0.00234"#,
+        )
+        .replace(
+            r#""coefficient_of_variation": 0.000366}"#,
+            r#""coefficient_of_variation": 0.000366},
+               "failure_bias": {"mean": -1.234, "coefficient_of_variation": 0.000321}"#,
+        )
+        .replace(
+            r#""coefficient_of_variation": 0.02711}"#,
+            r#""coefficient_of_variation": 0.02711,
+               "interval": {"mean": [3895.21, 3916.64], "coefficient_of_variation": [0.02512, 0.02934],
+                            "level": 0.95},
+               "kolmogorov": {"distance": 0.0412, "p_value": 0.6543}}"#,
+        );
+    let kind = JobKind::Identification;
+    let result = ShownResult { kind, specification: &specification, json: &json, directory: None };
+    insta::assert_snapshot!(printed(Format::Text, |output| output.result(&result).unwrap()));
 }
 
 #[test]

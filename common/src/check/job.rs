@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use crate::accepted::{Interval, WholeRange};
 use crate::document::{element_path, entry_path};
 use crate::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    SearchMethod,
 };
 use crate::limits;
 use crate::parameters::Parameter;
@@ -63,6 +64,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     search(&specification.search, violations);
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
+    likelihood(specification, violations);
 }
 
 /// The message for an identification without data.
@@ -296,6 +298,40 @@ fn enough_for_the_method(specification: &JobSpecification, violations: &mut Viol
         violations.add(
             "monte_carlo.realizations",
             "is 1; the search \"newton\" needs a coefficient of variation, so at least 2",
+        );
+    }
+}
+
+/// What a likelihood needs of the rest of an identification.
+fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
+    const FIELD: &str = "objective.kind";
+    let asked = specification.kind == JobKind::Identification
+        && specification.objective == Objective::Likelihood;
+    if !asked || known_wrong(FIELD, violations) {
+        return;
+    }
+    if matches!(specification.data, Some(Data::Moments { .. })) && !violations.touches("data") {
+        violations.add(
+            FIELD,
+            "is \"likelihood\", which needs the measured velocities as data.velocities; with data.mean and \
+             data.coefficient_of_variation alone it must be \"moments\"",
+        );
+    }
+    if specification.search.method == SearchMethod::Newton
+        && !known_wrong("search.method", violations)
+    {
+        violations.add(
+            "search.method",
+            "is \"newton\", which solves for the moments; with the objective.kind \"likelihood\" it must be \
+             \"simplex\"",
+        );
+    }
+    if specification.monte_carlo.realizations == 1
+        && !known_wrong("monte_carlo.realizations", violations)
+    {
+        violations.add(
+            "monte_carlo.realizations",
+            "is 1; the objective \"likelihood\" needs the law of velocities that differ, so at least 2",
         );
     }
 }

@@ -71,6 +71,9 @@ fn found(specification: &JobSpecification, errors: [f64; 2]) -> Inference {
         point: OPTIMUM,
         cost: Some(0.0),
         velocity: Some(Estimate { moments, standard_error, controlled: false }),
+        cost_error: None,
+        failure_bias: None,
+        kolmogorov: None,
         failures: FailureCounts::default(),
         estimated_error: None,
         outcomes: Vec::new(),
@@ -183,6 +186,9 @@ fn nothing_is_known_where_the_model_does_not_match() {
         point: OPTIMUM,
         cost: Some(0.6),
         velocity: Some(Estimate { moments, standard_error, controlled: false }),
+        cost_error: None,
+        failure_bias: None,
+        kolmogorov: None,
         failures: FailureCounts::default(),
         estimated_error: None,
         outcomes: Vec::new(),
@@ -242,7 +248,8 @@ fn a_profile_is_the_lowest_cost() {
                 }
             }
             if profile.parameter == Parameter::Dispersion {
-                lowest += (1.0 - value / OPTIMUM.dispersion()).powi(2);
+                let relative = 1.0 - value / OPTIMUM.dispersion();
+                lowest += relative * relative;
             }
             assert!(cost <= lowest + 1e-12, "{:?} {value}: {cost}, {lowest}", profile.parameter);
             assert!(lowest - cost < 2e-3, "{:?} {value}: {cost}, {lowest}", profile.parameter);

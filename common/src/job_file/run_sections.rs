@@ -31,7 +31,7 @@ pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
 /// The objective, with its default where `root` is silent or wrong.
 pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
     let table = reader.table(root, "objective", &["kind"]);
-    let kind = Choice { all: &Objective::ALL, name: Objective::name, reserved: &["likelihood"] };
+    let kind = Choice { all: &Objective::ALL, name: Objective::name, reserved: &[] };
     reader.choice(&table, "kind", &kind).unwrap_or_default()
 }
 

@@ -2,11 +2,11 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{estimate, failures, moments};
+use super::{failures, measured, moments};
 use crate::inference::{
     self, Direction, Inference, LEVEL, Noise, Profile, Quantity, Sensitivity, Solution, Spread,
 };
-use crate::job::{JobSpecification, Search, SearchMethod};
+use crate::job::{JobSpecification, Objective, SearchMethod};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, GroupResult, Moments};
 
@@ -17,12 +17,19 @@ pub(super) struct Asked<'a> {
 }
 
 /// The best point: cost, parameters, dispersion, moments.
-pub(super) fn point(put: &mut impl FnMut(&str, Value) -> Option<Value>, best: Option<&BestPoint>) {
+pub(super) fn point(
+    put: &mut impl FnMut(&str, Value) -> Option<Value>,
+    specification: &JobSpecification,
+    best: Option<&BestPoint>,
+) {
     let point = best.map(|best| best.point);
     put("cost", json!(best.and_then(|best| best.cost)));
+    if specification.objective == Objective::Likelihood {
+        put("cost_standard_error", json!(best.and_then(|best| best.cost_error)));
+    }
     put("parameters", mean_model(point.as_ref()));
     put("dispersion", json!(point.map(|point| point.dispersion())));
-    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    put("velocity", measured::model(best));
 }
 
 /// What was found for a group.
@@ -35,10 +42,10 @@ pub(super) fn group(asked: &Asked<'_>, set: usize, group: &GroupResult) -> Value
     if let Some(reason) = &group.reason {
         put("reason", json!(reason));
     }
-    point(&mut put, best);
-    let mut data = moments(Some(group.data));
-    let data_of = asked.specification.data.as_ref();
-    data["count"] = json!(data_of.and_then(|data| data.velocities(set)).map(<[f64]>::len));
+    point(&mut put, asked.specification, best);
+    let velocities = asked.specification.data.as_ref().and_then(|data| data.velocities(set));
+    let mut data = measured::data(Some(group.data), velocities, best);
+    data["count"] = json!(velocities.map(<[f64]>::len));
     put("data", data);
     put("failures", failures(best.map(|best| best.failures)));
     inference(&mut put, asked, set, best);
@@ -52,7 +59,7 @@ pub(super) fn search(asked: &Asked<'_>, best: Option<&BestPoint>) -> Value {
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("method", json!(search.method.name()));
     put("max_evaluations", json!(search.max_evaluations));
-    put("cost_tolerance", json!(search.cost_tolerance));
+    put("cost_tolerance", json!(tolerance(asked.specification)));
     put("size_tolerance", json!(search.size_tolerance));
     if search.method == SearchMethod::Simplex {
         put("initial_step", json!(search.initial_step));
@@ -60,10 +67,17 @@ pub(super) fn search(asked: &Asked<'_>, best: Option<&BestPoint>) -> Value {
     put("starts", json!(search.starts));
     put("sensitivities", json!(search.sensitivities));
     let cost = best.and_then(|best| best.cost);
-    put("point", json!(cost.map(|cost| meaning(search, cost))));
-    let below = best.and_then(|best| inference::first_below_noise(0, best, asked.history));
+    put("point", json!(cost.map(|cost| meaning(asked.specification, cost))));
+    let below = best.filter(|_| asked.specification.objective == Objective::Moments);
+    let below = below.and_then(|best| inference::first_below_noise(0, best, asked.history));
     put("below_noise_from", json!(below));
     Value::Object(object)
+}
+
+/// The cost that is low enough; a likelihood has none.
+fn tolerance(specification: &JobSpecification) -> Option<f64> {
+    let by_moments = specification.objective == Objective::Moments;
+    by_moments.then_some(specification.search.cost_tolerance)
 }
 
 /// What the data say: derivatives, what is identified, what is not.
@@ -77,7 +91,9 @@ pub(super) fn inference(
     let found = best.and_then(|best| inference::inference(specification, set, best, asked.history));
     put("sensitivities", found.as_ref().map_or(Value::Null, |found| sensitivities(found)));
     put("identified", found.as_ref().map_or(Value::Null, identified));
-    if let (Some(best), Some(data)) = (best, &specification.data)
+    // Those of a likelihood would be another matter.
+    if let (Some(best), Some(data), Objective::Moments) =
+        (best, &specification.data, specification.objective)
         && let Some(velocity) = best.velocity
     {
         let data = data.moments(set);
@@ -90,9 +106,11 @@ pub(super) fn inference(
 }
 
 /// What the best point of a search is, by its cost.
-fn meaning(search: &Search, cost: f64) -> &'static str {
-    match search.method {
-        _ if cost > search.cost_tolerance => "of the points evaluated, the one with the least cost",
+fn meaning(specification: &JobSpecification, cost: f64) -> &'static str {
+    match specification.search.method {
+        _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
+            "of the points evaluated, the one with the least cost"
+        }
         SearchMethod::Simplex => {
             "of the points that match the data, the one where the simplex ended"
         }
@@ -172,7 +190,7 @@ fn profile(profile: &Profile) -> (String, Value) {
 fn solutions(asked: &Asked<'_>, set: usize, best: Option<&BestPoint>) -> Value {
     let solutions = inference::solutions(set, asked.history);
     let cost = best.and_then(|best| best.cost).unwrap_or(f64::INFINITY);
-    let most = asked.specification.search.cost_tolerance.max(cost);
+    let most = tolerance(asked.specification).map_or(cost, |tolerance| tolerance.max(cost));
     let matching: Vec<Point> =
         solutions.iter().filter(|one| one.cost <= most).map(|one| one.point).collect();
     let point = |one: &Solution| {

@@ -1,12 +1,17 @@
 //! The methods of search behind one face.
 
-use osteon_common::job::{Search, SearchMethod};
+use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
 
+use super::NOWHERE;
 use crate::ask::Ask;
 use crate::newton::{self, Newton};
 use crate::search_box::SearchBox;
-use crate::simplex::{self, Simplex};
+use crate::simplex::{self, Costs, Simplex};
+
+/// Log likelihoods of all data together that differ by this are equal: a thousandth of what a standard
+/// error of a parameter makes.
+const EQUAL_LIKELIHOODS: f64 = 5e-4;
 
 /// A method under way.
 #[derive(Debug, Clone)]
@@ -16,14 +21,17 @@ pub(super) enum Method {
 }
 
 impl Method {
-    /// The method that `search` names, at its start.
-    pub(super) fn new(search: &Search, space: SearchBox, data: Moments) -> Self {
-        let Search { max_evaluations, cost_tolerance, size_tolerance, initial_step, .. } = *search;
+    /// The method that the specification names, at the start of the box, for set number `set` of the
+    /// data.
+    pub(super) fn new(specification: &JobSpecification, set: usize, space: SearchBox) -> Self {
+        let data = specification.data.as_ref();
+        let search = specification.search;
+        let Search { max_evaluations, cost_tolerance, size_tolerance, initial_step, .. } = search;
         match search.method {
             SearchMethod::Simplex => {
                 let settings = simplex::Settings {
                     max_evaluations,
-                    cost_tolerance,
+                    costs: costs(specification, data.and_then(|data| data.velocities(set))),
                     size_tolerance,
                     initial_step,
                 };
@@ -31,7 +39,8 @@ impl Method {
             }
             SearchMethod::Newton => {
                 let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
-                Self::Newton(Box::new(Newton::new(space, data, settings)))
+                let target = data.map_or(NOWHERE, |data| data.moments(set));
+                Self::Newton(Box::new(Newton::new(space, target, settings)))
             }
         }
     }
@@ -58,5 +67,16 @@ impl Method {
             Self::Simplex(simplex) => simplex.refuse(),
             Self::Newton(newton) => newton.refuse(),
         }
+    }
+}
+
+/// How costs compare. A likelihood has no value that is low enough, and differences of its logarithm,
+/// which is an average over the data, count by their number.
+fn costs(specification: &JobSpecification, measured: Option<&[f64]>) -> Costs {
+    match (specification.objective, measured) {
+        (Objective::Likelihood, Some(measured)) => {
+            Costs::Logarithms { equal: EQUAL_LIKELIHOODS / measured.len() as f64 }
+        }
+        _ => Costs::Squares { tolerance: specification.search.cost_tolerance },
     }
 }

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use osteon_common::ensemble::Germs;
-use osteon_common::job::{JobSpecification, Range};
+use osteon_common::job::{JobSpecification, Objective, Range};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, GroupEnding, Moments, Role};
-use osteon_common::statistics::Verdict;
+use osteon_common::statistics::{Verdict, likelihood_cost};
 
 use super::method::Method;
 use super::{NOWHERE, reasons};
@@ -58,7 +58,7 @@ impl OneSet {
             data,
             start: 0,
             space,
-            method: Method::new(&specification.search, space, data),
+            method: Method::new(specification, set, space),
             evaluations: 0,
             first: None,
             best: None,
@@ -90,7 +90,15 @@ impl OneSet {
         verdict: Verdict,
         outcomes: Arc<[Outcome]>,
     ) -> Evaluation {
-        let cost = verdict.cost(self.data);
+        let measured = specification.data.as_ref();
+        let measured = measured.and_then(|data| data.velocities(self.set as usize));
+        let cost = match (specification.objective, measured) {
+            (Objective::Likelihood, Some(measured)) => {
+                let monte_carlo = &specification.monte_carlo;
+                likelihood_cost(&verdict, monte_carlo, &row.point, &outcomes, measured)
+            }
+            _ => verdict.cost(self.data),
+        };
         row.cost = Some(cost);
         row.role = Role { group: self.set, start: self.start, varied: None };
         if let Some((varied, _)) = self.differences.pop() {
@@ -136,8 +144,11 @@ impl OneSet {
         row: Evaluation,
         outcomes: Arc<[Outcome]>,
     ) {
-        let (Some(cost), tolerance) = (row.cost, specification.search.cost_tolerance) else {
-            return;
+        let Some(cost) = row.cost else { return };
+        let tolerance = match specification.objective {
+            Objective::Moments => specification.search.cost_tolerance,
+            // No likelihood is high enough.
+            Objective::Likelihood => f64::NEG_INFINITY,
         };
         let lowest = self.best.as_ref().and_then(|best| best.row.cost);
         if cost.is_finite() && lowest.is_none_or(|lowest| lowest > tolerance && cost < lowest) {
@@ -167,7 +178,7 @@ impl OneSet {
         self.start += 1;
         if u64::from(self.start) < specification.search.starts {
             self.space = random_start(specification, self.start.into());
-            self.method = Method::new(&specification.search, self.space, self.data);
+            self.method = Method::new(specification, self.set as usize, self.space);
             return;
         }
         if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {

@@ -1,6 +1,6 @@
 //! How a search ended, in words.
 
-use osteon_common::job::{JobSpecification, SearchMethod};
+use osteon_common::job::{JobSpecification, Objective, SearchMethod};
 use osteon_common::results::{Evaluation, Status};
 
 use super::Ending;
@@ -86,6 +86,14 @@ fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) 
     if evidence.best.is_some() {
         return "every velocity of the points evaluated is the same: their coefficient of \
                 variation has no logarithm; raise [monte_carlo] realizations"
+            .to_owned();
+    }
+    // Without a law a point has no likelihood, whether or not realizations failed.
+    if specification.objective == Objective::Likelihood
+        && evidence.first.is_some_and(|row| row.failures.total() == 0)
+    {
+        return "every velocity of the first point is the same: they have no law; raise \
+                [monte_carlo] realizations"
             .to_owned();
     }
     match evidence.first {

@@ -6,7 +6,7 @@ use super::*;
 
 const SETTINGS: Settings = Settings {
     max_evaluations: 2000,
-    cost_tolerance: 1e-10,
+    costs: Costs::Squares { tolerance: 1e-10 },
     size_tolerance: 1e-5,
     initial_step: 0.15,
 };
@@ -257,5 +257,18 @@ proptest! {
         }
         prop_assert!(matches!(simplex.ask(), Ask::Stopped(_)));
         prop_assert!(simplex.evaluations() <= 250);
+    }
+}
+
+/// Costs of any sign, none of which is low enough to stop, down to differences that count as equal.
+#[test]
+fn logarithms_are_minimised_by_their_differences() {
+    let costs = Costs::Logarithms { equal: 1e-9 };
+    for offset in [-1000.0, 0.0, 1000.0] {
+        let settings = Settings { costs, ..SETTINGS };
+        let found = minimise(&[0.8, 0.9], settings, |at| sphere(at) + offset);
+        assert_eq!(found.stop, Stop::Settled, "{offset}");
+        // Of an offset of 1000 rounding leaves differences of 1e-13.
+        assert!(found.at.iter().all(|u| (u - 0.3).abs() < 1e-5), "{offset}: {:?}", found.at);
     }
 }

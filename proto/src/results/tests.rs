@@ -40,14 +40,29 @@ prop_compose! {
         velocity in proptest::option::of((moments(), moments(), any::<bool>())),
         failures in failures(),
         estimated_error in estimated_error(),
+        cost_error in proptest::option::of(0.0..1.0),
+        failure_bias in proptest::option::of(moments()),
+        kolmogorov in proptest::option::of((0.0..1.0, 0.0..1.0)),
     ) -> BestPoint {
+        let kolmogorov =
+            kolmogorov.map(|(distance, p_value)| KolmogorovTest { distance, p_value });
         let velocity = velocity.map(|(moments, standard_error, controlled)| Estimate {
             moments,
             standard_error,
             controlled,
         });
         let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
-        BestPoint { point, cost, velocity, failures, estimated_error, outcomes }
+        BestPoint {
+            point,
+            cost,
+            cost_error,
+            velocity,
+            failure_bias,
+            kolmogorov,
+            failures,
+            estimated_error,
+            outcomes,
+        }
     }
 }
 

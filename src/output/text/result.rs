@@ -1,7 +1,7 @@
 //! The table of a result, made from the text of `result.json`: a result that was stored looks as
 //! one that was just computed.
 
-use osteon_common::job::{JobKind, JobSpecification, Range, SearchMethod};
+use osteon_common::job::{JobKind, JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results_json;
 use serde_json::Value;
@@ -63,11 +63,14 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     text.push_str(&format!("; at the best point {}\n\n", failures(value)));
     text.push_str(&moments(value, true));
     text.push_str(uncontrolled(value));
+    text.push_str(&failure_bias(value));
+    text.push_str(&kolmogorov(value));
     text.push('\n');
     text.push_str(&parameters(&point, shown.specification));
     if status != "failed" {
         let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
-        let matches = cost <= shown.specification.search.cost_tolerance;
+        let search = &shown.specification.search;
+        let matches = !by_likelihood(value) && cost <= search.cost_tolerance;
         text.push_str(&uniqueness(&point, shown.specification, matches));
         text.push_str(&identified::text(value));
     }
@@ -80,6 +83,7 @@ fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
     text.push_str(&moments(value, false));
     text.push_str(uncontrolled(value));
+    text.push_str(&failure_bias(value));
 }
 
 fn failures(value: &Value) -> String {
@@ -103,7 +107,8 @@ fn moments(value: &Value, with_data: bool) -> String {
             _ => "none".to_owned(),
         };
         let data = value["data"][key].as_f64();
-        let data = data.map(|number| format!("{}{unit}", significant(number, 7)));
+        let interval = interval(&value["data"]["interval"], key);
+        let data = data.map(|number| format!("{}{unit}{interval}", significant(number, 7)));
         [name.to_owned(), model, data.unwrap_or_default()]
     };
     let mut rows = Vec::new();
@@ -113,7 +118,12 @@ fn moments(value: &Value, with_data: bool) -> String {
     rows.push(row("mean velocity", "mean", " m/s"));
     rows.push(row("coefficient of variation", "coefficient_of_variation", ""));
     if let Some(cost) = value["cost"].as_f64() {
-        rows.push(["cost".to_owned(), significant(cost, 4), String::new()]);
+        let shown = if by_likelihood(value) {
+            with_error(cost, value["cost_standard_error"].as_f64().unwrap_or(f64::NAN), " nats")
+        } else {
+            significant(cost, 4)
+        };
+        rows.push(["cost".to_owned(), shown, String::new()]);
     }
     aligned(&rows)
 }
@@ -126,6 +136,53 @@ fn uncontrolled(value: &Value) -> &'static str {
         }
         _ => "",
     }
+}
+
+/// The confidence interval of a moment of the data, if it is known.
+fn interval(interval: &Value, key: &str) -> String {
+    let ends = (interval[key][0].as_f64(), interval[key][1].as_f64(), interval["level"].as_f64());
+    let (Some(low), Some(high), Some(level)) = ends else { return String::new() };
+    let [low, high] = [low, high].map(|end| significant(end, 5));
+    format!(" ({} %: {low} to {high})", significant(100.0 * level, 3))
+}
+
+/// How large a bias the failed realizations may have left, if there are any.
+fn failure_bias(value: &Value) -> String {
+    if value["failures"].as_object().is_none_or(serde_json::Map::is_empty) {
+        return String::new();
+    }
+    let bias = &value["velocity"]["failure_bias"];
+    let (Some(mean), Some(variation)) =
+        (bias["mean"].as_f64(), bias["coefficient_of_variation"].as_f64())
+    else {
+        return String::new();
+    };
+    let signed = |number: f64, digits| {
+        format!("{}{}", if number < 0.0 { "-" } else { "+" }, significant(number.abs(), digits))
+    };
+    format!(
+        "with velocities as expected of their tensors the failed realizations would add {} m/s to the mean\n\
+         and {} to the coefficient of variation\n",
+        signed(mean, 2),
+        signed(variation, 2)
+    )
+}
+
+/// Whether the data can be of the model's law, if that was tested.
+fn kolmogorov(value: &Value) -> String {
+    let test = &value["data"]["kolmogorov"];
+    match (test["distance"].as_f64(), test["p_value"].as_f64()) {
+        (Some(distance), Some(p)) => format!(
+            "Kolmogorov's distance of data and model {}, p {} (too large, as the model was fitted)\n",
+            significant(distance, 2),
+            significant(p, 2)
+        ),
+        _ => String::new(),
+    }
+}
+
+fn by_likelihood(value: &Value) -> bool {
+    value["objective"].as_str() == Some(Objective::Likelihood.name())
 }
 
 /// A number with enough digits to compare it with the data's, and two digits of its standard
@@ -177,6 +234,10 @@ fn uniqueness(point: &Point, specification: &JobSpecification, matches: bool) ->
     } else {
         String::new()
     };
+    let known = match specification.objective {
+        Objective::Moments => "Two moments",
+        Objective::Likelihood => "The law of one velocity",
+    };
     let others = if matches && specification.search.method == SearchMethod::Newton {
         "of the points that match the data, this is the one nearest to the start\n\
          (distances in units of the bounds)."
@@ -184,7 +245,7 @@ fn uniqueness(point: &Point, specification: &JobSpecification, matches: bool) ->
         "the other values are one of many sets that match the data equally well."
     };
     format!(
-        "\nTwo moments cannot fix {searched} parameters. The data determine only\n    \
+        "\n{known} cannot fix {searched} parameters. The data determine only\n    \
          {speed}{dispersion};\n\
          {others}\n\
          Fix what is known from elsewhere (`fixed = …`) to narrow them down.\n"
