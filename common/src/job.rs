@@ -180,6 +180,9 @@ pub struct Search {
     pub size_tolerance: f64,
     /// Edge of the first simplex, as a fraction of the box; of no use to other methods.
     pub initial_step: f64,
+    /// Whether workers that nobody else has work for compute points that may be asked for next. It
+    /// changes when a result is there, and no bit of it.
+    pub speculation: bool,
 }
 
 impl Search {
@@ -194,6 +197,7 @@ impl Search {
             },
             size_tolerance: 1e-5,
             initial_step: 0.15,
+            speculation: true,
         }
     }
 }

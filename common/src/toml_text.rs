@@ -149,5 +149,6 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "max_evaluations = {}", search.max_evaluations)?;
     writeln!(out, "cost_tolerance = {:?}", search.cost_tolerance)?;
     writeln!(out, "size_tolerance = {:?}", search.size_tolerance)?;
-    writeln!(out, "initial_step = {:?}", search.initial_step)
+    writeln!(out, "initial_step = {:?}", search.initial_step)?;
+    writeln!(out, "speculation = {}", search.speculation)
 }

@@ -161,6 +161,8 @@ fn run() {
             ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
             ("size_tolerance = 1e-4", "size_tolerance = 1"),
             ("initial_step = 0.1", "initial_step = 0.6"),
+            ("speculation = false", "speculation = 1"),
+            ("speculation = false", "speculative = true"),
         ],
     );
 }

@@ -135,15 +135,18 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
 
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
-    (method, 1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5).prop_map(
-        |(method, max_evaluations, cost_tolerance, size_tolerance, initial_step)| Search {
+    let numbers = (1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5);
+    (method, numbers, any::<bool>()).prop_map(|(method, numbers, speculation)| {
+        let (max_evaluations, cost_tolerance, size_tolerance, initial_step) = numbers;
+        Search {
             method,
             max_evaluations,
             cost_tolerance,
             size_tolerance,
             initial_step,
-        },
-    )
+            speculation,
+        }
+    })
 }
 
 /// Almost always valid.

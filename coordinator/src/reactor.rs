@@ -7,6 +7,7 @@ use crate::effect::Effect;
 use crate::event::Event;
 use crate::state::State;
 
+mod ahead;
 mod batches;
 mod checks;
 mod dispatch;
@@ -20,6 +21,7 @@ mod suspects;
 mod ticks;
 mod workers;
 
+pub(crate) use ahead::LIKELY_MAX;
 pub use restore::Restored;
 
 #[cfg(test)]

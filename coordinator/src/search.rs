@@ -15,11 +15,14 @@ use osteon_common::statistics::{self, Verdict};
 use thiserror::Error;
 
 use crate::ask::{Ask, Stop};
-use crate::search_box::{SearchBox, Side, admissible};
+use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
 
 use self::method::Method;
 
+pub(crate) use self::ahead::same_point;
+
+mod ahead;
 mod method;
 #[cfg(test)]
 mod tests;
@@ -235,12 +238,7 @@ impl Search {
     /// Refuses points until the method is done or asks for an admissible one.
     fn refuse_inadmissible(&mut self) {
         if let Plan::Identification { method, .. } = &mut self.plan {
-            while let Ask::At(at) = method.ask() {
-                if admissible(&self.space.point(at)) {
-                    break;
-                }
-                method.refuse();
-            }
+            method.refuse_inadmissible(&self.space);
         }
     }
 

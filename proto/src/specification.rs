@@ -215,6 +215,7 @@ fn search_to_message(search: &Search) -> v1::Search {
         cost_tolerance: Some(search.cost_tolerance),
         size_tolerance: Some(search.size_tolerance),
         initial_step: Some(search.initial_step),
+        speculation: Some(search.speculation),
     }
 }
 
@@ -233,6 +234,7 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
         initial_step: message.initial_step.unwrap_or(default.initial_step),
+        speculation: message.speculation.unwrap_or(default.speculation),
     }
 }
 

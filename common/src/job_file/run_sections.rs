@@ -37,7 +37,14 @@ pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
 
 /// The search loop, with defaults where `root` is silent or wrong.
 pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
-    let keys = ["method", "max_evaluations", "cost_tolerance", "size_tolerance", "initial_step"];
+    let keys = [
+        "method",
+        "max_evaluations",
+        "cost_tolerance",
+        "size_tolerance",
+        "initial_step",
+        "speculation",
+    ];
     let table = reader.table(root, "search", &keys);
     let method = Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &[] };
     let method = reader.choice(&table, "method", &method).unwrap_or_default();
@@ -50,5 +57,6 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         cost_tolerance: reader.number(&table, "cost_tolerance").unwrap_or(default.cost_tolerance),
         size_tolerance: reader.number(&table, "size_tolerance").unwrap_or(default.size_tolerance),
         initial_step: reader.number(&table, "initial_step").unwrap_or(default.initial_step),
+        speculation: reader.truth(&table, "speculation").unwrap_or(default.speculation),
     }
 }

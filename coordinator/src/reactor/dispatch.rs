@@ -5,16 +5,16 @@
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
-//! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
-//! longest. Whom a realization waits for that is to be computed alone is not refilled.
+//! or more than the quarter. A worker that has nothing to do gets a copy of a batch that is late,
+//! then what may be done ahead (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to be computed alone is not refilled.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::{Effects, checks, suspects};
+use super::{Effects, ahead, checks, suspects};
 use crate::effect::Effect;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
@@ -27,6 +27,8 @@ const FIRST_BATCH_PER_THREAD: u32 = 4;
 /// A batch holds at most one in so many of a worker's share of what remains, and more only to
 /// give each of the worker's threads one realization; never more than the share.
 const SHARE_DIVISOR: f64 = 4.0;
+/// A batch that takes so many times as long as it should is copied before anything is done ahead.
+const LATE: u32 = 2;
 
 /// Hands out batches while there is credit and work, then copies.
 pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) {
@@ -35,7 +37,52 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     }
     let kept = suspects::hand_out(state, now, effects);
     while work_waits(state) && hand_one(state, &kept, now, effects) {}
-    copy_slowest(state, now, effects);
+    // Batches younger than half the target time are about to be answered and are not worth a copy.
+    let patience = state.config.batch_target / 2;
+    let old = |_: &State, batch: &Batch| now.saturating_sub(batch.sent) >= patience;
+    let late = |state: &State, batch: &Batch| {
+        old(state, batch) && now.saturating_sub(batch.sent) >= LATE * expected(state, batch)
+    };
+    copy_slowest(state, |state, worker| held(state, worker) == 0, late, now, effects);
+    if kept.is_empty() && !work_waits(state) {
+        ahead::hand_out(state, now, effects);
+    }
+    copy_slowest(state, |_, worker| worker.in_flight.is_empty(), old, now, effects);
+}
+
+/// When the last batch of what each search waits for should be answered.
+pub(super) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
+    let mut dues = BTreeMap::new();
+    for batch in state.batches.values().filter(|batch| !batch.ahead) {
+        if let Some(answered) = answered(state, batch) {
+            let due: &mut Duration = dues.entry(batch.assignment.job).or_default();
+            *due = answered.max(*due);
+        }
+    }
+    dues
+}
+
+/// When a batch should be answered.
+fn answered(state: &State, batch: &Batch) -> Option<Duration> {
+    let worker = state.workers.get(&batch.worker)?;
+    // Two of more than half a worker's threads are computed one after the other.
+    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.threads.into();
+    if !large(batch) {
+        return Some(batch.sent + expected(state, batch));
+    }
+    let held = worker.in_flight.iter().filter_map(|id| state.batches.get(id));
+    let before = held.filter(|held| held.sent < batch.sent && large(held));
+    let waits: Duration = before.map(|held| expected(state, held)).sum();
+    Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
+}
+
+/// Time that a batch should take, as far as that is known.
+fn expected(state: &State, batch: &Batch) -> Duration {
+    let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
+    let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
+    rate.map_or(Duration::ZERO, |rate| {
+        fairness::thread_time(batch.assignment.indices.count as f64 / rate, 1)
+    })
 }
 
 /// Whether there is anything to hand out but suspects.
@@ -69,11 +116,17 @@ fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
         .iter()
         .filter(|(id, worker)| !worker.draining && !kept.contains(id))
         .filter(|(_, worker)| !worker.in_flight.iter().any(exclusive))
-        .map(|(id, worker)| (worker.in_flight.len(), *id));
-    let mut free: Vec<(usize, WorkerId)> = free.collect();
+        .map(|(id, worker)| (held(state, worker), worker.in_flight.len(), *id));
+    let mut free: Vec<(usize, usize, WorkerId)> = free.collect();
     free.sort_unstable();
-    let free = free.into_iter().filter(|(held, _)| *held < BATCHES_IN_FLIGHT_MAX);
-    free.map(|(_, worker)| worker).collect()
+    let free = free.into_iter().filter(|(held, ..)| *held < BATCHES_IN_FLIGHT_MAX);
+    free.map(|(.., worker)| worker).collect()
+}
+
+/// Batches that a worker holds, what is done ahead aside.
+pub(super) fn held(state: &State, worker: &Worker) -> usize {
+    let ahead = |held: &&BatchId| state.batches.get(held).is_some_and(|batch| batch.ahead);
+    worker.in_flight.len() - worker.in_flight.iter().filter(ahead).count()
 }
 
 /// Gives a worker a batch of the job whose turn it is.
@@ -124,7 +177,7 @@ pub(super) fn next_job(state: &State) -> Option<JobId> {
 }
 
 /// Charges the client of a batch for the time that it will take, as far as that is known.
-fn charge(state: &mut State, id: BatchId) {
+pub(super) fn charge(state: &mut State, id: BatchId) {
     let target = state.config.batch_target.as_secs_f64();
     let Some(batch) = state.batches.get_mut(&id) else {
         return;
@@ -172,20 +225,26 @@ fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
     if threads > 0.0 { rates / threads } else { 1.0 }
 }
 
-/// Gives each idle worker a copy of the batch that is out longest. Batches younger than half the
-/// target time are about to be answered and are not worth a copy.
-fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
-    let patience = state.config.batch_target / 2;
-    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
-    let idle = |worker: &Worker| !worker.draining && worker.in_flight.is_empty();
-    let is_old = |state: &State, id: &BatchId| state.batches.get(id).is_some_and(old);
-    if !state.copyable.first().is_some_and(|slowest| is_old(state, slowest)) {
+/// Gives each worker in `idle` a copy of the batch that is out longest of those in `worth`.
+fn copy_slowest(
+    state: &mut State,
+    idle: impl Fn(&State, &Worker) -> bool,
+    worth: impl Fn(&State, &Batch) -> bool,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let slowest = |state: &State| {
+        let of = |id: &&BatchId| state.batches.get(id).is_some_and(|batch| worth(state, batch));
+        state.copyable.iter().find(of).copied()
+    };
+    if slowest(state).is_none() {
         return;
     }
+    let idle = |worker: &Worker| !worker.draining && idle(state, worker);
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {
-        let Some(slowest) = state.copyable.first().copied().filter(|id| is_old(state, id)) else {
+        let Some(slowest) = slowest(state) else {
             return;
         };
         let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
@@ -211,6 +270,7 @@ pub(super) fn send(
     effects: &mut Effects,
 ) -> Option<BatchId> {
     let work = state.work(&assignment)?;
+    ahead::make_way(state, worker, assignment.indices.count, now, effects);
     let id = BatchId(state.next_batch);
     state.next_batch += 1;
     let batch = Batch {
@@ -221,6 +281,7 @@ pub(super) fn send(
         charged: Duration::ZERO,
         twin: None,
         exclusive: false,
+        ahead: false,
     };
     state.batches.insert(id, batch);
     if purpose == Purpose::Fill {

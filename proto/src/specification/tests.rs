@@ -71,6 +71,7 @@ prop_compose! {
         method in proptest::sample::select(SearchMethod::ALL.to_vec()),
         max_evaluations in 1_u64..1000,
         initial_step in 0.01..0.5,
+        speculation: bool,
         solver in solver(),
     ) -> JobSpecification {
         JobSpecification {
@@ -87,7 +88,7 @@ prop_compose! {
                 max_failed_fraction,
             },
             objective: Objective::default(),
-            search: Search { max_evaluations, initial_step, ..Search::by(method) },
+            search: Search { max_evaluations, initial_step, speculation, ..Search::by(method) },
         }
     }
 }
