@@ -9,12 +9,12 @@
 //! then what may be done ahead (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to be computed alone is not refilled.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::{Effects, ahead, checks, suspects};
+use super::{Effects, ahead, checks, copies, suspects};
 use crate::effect::Effect;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
@@ -27,8 +27,6 @@ const FIRST_BATCH_PER_THREAD: u32 = 4;
 /// A batch holds at most one in so many of a worker's share of what remains, and more only to
 /// give each of the worker's threads one realization; never more than the share.
 const SHARE_DIVISOR: f64 = 4.0;
-/// A batch that takes so many times as long as it should is copied before anything is done ahead.
-const LATE: u32 = 2;
 
 /// Hands out batches while there is credit and work, then copies.
 pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) {
@@ -37,52 +35,11 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     }
     let kept = suspects::hand_out(state, now, effects);
     while work_waits(state) && hand_one(state, &kept, now, effects) {}
-    // Batches younger than half the target time are about to be answered and are not worth a copy.
-    let patience = state.config.batch_target / 2;
-    let old = |_: &State, batch: &Batch| now.saturating_sub(batch.sent) >= patience;
-    let late = |state: &State, batch: &Batch| {
-        old(state, batch) && now.saturating_sub(batch.sent) >= LATE * expected(state, batch)
-    };
-    copy_slowest(state, |state, worker| held(state, worker) == 0, late, now, effects);
+    copies::of_late_ones(state, now, effects);
     if kept.is_empty() && !work_waits(state) {
         ahead::hand_out(state, now, effects);
     }
-    copy_slowest(state, |_, worker| worker.in_flight.is_empty(), old, now, effects);
-}
-
-/// When the last batch of what each search waits for should be answered.
-pub(super) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
-    let mut dues = BTreeMap::new();
-    for batch in state.batches.values().filter(|batch| !batch.ahead) {
-        if let Some(answered) = answered(state, batch) {
-            let due: &mut Duration = dues.entry(batch.assignment.job).or_default();
-            *due = answered.max(*due);
-        }
-    }
-    dues
-}
-
-/// When a batch should be answered.
-fn answered(state: &State, batch: &Batch) -> Option<Duration> {
-    let worker = state.workers.get(&batch.worker)?;
-    // Two of more than half a worker's threads are computed one after the other.
-    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.threads.into();
-    if !large(batch) {
-        return Some(batch.sent + expected(state, batch));
-    }
-    let held = worker.in_flight.iter().filter_map(|id| state.batches.get(id));
-    let before = held.filter(|held| held.sent < batch.sent && large(held));
-    let waits: Duration = before.map(|held| expected(state, held)).sum();
-    Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
-}
-
-/// Time that a batch should take, as far as that is known.
-fn expected(state: &State, batch: &Batch) -> Duration {
-    let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
-    let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
-    rate.map_or(Duration::ZERO, |rate| {
-        fairness::thread_time(batch.assignment.indices.count as f64 / rate, 1)
-    })
+    copies::of_slow_ones(state, now, effects);
 }
 
 /// Whether there is anything to hand out but suspects.
@@ -223,41 +180,6 @@ fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
         .filter_map(|worker| Some((*worker.rates.get(&job)?, f64::from(worker.hello.threads))));
     let (rates, threads) = measured.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
     if threads > 0.0 { rates / threads } else { 1.0 }
-}
-
-/// Gives each worker in `idle` a copy of the batch that is out longest of those in `worth`.
-fn copy_slowest(
-    state: &mut State,
-    idle: impl Fn(&State, &Worker) -> bool,
-    worth: impl Fn(&State, &Batch) -> bool,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let slowest = |state: &State| {
-        let of = |id: &&BatchId| state.batches.get(id).is_some_and(|batch| worth(state, batch));
-        state.copyable.iter().find(of).copied()
-    };
-    if slowest(state).is_none() {
-        return;
-    }
-    let idle = |worker: &Worker| !worker.draining && idle(state, worker);
-    let idle: Vec<WorkerId> =
-        state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
-    for worker in idle {
-        let Some(slowest) = slowest(state) else {
-            return;
-        };
-        let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
-            return;
-        };
-        let copy = send(state, worker, assignment, Purpose::Fill, now, effects);
-        for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
-            if let Some((id, batch)) = one.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
-                batch.twin = other;
-                state.copyable.remove(&id);
-            }
-        }
-    }
 }
 
 /// Sends a batch to a worker; its number, if its evaluation is under way.

@@ -15,7 +15,7 @@ use super::{realizations, realizations_held};
 use crate::evaluation::{Evaluation, Indices};
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::reactor::{Effects, dispatch};
+use crate::reactor::{Effects, dispatch, due};
 use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
 
 /// When the last batch of what each search waits for should be answered.
@@ -29,14 +29,16 @@ pub(in crate::reactor) fn hand_out(state: &mut State, now: Duration, effects: &m
     let idle = state.workers.iter().map(|(id, worker)| (*id, spare(state, worker)));
     let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, threads)| *threads > 0).collect();
     let mut threads: u64 = idle.iter().map(|(_, threads)| threads).sum();
-    let dues = dispatch::dues(state);
+    let dues = due::dues(state);
+    let mut wanted = next(state);
     for (worker, spare) in idle {
-        let Some((job, point)) = next(state) else {
+        let Some((job, point)) = wanted else {
             return;
         };
-        if let Some(size) = size(state, job, &point, worker, threads, &dues, now) {
-            send(state, job, point, worker, size, now, effects);
+        if !waits(state, job, &point, worker, threads, &dues, now) {
+            send(state, job, point, worker, now, effects);
             threads -= spare;
+            wanted = next(state);
         }
     }
 }
@@ -63,9 +65,8 @@ fn next(state: &State) -> Option<(JobId, Point)> {
     Some((id, *point))
 }
 
-/// Realizations of a point for the idle threads of a worker, of `threads` that are idle; `None` if
-/// it had better wait.
-fn size(
+/// Whether the idle threads of a worker, of `threads` that are idle, had better wait.
+fn waits(
     state: &State,
     id: JobId,
     point: &Point,
@@ -73,24 +74,24 @@ fn size(
     threads: u64,
     dues: &Dues,
     now: Duration,
-) -> Option<u64> {
-    let job = state.jobs.get(&id)?;
-    let attached = state.workers.get(&worker)?;
-    let realizations = job.record.specification.monte_carlo.realizations;
-    let queued = job.ahead.at(point).map_or(realizations, Evaluation::queued);
-    let spare = spare(state, attached);
-    let size = match realizations_held(state, attached) {
-        0 => dispatch::batch_size(state, attached, id, queued).max(spare.min(queued)),
-        _ => spare,
+) -> bool {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return true;
     };
+    let spare = spare(state, attached);
     // What is begun on each thread is not given up before it ends.
-    let begun = size.min(attached.hello.threads.into()) as f64;
+    let begun = spare.min(queued(job, point)) as f64;
     let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
     let takes = fairness::thread_time(seconds, 1);
     let soon = |due: &Duration| now < *due + takes / 2 && *due < now + takes / 2;
-    let wanted = wanted_by_others(state, id, now + takes, dues);
-    let waits = dues.get(&id).is_some_and(soon) || threads < wanted + spare;
-    (!waits).then_some(size)
+    dues.get(&id).is_some_and(soon)
+        || threads < spare + wanted_by_others(state, id, now + takes, dues)
+}
+
+/// Realizations of a point that nobody computes.
+fn queued(job: &Job, point: &Point) -> u64 {
+    let realizations = job.record.specification.monte_carlo.realizations;
+    job.ahead.at(point).map_or(realizations, Evaluation::queued)
 }
 
 /// Threads that jobs other than `but` will want before `until`, besides those they have.
@@ -119,16 +120,23 @@ fn has_next(job: &Job) -> bool {
     next.is_some_and(|next| next.queue.is_empty())
 }
 
-/// Gives a worker a batch of a point.
+/// Gives the idle threads of a worker a batch of a point.
 fn send(
     state: &mut State,
     id: JobId,
     point: Point,
     worker: WorkerId,
-    size: u64,
     now: Duration,
     effects: &mut Effects,
 ) {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return;
+    };
+    let (queued, spare) = (queued(job, &point), spare(state, attached));
+    let size = match realizations_held(state, attached) {
+        0 => dispatch::batch_size(state, attached, id, queued).max(spare.min(queued)),
+        _ => spare,
+    };
     let Some((round, indices)) = take(state, id, point, size) else {
         return;
     };
