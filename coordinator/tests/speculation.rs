@@ -6,6 +6,7 @@
     clippy::panic,
     reason = "a test that cannot go on fails"
 )]
+#![expect(clippy::print_stdout, reason = "what is measured stands in docs/searches.md")]
 
 mod clockwork;
 #[expect(dead_code, reason = "each test file uses a part of it")]

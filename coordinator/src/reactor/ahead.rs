@@ -28,7 +28,7 @@ mod idle;
 /// Points that are known for each job, at most.
 pub(crate) const LIKELY_MAX: usize = 8;
 /// Evaluations with more realizations leave no worker idle for long; nothing is done ahead of them.
-const REALIZATIONS_MAX: u64 = 100_000;
+const REALIZATIONS_MAX: u64 = 20_000;
 
 /// Begins the evaluation of the point that a job's search asks for, with what is known of it.
 pub(super) fn begin(
