@@ -42,10 +42,10 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    let JobSpecification { setup, search, .. } = &fetched.specification;
+    let Fetched { specification, result, history } = fetched;
     match kind {
-        JobKind::Identification => results_json::identification(&fetched.result, setup, search),
-        JobKind::Propagation => results_json::propagation(&fetched.result, setup),
+        JobKind::Identification => results_json::identification(result, specification, history),
+        JobKind::Propagation => results_json::propagation(result, &specification.setup),
     }
 }
 
@@ -162,7 +162,8 @@ impl ResultsDirectory {
             remove_if_there(&self.path.join(RESULT))?;
             write(&self.path.join(JOB), &job_file::to_toml(&fetched.specification))?;
             if kind == JobKind::Identification {
-                write(&self.path.join(HISTORY), &results_csv::history(&fetched.history))?;
+                let history = results_csv::history(&fetched.specification, &fetched.history);
+                write(&self.path.join(HISTORY), &history)?;
             }
             let outcomes = fetched.result.best.as_ref().map(|best| best.outcomes.as_slice());
             let realizations = results_csv::realizations(outcomes.unwrap_or_default());

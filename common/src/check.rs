@@ -12,7 +12,8 @@ use crate::job::JobSpecification;
 use crate::violations::Violations;
 
 pub(crate) use self::job::{
-    DATA_FORMS, EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, VELOCITIES_MIN, VELOCITY, no_data,
+    DATA_FORMS, EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, STARTS, VELOCITIES_MIN, VELOCITY,
+    no_data,
 };
 pub use self::job::{data, job};
 pub use self::setup::setup;

@@ -3,6 +3,8 @@
 use crate::case::Setup;
 use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
+use crate::results::Moments;
+use crate::statistics;
 
 /// What a job does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +20,8 @@ pub enum JobKind {
 pub enum Data {
     /// The velocities themselves, m/s, each finite and above 0, at least two.
     Velocities(Vec<f64>),
+    /// Several sets of them: each group is identified by itself, in this order.
+    Groups(Vec<Group>),
     /// Their mean, m/s, and coefficient of variation.
     Moments {
         /// Mean, m/s.
@@ -25,6 +29,52 @@ pub enum Data {
         /// Coefficient of variation.
         coefficient_of_variation: f64,
     },
+}
+
+/// The measured velocities of one group: a bone, a patient, a site.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Its name, unlike all others'; not empty, no control characters.
+    pub name: String,
+    /// m/s, as those of [`Data::Velocities`].
+    pub velocities: Vec<f64>,
+}
+
+impl Data {
+    /// How many sets of data there are, each to be identified by itself.
+    pub fn sets(&self) -> usize {
+        match self {
+            Self::Groups(groups) => groups.len(),
+            Self::Velocities(_) | Self::Moments { .. } => 1,
+        }
+    }
+
+    /// Name of each group; none where the data are not grouped.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let groups: &[Group] = match self {
+            Self::Groups(groups) => groups,
+            Self::Velocities(_) | Self::Moments { .. } => &[],
+        };
+        groups.iter().map(|group| group.name.as_str())
+    }
+
+    /// The velocities of a set, by its number; `None` where only their moments are known.
+    pub fn velocities(&self, set: usize) -> Option<&[f64]> {
+        match self {
+            Self::Velocities(velocities) => Some(velocities),
+            Self::Groups(groups) => groups.get(set).map(|group| group.velocities.as_slice()),
+            Self::Moments { .. } => None,
+        }
+    }
+
+    /// Moments of a set, by its number; NaN where there is none.
+    pub fn moments(&self, set: usize) -> Moments {
+        if let Self::Moments { mean, coefficient_of_variation } = *self {
+            return Moments { mean, coefficient_of_variation };
+        }
+        let moments = self.velocities(set).and_then(statistics::moments);
+        moments.unwrap_or(Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN })
+    }
 }
 
 /// Range of one parameter.
@@ -180,6 +230,12 @@ pub struct Search {
     pub size_tolerance: f64,
     /// Edge of the first simplex, as a fraction of the box; of no use to other methods.
     pub initial_step: f64,
+    /// Searches of each set of data: the first from the starts of the parameters, the others from
+    /// random points of the box; 1 to [`crate::limits::STARTS_MAX`].
+    pub starts: u64,
+    /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
+    /// free parameter.
+    pub sensitivities: bool,
     /// Whether workers that nobody else has work for compute points that may be asked for next. It
     /// changes when a result is there, and no bit of it.
     pub speculation: bool,
@@ -197,6 +253,8 @@ impl Search {
             },
             size_tolerance: 1e-5,
             initial_step: 0.15,
+            starts: 1,
+            sensitivities: true,
             speculation: true,
         }
     }
@@ -231,6 +289,18 @@ impl JobSpecification {
     /// Range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]
+    }
+
+    /// Most evaluations of the whole job.
+    pub fn evaluations_max(&self) -> u64 {
+        if self.kind == JobKind::Propagation {
+            return 1;
+        }
+        let Search { max_evaluations, starts, sensitivities, .. } = self.search;
+        let free = self.parameters.iter().filter(|range| matches!(range, Range::Free { .. }));
+        let measured = if sensitivities { free.count() as u64 } else { 0 };
+        let sets = self.data.as_ref().map_or(1, Data::sets) as u64;
+        starts.saturating_mul(max_evaluations).saturating_add(measured).saturating_mul(sets)
     }
 
     /// The point of fixed values and starts.

@@ -18,6 +18,7 @@ pub mod elasticity;
 pub mod ensemble;
 pub mod file_error;
 pub mod germ_source;
+pub mod inference;
 pub mod job;
 pub mod job_file;
 pub mod layers;

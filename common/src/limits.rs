@@ -10,10 +10,14 @@ pub const REALIZATIONS_MAX: u64 = 10_000_000;
 pub const SCRAMBLES_MAX: u64 = 1024;
 /// Largest seed: 2⁶³ - 1, so that every tool can hold it in a signed integer.
 pub const SEED_MAX: u64 = (1 << 63) - 1;
-/// Most evaluations of one search.
+/// Most evaluations of one job.
 pub const EVALUATIONS_MAX: u64 = 1_000_000;
 /// Most measured velocities of one job.
 pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
+/// Most groups of measured velocities of one job.
+pub const GROUPS_MAX: usize = 1000;
+/// Most searches of one set of data, from as many starts.
+pub const STARTS_MAX: u64 = 1000;
 /// Smallest refinement of the solver's sampling.
 pub const REFINEMENT_MIN: f64 = 0.5;
 /// Largest refinement of the solver's sampling.

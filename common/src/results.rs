@@ -2,7 +2,7 @@
 
 use crate::job::Sampling;
 use crate::outcome::{FailureCounts, Outcome};
-use crate::parameters::Point;
+use crate::parameters::{Parameter, Point};
 use crate::settings::{Picking, SolverSettings};
 
 /// How a job ended.
@@ -63,14 +63,29 @@ pub struct EstimatedError {
     pub largest: f64,
 }
 
-/// One evaluation of the search, as a row of `history.csv`.
+/// What an evaluation is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Role {
+    /// Number of the set of data that it is for, from 0.
+    pub group: u32,
+    /// Number of the start of its search, from 0, the job's own.
+    pub start: u32,
+    /// The parameter in which it differs from the best point, to measure a derivative; `None` of a
+    /// search.
+    pub varied: Option<Parameter>,
+}
+
+/// One evaluation: of a search, a row of `history.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
+    /// What it is for.
+    pub role: Role,
     /// The point.
     pub point: Point,
-    /// Moments over the successes, unless there are none.
+    /// Moments over the successes, unless there are none; of one that measures a derivative, `None`
+    /// too if other realizations failed than at the best point.
     pub moments: Option<Moments>,
     /// Cost; infinite at an infeasible point; `None` for a propagation.
     pub cost: Option<f64>,
@@ -78,6 +93,32 @@ pub struct Evaluation {
     pub failures: FailureCounts,
     /// Estimated errors of the successes, unless there are none, or they are not known.
     pub estimated_error: Option<EstimatedError>,
+}
+
+/// How the search for one group ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupEnding {
+    /// How.
+    pub status: Status,
+    /// Why, in a sentence, where the status needs one.
+    pub reason: Option<String>,
+    /// Number of its best evaluation, if a point was feasible.
+    pub best: Option<u64>,
+}
+
+/// What was found for one group of the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupResult {
+    /// Its name.
+    pub name: String,
+    /// How its search ended.
+    pub status: Status,
+    /// Why, in a sentence, where the status needs one.
+    pub reason: Option<String>,
+    /// Its best feasible evaluation, without the outcomes.
+    pub best: Option<BestPoint>,
+    /// Moments of its data.
+    pub data: Moments,
 }
 
 /// The result of a job. No wall times in it: one job, the same bytes.
@@ -89,11 +130,14 @@ pub struct JobResult {
     pub reason: Option<String>,
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
     pub digest: String,
-    /// The best feasible evaluation (of a propagation: the only one), if any was complete.
+    /// The best feasible evaluation (of a propagation: the only one), if any was complete; `None`
+    /// where the data are groups.
     pub best: Option<BestPoint>,
-    /// The data's moments; `None` for a propagation.
+    /// The data's moments; `None` for a propagation, and where the data are groups.
     pub data: Option<Moments>,
-    /// Points whose realizations were run.
+    /// What was found for each group of the data; empty where there are none.
+    pub groups: Vec<GroupResult>,
+    /// Points that the search went to, and whose realizations were run.
     pub evaluations: u64,
     /// Realizations of each evaluation.
     pub realizations: u64,

@@ -2,22 +2,43 @@
 
 use std::fmt::{self, Write as _};
 
+use crate::job::{Data, JobSpecification};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
 use crate::results::Evaluation;
 
-/// The text of `history.csv`: one row per evaluation, the seven parameters between its number
-/// and its moments.
+/// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
+/// number and its moments; with groups or several starts, also which of them it was for.
 ///
 /// Moments are empty where every realization failed; a cost is `inf` at an infeasible point.
-pub fn history(evaluations: &[Evaluation]) -> String {
+pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> String {
     let parameters = Parameter::ALL.map(Parameter::name).join(",");
-    let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures\n");
-    for evaluation in evaluations {
+    let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
+    let several = specification.search.starts > 1;
+    let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
+    out.push_str(if several { ",start" } else { "" });
+    out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
+    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.varied.is_none()) {
         // Writing to a string does not fail.
         let _infallible = history_row(&mut out, evaluation);
+        if several {
+            let _infallible = write!(out, ",{}", evaluation.role.start);
+        }
+        if let Some(name) = names.get(evaluation.role.group as usize) {
+            let _infallible = write!(out, ",{}", field(name));
+        }
+        out.push('\n');
     }
     out
+}
+
+/// A text as a field: in quotes where it must be.
+fn field(text: &str) -> String {
+    if text.contains([',', '"', '#']) || text.trim() != text {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
 }
 
 fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
@@ -36,7 +57,7 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
             None => out.push(','),
         }
     }
-    writeln!(out, ",{}", evaluation.failures.total())
+    write!(out, ",{}", evaluation.failures.total())
 }
 
 /// The text of `realizations.csv`: one row per index; the velocity (m/s) is empty where there is

@@ -7,12 +7,16 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::job::{Search, SearchMethod};
+use crate::job::JobSpecification;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::results::{Estimate, EstimatedError, JobResult, Moments};
+use crate::results::{Estimate, EstimatedError, Evaluation, JobResult, Moments};
 use crate::sampling;
 use crate::settings::Method;
+
+use self::found::Asked;
+
+mod found;
 
 /// Why a text is no `result.json` with a best point.
 #[derive(Debug, Error)]
@@ -32,11 +36,14 @@ pub enum ResultError {
     },
 }
 
-/// The object of an identification in this setup by this search, with a final newline.
-pub fn identification(result: &JobResult, setup: &Setup, by: &Search) -> String {
+/// The object of an identification, given all its evaluations, with a final newline.
+pub fn identification(
+    result: &JobResult,
+    specification: &JobSpecification,
+    history: &[Evaluation],
+) -> String {
     let best = result.best.as_ref();
-    let point = best.map(|best| best.point);
-    let of_point = |parameter| json!(point.map(|point| point.get(parameter)));
+    let asked = Asked { specification, history };
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("status", json!(result.status.name()));
@@ -44,21 +51,23 @@ pub fn identification(result: &JobResult, setup: &Setup, by: &Search) -> String 
         put("reason", json!(reason));
     }
     put("digest", json!(result.digest));
-    put("cost", json!(best.and_then(|best| best.cost)));
-    let mean_model = Parameter::ALL.into_iter().filter(|&name| name != Parameter::Dispersion);
-    let parameters = mean_model.map(|name| (name.name().to_owned(), of_point(name)));
-    put("parameters", Value::Object(parameters.collect()));
-    put("dispersion", of_point(Parameter::Dispersion));
-    put("velocity", estimate(best.and_then(|best| best.velocity)));
+    found::point(&mut put, best);
     put("data", moments(result.data));
     put("evaluations", json!(result.evaluations));
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
     sampling(&mut put, result);
-    put("search", search(by, best.and_then(|best| best.cost)));
+    put("search", found::search(&asked, best));
+    if result.groups.is_empty() {
+        found::inference(&mut put, &asked, 0, best);
+    } else {
+        let groups = result.groups.iter().enumerate();
+        put("groups", groups.map(|(set, group)| found::group(&asked, set, group)).collect());
+    }
     let picking = &result.picking;
-    put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
+    let estimated_error = errors(best.and_then(|best| best.estimated_error));
+    put("solver", solver(&specification.setup, estimated_error));
     put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
     put("version", json!(result.version));
     text(object)
@@ -104,32 +113,6 @@ pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
     }
     put("estimated_error", estimated_error);
     Value::Object(object)
-}
-
-/// How a search went, and what its best point is, given the cost there.
-fn search(search: &Search, cost: Option<f64>) -> Value {
-    let mut object = Map::new();
-    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
-    put("method", json!(search.method.name()));
-    put("max_evaluations", json!(search.max_evaluations));
-    put("cost_tolerance", json!(search.cost_tolerance));
-    put("size_tolerance", json!(search.size_tolerance));
-    if search.method == SearchMethod::Simplex {
-        put("initial_step", json!(search.initial_step));
-    }
-    put("point", json!(cost.map(|cost| meaning(search, cost))));
-    Value::Object(object)
-}
-
-/// What the best point of a search is, by its cost.
-fn meaning(search: &Search, cost: f64) -> &'static str {
-    match search.method {
-        _ if cost > search.cost_tolerance => "of the points evaluated, the one with the least cost",
-        SearchMethod::Simplex => {
-            "of the points that match the data, the one where the simplex ended"
-        }
-        SearchMethod::Newton => "of the points that match the data, the one nearest to the start",
-    }
 }
 
 /// The best point in the text of an identification's `result.json`.

@@ -17,6 +17,7 @@ use crate::results::{Estimate, Moments};
 use self::blocks::Doubled;
 use self::central::{Central, central};
 use self::controlled::Controlled;
+use self::sum::Sum;
 
 /// Mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no velocity.
 ///
@@ -24,6 +25,28 @@ use self::controlled::Controlled;
 /// is that of the set (division by N, as in the paper).
 pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
+}
+
+/// Covariance of the logarithms of mean and coefficient of variation of independent velocities, by
+/// the delta method, or `None` for fewer than two different ones.
+///
+/// That of the mean of their influences, with division by N - 1.
+pub fn covariance_of_logarithms(velocities: &[f64]) -> Option<[[f64; 2]; 2]> {
+    let central = central(velocities.iter().copied()).filter(Central::scatters)?;
+    let moments = central.moments();
+    let mut sums = [Sum::default(); 3];
+    for &velocity in velocities {
+        let [mean, variation] = central.influence(velocity);
+        let [mean, variation] = [mean / moments.mean, variation / moments.coefficient_of_variation];
+        for (sum, product) in
+            sums.iter_mut().zip([mean * mean, mean * variation, variation * variation])
+        {
+            sum.add(product);
+        }
+    }
+    let pairs = central.count * (central.count - 1.0);
+    let [mean, both, variation] = sums.map(|sum| sum.total() / pairs);
+    Some([[mean, both], [both, variation]])
 }
 
 /// Moments over the successes of an evaluation at `point` with their standard errors, or `None` if

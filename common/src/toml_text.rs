@@ -102,21 +102,34 @@ fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {
 }
 
 fn data(out: &mut String, data: &Data) -> fmt::Result {
-    writeln!(out, "\n[data]  # m/s")?;
     match data {
-        Data::Velocities(velocities) => {
-            writeln!(out, "velocities = [")?;
-            for line in velocities.chunks(VELOCITIES_PER_LINE) {
-                let line: Vec<_> = line.iter().map(|velocity| format!("{velocity:?}")).collect();
-                writeln!(out, "    {},", line.join(", "))?;
-            }
-            writeln!(out, "]")
-        }
+        Data::Groups(_) => writeln!(out, "\n[data.groups]  # m/s")?,
+        Data::Velocities(_) | Data::Moments { .. } => writeln!(out, "\n[data]  # m/s")?,
+    }
+    match data {
+        Data::Velocities(measured) => velocities(out, "velocities", measured),
+        Data::Groups(groups) => groups
+            .iter()
+            .try_for_each(|group| velocities(out, &quoted(&group.name), &group.velocities)),
         Data::Moments { mean, coefficient_of_variation } => {
             writeln!(out, "mean = {mean:?}")?;
             writeln!(out, "coefficient_of_variation = {coefficient_of_variation:?}")
         }
     }
+}
+
+fn velocities(out: &mut String, key: &str, velocities: &[f64]) -> fmt::Result {
+    writeln!(out, "{key} = [")?;
+    for line in velocities.chunks(VELOCITIES_PER_LINE) {
+        let line: Vec<_> = line.iter().map(|velocity| format!("{velocity:?}")).collect();
+        writeln!(out, "    {},", line.join(", "))?;
+    }
+    writeln!(out, "]")
+}
+
+/// A name as a key; it holds no control characters.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 fn range(out: &mut String, parameter: Parameter, range: Range) -> fmt::Result {
@@ -150,5 +163,7 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "cost_tolerance = {:?}", search.cost_tolerance)?;
     writeln!(out, "size_tolerance = {:?}", search.size_tolerance)?;
     writeln!(out, "initial_step = {:?}", search.initial_step)?;
+    writeln!(out, "starts = {}", search.starts)?;
+    writeln!(out, "sensitivities = {}", search.sensitivities)?;
     writeln!(out, "speculation = {}", search.speculation)
 }

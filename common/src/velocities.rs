@@ -1,14 +1,17 @@
 //! Measured velocities from a CSV file.
 //!
 //! The first line that is neither empty nor a comment (`#`) names the columns; `velocity` (m/s)
-//! is one of them, others are not looked at. Fields may be quoted, but hold no line break.
+//! is one of them, another one may name the group of each; others are not looked at. Fields may be
+//! quoted, but hold no line break.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use crate::check::{VELOCITIES_MIN, VELOCITY};
 use crate::file_error::{read_bytes, without_byte_order_mark};
+use crate::job::Group;
 use crate::limits;
 
 /// The column that is read.
@@ -37,10 +40,14 @@ enum Problem {
     Empty,
     #[error("is no header; it must name the columns, one of them `{COLUMN}`")]
     NoHeader,
-    #[error("no column `{COLUMN}`; the header has {columns}")]
-    NoColumn { columns: String },
-    #[error("the header has the column `{COLUMN}` twice")]
-    RepeatedColumn,
+    #[error("no column `{column}`; the header has {columns}")]
+    NoColumn { column: String, columns: String },
+    #[error("the header has the column `{column}` twice")]
+    RepeatedColumn { column: String },
+    #[error("{column} is empty; it must name the group of the velocity")]
+    NoGroup { column: String },
+    #[error("has more than {} groups", limits::GROUPS_MAX)]
+    TooManyGroups,
     #[error("the number of fields is {found}; the header has {expected}")]
     FieldCount { found: usize, expected: usize },
     #[error("a quote is not closed, or stands inside a field")]
@@ -66,10 +73,39 @@ enum Problem {
 /// # Errors
 /// Everything that is wrong with it, up to [`REPORTED_MAX`] lines.
 pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
+    let rows = rows_of(path, None)?;
+    Ok(rows.into_iter().map(|(_, velocity)| velocity).collect())
+}
+
+/// The velocities of the CSV file at `path`, m/s, by the names in its column `column`: groups in the
+/// order in which they begin, velocities in that of the file.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_groups(path: &Path, column: &str) -> Result<Vec<Group>, Vec<CsvError>> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for (name, velocity) in rows_of(path, Some(column))? {
+        let place = places.get(&name).copied().unwrap_or_else(|| {
+            groups.push(Group { name: name.clone(), velocities: Vec::new() });
+            places.insert(name, groups.len() - 1);
+            groups.len() - 1
+        });
+        groups[place].velocities.push(velocity);
+        if groups.len() > limits::GROUPS_MAX {
+            let (line, problem) = (None, Problem::TooManyGroups);
+            return Err(vec![CsvError { path: path.to_owned(), line, problem }]);
+        }
+    }
+    Ok(groups)
+}
+
+/// Name of the group (empty without a `column` of them) and velocity of each row.
+fn rows_of(path: &Path, column: Option<&str>) -> Result<Vec<(String, f64)>, Vec<CsvError>> {
     let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
     text_of(path)
         .map_err(|located| vec![located])
-        .and_then(|text| parse(&text))
+        .and_then(|text| parse(&text, column))
         .map_err(|problems| problems.into_iter().map(located).collect())
 }
 
@@ -85,7 +121,7 @@ fn text_of(path: &Path) -> Result<String, Located> {
 
 type Located = (Option<usize>, Problem);
 
-fn parse(text: &str) -> Result<Vec<f64>, Vec<Located>> {
+fn parse(text: &str, group: Option<&str>) -> Result<Vec<(String, f64)>, Vec<Located>> {
     let mut lines = without_byte_order_mark(text)
         .lines()
         .enumerate()
@@ -94,12 +130,12 @@ fn parse(text: &str) -> Result<Vec<f64>, Vec<Located>> {
     let Some((number, header)) = lines.next() else {
         return Err(vec![(None, Problem::Empty)]);
     };
-    let columns = Columns::of(header).map_err(|problem| vec![(Some(number), problem)])?;
+    let columns = Columns::of(header, group).map_err(|problem| vec![(Some(number), problem)])?;
     let mut velocities = Vec::new();
     let mut problems = Vec::new();
     for (number, line) in lines {
-        match columns.velocity(line) {
-            Ok(velocity) => velocities.push(velocity),
+        match columns.row(line) {
+            Ok(row) => velocities.push(row),
             Err(problem) => problems.push((Some(number), problem)),
         }
         if problems.len() > REPORTED_MAX {
@@ -118,38 +154,62 @@ fn parse(text: &str) -> Result<Vec<f64>, Vec<Located>> {
     if problems.is_empty() { Ok(velocities) } else { Err(problems) }
 }
 
-/// Where the velocity stands in each row.
+/// Where velocity and group stand in each row.
 struct Columns {
     count: usize,
     velocity: usize,
+    /// With its name.
+    group: Option<(usize, String)>,
 }
 
 impl Columns {
-    fn of(header: &str) -> Result<Self, Problem> {
+    fn of(header: &str, group: Option<&str>) -> Result<Self, Problem> {
         let names = fields(header)?;
-        let mut found = names.iter().enumerate().filter(|(_, name)| name.as_str() == COLUMN);
-        match (found.next(), found.next()) {
-            (Some((velocity, _)), None) => Ok(Self { count: names.len(), velocity }),
-            (Some(_), Some(_)) => Err(Problem::RepeatedColumn),
-            (None, _) if names.iter().all(|name| name.parse::<f64>().is_ok()) => {
-                Err(Problem::NoHeader)
-            }
-            (None, _) => Err(Problem::NoColumn { columns: listed(&names) }),
+        if !names.iter().any(|name| name == COLUMN)
+            && names.iter().all(|name| name.parse::<f64>().is_ok())
+        {
+            return Err(Problem::NoHeader);
         }
+        let group = match group {
+            Some(column) => Some((place_of(column, &names)?, column.to_owned())),
+            None => None,
+        };
+        Ok(Self { count: names.len(), velocity: place_of(COLUMN, &names)?, group })
     }
 
-    fn velocity(&self, line: &str) -> Result<f64, Problem> {
-        let fields = fields(line)?;
+    /// Name of the group, and the velocity.
+    fn row(&self, line: &str) -> Result<(String, f64), Problem> {
+        let mut fields = fields(line)?;
         if fields.len() != self.count {
             return Err(Problem::FieldCount { found: fields.len(), expected: self.count });
         }
-        let field = &fields[self.velocity];
-        match field.parse::<f64>() {
-            Ok(velocity) if VELOCITY.contains(velocity) => Ok(velocity),
-            Ok(found) => Err(Problem::Refused { found }),
-            Err(_) if field.is_empty() => Err(Problem::NoNumber),
-            Err(_) => Err(Problem::NotANumber { found: shortened(field) }),
+        let velocity = velocity(&fields[self.velocity])?;
+        let Some((place, column)) = &self.group else {
+            return Ok((String::new(), velocity));
+        };
+        match std::mem::take(&mut fields[*place]) {
+            name if name.is_empty() => Err(Problem::NoGroup { column: shortened(column) }),
+            name => Ok((name, velocity)),
         }
+    }
+}
+
+fn place_of(column: &str, names: &[String]) -> Result<usize, Problem> {
+    let mut found = names.iter().enumerate().filter(|(_, name)| name.as_str() == column);
+    let column = || shortened(column);
+    match (found.next(), found.next()) {
+        (Some((place, _)), None) => Ok(place),
+        (Some(_), Some(_)) => Err(Problem::RepeatedColumn { column: column() }),
+        (None, _) => Err(Problem::NoColumn { column: column(), columns: listed(names) }),
+    }
+}
+
+fn velocity(field: &str) -> Result<f64, Problem> {
+    match field.parse::<f64>() {
+        Ok(velocity) if VELOCITY.contains(velocity) => Ok(velocity),
+        Ok(found) => Err(Problem::Refused { found }),
+        Err(_) if field.is_empty() => Err(Problem::NoNumber),
+        Err(_) => Err(Problem::NotANumber { found: shortened(field) }),
     }
 }
 

@@ -96,6 +96,8 @@ fn a_minimal_job_has_the_documented_defaults() {
             cost_tolerance: 1e-10,
             size_tolerance: 1e-5,
             initial_step: 0.15,
+            starts: 1,
+            sensitivities: true,
             speculation: true,
         },
     };

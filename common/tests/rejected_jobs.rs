@@ -152,15 +152,21 @@ fn run() {
             ("kind = \"moments\"", "kind = \"likelihood\""),
             ("method = \"simplex\"", "method = \"annealing\""),
             (
-                "realizations = 500\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4\n\
+                 control_variate = true\nmax_failed_fraction = 0.02\n\n\
                  [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
-                "realizations = 1\nseed = 7\nsampling = \"monte_carlo\"\nmax_failed_fraction = 0.02\n\n\
+                "realizations = 1\nseed = 7\nmax_failed_fraction = 0.02\n\n\
                  [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"newton\"",
             ),
             ("max_evaluations = 300", "max_evaluations = 0"),
             ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
             ("size_tolerance = 1e-4", "size_tolerance = 1"),
             ("initial_step = 0.1", "initial_step = 0.6"),
+            ("initial_step = 0.1", "starts = 0"),
+            ("initial_step = 0.1", "starts = 1001"),
+            ("max_evaluations = 300", "max_evaluations = 10000\nstarts = 200"),
+            ("initial_step = 0.1", "sensitivities = 1"),
+            ("initial_step = 0.1", "sensitivity = true"),
             ("speculation = false", "speculation = 1"),
             ("speculation = false", "speculative = true"),
         ],
@@ -187,6 +193,16 @@ fn data() {
             (given, "mean = 3900.0\ncoefficient_of_variation = 0.0"),
             (given, "mean = 0\ncoefficient_of_variation = 0.03"),
             (given, "velocities = [3900.0, 4000.0]\nmean = 3900.0"),
+            (given, "groups = { a = [3900.0, 4000.0] }\nmean = 3900.0"),
+            (given, "groups = { a = [3900.0, 4000.0] }\nvelocities = [3900.0, 4000.0]"),
+            (given, "groups = {}"),
+            (given, "groups = [3900.0, 4000.0]"),
+            (given, "groups = { a = [3900.0, 4000.0], b = 3900.0, \"c d\" = [3900.0, \"x\"] }"),
+            (given, "groups = { a = [3900.0], b = [3900.0, -1.0], \"\" = [3900.0, 4000.0] }"),
+            (given, "groups = { \"a\\tb\" = [3900.0, 4000.0] }"),
+            (given, "group = \"site\""),
+            (given, "velocities = [3900.0, 4000.0]\ngroup = \"site\""),
+            (given, "velocities = \"v.csv\"\ngroup = 3"),
         ],
     );
 }

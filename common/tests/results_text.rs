@@ -1,14 +1,17 @@
 //! The text of results: exact keys, columns and digits.
 
+use std::path::Path;
+
 use osteon_common::case::Setup;
-use osteon_common::job::{Sampling, Search, SearchMethod};
+use osteon_common::document::Format;
+use osteon_common::job::{Data, Group, JobKind, JobSpecification, Sampling, Search, SearchMethod};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
+    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Role, Status,
 };
 use osteon_common::settings::{Method, Picking, SolverSettings};
-use osteon_common::{results_csv, results_json};
+use osteon_common::{job_file, results_csv, results_json};
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
@@ -38,6 +41,7 @@ fn result() -> JobResult {
             outcomes: outcomes(),
         }),
         data: Some(moments(3906.3, 0.02709)),
+        groups: Vec::new(),
         evaluations: 123,
         realizations: 4,
         seed: 9_223_372_036_854_775_807,
@@ -48,6 +52,18 @@ fn result() -> JobResult {
         picking: Picking::default(),
         version: "0.1.0".to_owned(),
     }
+}
+
+/// With every default.
+fn specification() -> JobSpecification {
+    let fixed =
+        Parameter::ALL.map(|name| format!("{} = {{ fixed = {:?} }}", name.name(), POINT.get(name)));
+    let fixed =
+        fixed.join("\n").replace("{ fixed = 0.1029 }", "{ start = 0.1, bounds = [0.02, 0.3] }");
+    let text = format!(
+        "[data]\nmean = 3906.3\ncoefficient_of_variation = 0.02709\n[parameters]\n{fixed}\n"
+    );
+    job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
 }
 
 /// Neither a point nor anything finite, and a reason.
@@ -61,7 +77,7 @@ fn failed() -> JobResult {
 }
 
 fn identified(result: &JobResult) -> String {
-    results_json::identification(result, &Setup::default(), &Search::default())
+    results_json::identification(result, &specification(), &[])
 }
 
 fn check(name: &str, text: &str) {
@@ -91,7 +107,8 @@ fn the_result_says_how_it_was_searched_and_what_its_point_is() {
         let mut result = result();
         result.best.as_mut().unwrap().cost = Some(cost);
         let search = Search { cost_tolerance: 1e-11, ..Search::by(method) };
-        let text = results_json::identification(&result, &Setup::default(), &search);
+        let specification = JobSpecification { search, ..specification() };
+        let text = results_json::identification(&result, &specification, &[]);
         let value: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["search"]["method"], method.name());
         assert_eq!(value["search"]["cost_tolerance"], 1e-11);
@@ -180,6 +197,7 @@ fn a_result_without_a_point_gives_none() {
 fn history() {
     let row = |number, moments, cost, failures| Evaluation {
         number,
+        role: Role::default(),
         point: POINT,
         moments,
         cost,
@@ -187,13 +205,16 @@ fn history() {
         estimated_error: None,
     };
     let none = FailureCounts::default();
-    let text = results_csv::history(&[
+    let varied = Role { varied: Some(Parameter::Density), ..Role::default() };
+    let beside = Evaluation { role: varied, ..row(3, None, None, none) };
+    let rows = [
         row(0, Some(moments(3906.5, 0.0271)), Some(1e-3), none),
         row(1, Some(moments(3906.5, 0.0271)), Some(f64::INFINITY), FailureCounts::of(&outcomes())),
         row(2, None, None, none),
-    ]);
+        beside,
+    ];
     assert_eq!(
-        text,
+        results_csv::history(&specification(), &rows),
         "evaluation,density,longitudinal_young_modulus,longitudinal_poisson_ratio,\
          longitudinal_shear_modulus,transverse_young_modulus,transverse_poisson_ratio,dispersion,\
          mean,coefficient_of_variation,cost,failures\n\
@@ -201,6 +222,27 @@ fn history() {
          1,1598.8,17717000000.0,0.3816,4795000000.0,9825400000.0,0.4495,0.1029,3906.5,0.0271,inf,2\n\
          2,1598.8,17717000000.0,0.3816,4795000000.0,9825400000.0,0.4495,0.1029,,,,0\n"
     );
+}
+
+#[test]
+fn the_history_names_start_and_group() {
+    let mut specification = specification();
+    let group = |name: &str| Group { name: name.to_owned(), velocities: vec![3900.0, 3950.0] };
+    specification.data = Some(Data::Groups(vec![group("left"), group("right, \"distal\"")]));
+    specification.search.starts = 2;
+    let row = Evaluation {
+        number: 7,
+        role: Role { group: 1, start: 1, varied: None },
+        point: POINT,
+        moments: None,
+        cost: Some(0.5),
+        failures: FailureCounts::default(),
+        estimated_error: None,
+    };
+    let text = results_csv::history(&specification, &[row]);
+    let (header, rows) = text.split_once('\n').unwrap();
+    assert!(header.ends_with(",cost,failures,start,group"), "{header}");
+    assert!(rows.ends_with(",0.5,0,1,\"right, \"\"distal\"\"\"\n"), "{rows}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use osteon_common::document::Format;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::file_error::ContentError;
 use osteon_common::job::{
-    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
@@ -112,6 +112,15 @@ fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
 fn data() -> impl Strategy<Value = Data> {
     prop_oneof![
         prop::collection::vec(1e-3..1e6, 2..40).prop_map(Data::Velocities),
+        prop::collection::btree_map(
+            "[ -~äβ骨\"\\\\]{1,20}",
+            prop::collection::vec(1e-3..1e6, 2..9),
+            1..5
+        )
+        .prop_map(|groups| {
+            let group = |(name, velocities)| Group { name, velocities };
+            Data::Groups(groups.into_iter().map(group).collect())
+        }),
         (positive(), positive()).prop_map(|(mean, coefficient_of_variation)| Data::Moments {
             mean,
             coefficient_of_variation
@@ -135,18 +144,20 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
 
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
-    let numbers = (1_u64..=1_000_000, positive(), 0.0..1.0, 1e-300..0.5);
-    (method, numbers, any::<bool>()).prop_map(|(method, numbers, speculation)| {
-        let (max_evaluations, cost_tolerance, size_tolerance, initial_step) = numbers;
-        Search {
+    let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
+    let truths = (any::<bool>(), any::<bool>());
+    (method, 1_u64..=1000, numbers, 1_u64..=100, truths).prop_map(
+        |(method, max_evaluations, numbers, starts, truths)| Search {
             method,
             max_evaluations,
-            cost_tolerance,
-            size_tolerance,
-            initial_step,
-            speculation,
-        }
-    })
+            cost_tolerance: numbers.0,
+            size_tolerance: numbers.1,
+            initial_step: numbers.2,
+            starts,
+            sensitivities: truths.0,
+            speculation: truths.1,
+        },
+    )
 }
 
 /// Almost always valid.

@@ -5,16 +5,22 @@
 use std::fmt::Write as _;
 
 use osteon_common::document::Format;
-use osteon_common::job::{Data, JobKind};
+use osteon_common::job::{Data, Group, JobKind};
 use osteon_common::job_file;
 
 /// What the job of `files/job.toml` gets from a file with these bytes.
 fn read(bytes: &[u8]) -> Result<Option<Data>, String> {
+    read_as(bytes, "")
+}
+
+/// The same with more keys in `[data]`.
+fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
     let directory = tempfile::tempdir().unwrap();
     std::fs::create_dir(directory.path().join("data")).unwrap();
     std::fs::write(directory.path().join("data/v.csv"), bytes).unwrap();
     let given = "velocities = [3900.5, 4000, 3950.25]";
-    let text = include_str!("files/job.toml").replace(given, "velocities = \"data/v.csv\"");
+    let text = include_str!("files/job.toml")
+        .replace(given, &format!("velocities = \"data/v.csv\"\n{more}"));
     match job_file::parse(&text, Format::Toml, directory.path(), JobKind::Identification) {
         Ok(job) => Ok(job.data),
         Err(error) => Err(error.to_string().replace(&*directory.path().to_string_lossy(), "DIR")),
@@ -35,6 +41,32 @@ fn what_is_read() {
     ] {
         assert_eq!(read(text.as_bytes()), Ok(expected.clone()), "{text}");
     }
+}
+
+#[test]
+fn groups_stand_in_the_order_in_which_they_begin() {
+    let text = "bone,velocity\nleft,3900.5\nright,4000\n\"left\",3950\nright,4010\n";
+    let groups = [("left", [3900.5, 3950.0]), ("right", [4000.0, 4010.0])];
+    let group = |(name, velocities): (&str, [f64; 2])| Group {
+        name: name.to_owned(),
+        velocities: velocities.to_vec(),
+    };
+    let expected = Data::Groups(groups.map(group).to_vec());
+    assert_eq!(read_as(text.as_bytes(), "group = \"bone\""), Ok(Some(expected)));
+}
+
+#[test]
+fn groups_that_are_refused() {
+    let check = |text: &str, expected: &str| {
+        let message = read_as(text.as_bytes(), "group = \"bone\"").unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    check("site,velocity\na,1\na,2\n", "no column `bone`; the header has `site`, `velocity`");
+    check("bone,velocity,bone\na,1,b\n", "the header has the column `bone` twice");
+    check("bone,velocity\na,1\n,2\n", "line 3: bone is empty; it must name the group");
+    check("bone,velocity\na,1\na,2\nb,3\n", "data.groups.b: is a list of 1;");
+    let many: String = (0..1001).map(|i| format!("g{i},1\n")).collect();
+    check(&format!("bone,velocity\n{many}"), "has more than 1000 groups");
 }
 
 #[test]

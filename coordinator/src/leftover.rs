@@ -2,7 +2,7 @@
 //! length nor the version that went it matters.
 
 use osteon_common::job::JobSpecification;
-use osteon_common::results::{Evaluation, JobResult};
+use osteon_common::results::{BestPoint, Evaluation, JobResult};
 use thiserror::Error;
 
 use crate::ids::JobId;
@@ -68,12 +68,14 @@ pub(crate) struct Reading {
     end: EndRecord,
     record: Option<JobRecord>,
     summary: Option<Summary>,
+    /// Best points of the groups so far.
+    of_groups: Vec<Option<BestPoint>>,
 }
 
 impl Reading {
     /// Nothing is read yet.
     pub(crate) fn new(end: EndRecord) -> Self {
-        Self { end, record: None, summary: None }
+        Self { end, record: None, summary: None, of_groups: Vec::new() }
     }
 
     /// Reads the next record; what the job left, once that was the last. Blocks for that long.
@@ -86,23 +88,40 @@ impl Reading {
             self.record = Some(store.job(job)?.ok_or(ReadError::Pruned { job })?);
             return Ok(None);
         };
-        let Some(summary) = self.summary.take() else {
+        let Some(summary) = &self.summary else {
             let summary = store.summary(job)?;
             self.summary = Some(found(store, job, summary, ReadError::NoSummary { job })?);
             return Ok(None);
         };
-        let best = match summary.best {
-            Some(number) => {
-                let best = store.evaluation(job, number)?;
-                Some(found(store, job, best, ReadError::NoBest { job, number })?.outcomes)
-            }
-            None => None,
-        };
-        let specification = (*record.specification).clone();
+        let specification = &record.specification;
+        if let Some(group) = summary.groups.get(self.of_groups.len()) {
+            let best = best(store, job, specification, summary, group.best)?;
+            // The outcomes of all groups together may be very many.
+            self.of_groups.push(best.map(|best| BestPoint { outcomes: Vec::new(), ..best }));
+            return Ok(None);
+        }
+        let best = best(store, job, specification, summary, summary.best)?;
         let (ending, version) = (&self.end.ending, &self.end.version);
-        let result = summary.result(&specification, ending, version, best.as_deref());
-        Ok(Some(Leftover { specification, result, history: summary.history }))
+        let of_groups = std::mem::take(&mut self.of_groups);
+        let result = summary.result(specification, ending, version, best, of_groups);
+        let specification = (**specification).clone();
+        let history = self.summary.take().map(|summary| summary.history).unwrap_or_default();
+        Ok(Some(Leftover { specification, result, history }))
     }
+}
+
+/// The best point of a job or a group, whose evaluation has this number, if there is one.
+fn best(
+    store: &mut dyn Store,
+    job: JobId,
+    specification: &JobSpecification,
+    summary: &Summary,
+    number: Option<u64>,
+) -> Result<Option<BestPoint>, ReadError> {
+    let Some(number) = number else { return Ok(None) };
+    let evaluation = store.evaluation(job, number)?;
+    let evaluation = found(store, job, evaluation, ReadError::NoBest { job, number })?;
+    Ok(summary.best_point(specification, number, &evaluation.outcomes))
 }
 
 /// What is missing was forgotten with its job, or is `lost`.

@@ -1,29 +1,31 @@
 //! A job as an ask/tell state machine: which point next, and what its outcomes mean.
 //!
-//! An identification asks its method of search, a propagation evaluates one point. Everything here
-//! is a function of the specification and of the outcomes told: telling the stored evaluations
-//! again rebuilds the same state, to the bit.
+//! An identification searches for one set of data after the other, a propagation evaluates one point.
+//! Everything here is a function of the specification and of the outcomes told: telling the stored
+//! evaluations again rebuilds the same state, to the bit.
 
 use std::sync::Arc;
 
 use osteon_common::digest::PathDigest;
-use osteon_common::job::{Data, JobKind, JobSpecification, SearchMethod};
+use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
-use osteon_common::results::{BestPoint, EstimatedError, Evaluation, JobResult, Moments, Status};
+use osteon_common::results::{
+    BestPoint, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments,
+    Role, Status,
+};
 use osteon_common::statistics::{self, Verdict};
 use thiserror::Error;
 
-use crate::ask::{Ask, Stop};
-use crate::search_box::{SearchBox, Side};
-use crate::simplex::RESTARTS_MAX;
-
-use self::method::Method;
+use self::identification::Identification;
 
 pub(crate) use self::ahead::same_point;
 
 mod ahead;
+mod identification;
 mod method;
+mod one_set;
+mod reasons;
 #[cfg(test)]
 mod tests;
 
@@ -50,10 +52,13 @@ pub struct Ending {
 pub struct Summary {
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
     pub digest: String,
-    /// Number of the best evaluation, if a point was feasible.
+    /// Number of the best evaluation, if a point was feasible; `None` where the data are groups.
     pub best: Option<u64>,
-    /// Rows of the history, in order.
+    /// Rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
+    /// How the search for each group of the data ended, as far as it went; empty where there are
+    /// none.
+    pub groups: Vec<GroupEnding>,
 }
 
 /// A stored evaluation of another search than this one.
@@ -71,16 +76,9 @@ pub struct ReplayError {
     pub expected: Option<Box<[f64; 7]>>,
 }
 
-/// The lowest finite cost so far; of a propagation its only evaluation.
-#[derive(Debug, Clone)]
-struct Best {
-    row: Evaluation,
-    outcomes: Arc<[Outcome]>,
-}
-
 #[derive(Debug, Clone)]
 enum Plan {
-    Identification { method: Method, data: Moments },
+    Identification(Box<Identification>),
     Propagation { told: Option<Verdict> },
 }
 
@@ -88,38 +86,24 @@ enum Plan {
 #[derive(Debug, Clone)]
 pub struct Search {
     specification: Arc<JobSpecification>,
-    space: SearchBox,
     plan: Plan,
     digest: PathDigest,
     history: Vec<Evaluation>,
-    best: Option<Best>,
+    /// Of the evaluation that a result needs the outcomes of.
+    outcomes: Option<Arc<[Outcome]>>,
 }
 
 impl Search {
     /// A search of which nothing is known. The specification has passed its check.
     pub fn new(specification: Arc<JobSpecification>) -> Self {
-        let space = SearchBox::new(specification.parameters);
         let plan = match (specification.kind, &specification.data) {
-            (JobKind::Identification, Some(data)) => {
-                let data = data_moments(data);
-                Plan::Identification {
-                    method: Method::new(&specification.search, space, data),
-                    data,
-                }
+            (JobKind::Identification, Some(_)) => {
+                Plan::Identification(Box::new(Identification::new(&specification)))
             }
             // An identification without data has not passed the check.
             (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
         };
-        let mut search = Self {
-            specification,
-            space,
-            plan,
-            digest: PathDigest::new(),
-            history: Vec::new(),
-            best: None,
-        };
-        search.refuse_inadmissible();
-        search
+        Self { specification, plan, digest: PathDigest::new(), history: Vec::new(), outcomes: None }
     }
 
     /// Takes the outcomes of a stored evaluation.
@@ -160,9 +144,9 @@ impl Search {
     /// The next point, or how the job ends. Asking changes nothing.
     pub fn ask(&self) -> Step {
         match &self.plan {
-            Plan::Identification { method, .. } => match method.ask() {
-                Ask::At(at) => Step::Evaluate(self.space.point(at)),
-                Ask::Stopped(stop) => Step::Done(self.ending(stop)),
+            Plan::Identification(identification) => match identification.point() {
+                Some(point) => Step::Evaluate(point),
+                None => Step::Done(identification.ending(&self.specification)),
             },
             Plan::Propagation { told: None } => Step::Evaluate(self.specification.start()),
             Plan::Propagation { told: Some(verdict) } => Step::Done(self.propagated(verdict)),
@@ -176,32 +160,31 @@ impl Search {
             return;
         };
         let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
-        let cost = match &mut self.plan {
-            Plan::Identification { method, data } => {
-                let cost = verdict.cost(*data);
-                method.tell(cost, verdict.moments);
-                Some(cost)
+        self.digest.add_evaluation(&point, &outcomes);
+        let mut row = Evaluation { estimated_error, ..self.row(point, &verdict, &outcomes) };
+        match &mut self.plan {
+            Plan::Identification(identification) => {
+                row = identification.tell(&self.specification, row, verdict, outcomes);
             }
             Plan::Propagation { told } => {
                 *told = Some(verdict);
-                None
+                self.outcomes = Some(outcomes);
             }
-        };
-        self.digest.add_evaluation(&point, &outcomes);
-        let row = Evaluation {
+        }
+        self.history.push(row);
+    }
+
+    /// What is known of the point asked for before its cost is.
+    fn row(&self, point: Point, verdict: &Verdict, outcomes: &[Outcome]) -> Evaluation {
+        Evaluation {
             number: self.evaluations(),
+            role: Role::default(),
             point,
             moments: verdict.moments,
-            cost,
-            failures: FailureCounts::of(&outcomes),
-            estimated_error,
-        };
-        self.history.push(row);
-        let feasible = row.cost.is_none_or(f64::is_finite);
-        if feasible && self.best.as_ref().is_none_or(|best| row.cost < best.row.cost) {
-            self.best = Some(Best { row, outcomes });
+            cost: None,
+            failures: FailureCounts::of(outcomes),
+            estimated_error: None,
         }
-        self.refuse_inadmissible();
     }
 
     /// Points whose outcomes were told.
@@ -209,160 +192,124 @@ impl Search {
         self.history.len() as u64
     }
 
-    /// Rows of the history, in order.
+    /// Rows of all evaluations, in order.
     pub fn history(&self) -> &[Evaluation] {
         &self.history
     }
 
-    /// The row with the lowest finite cost, if a point was feasible; of equal ones the first. Of
-    /// a propagation the only one.
+    /// The best feasible evaluation, if there is one: that of the set of data that the search is at.
+    /// Of a propagation the only one.
     pub fn best(&self) -> Option<&Evaluation> {
-        self.best.as_ref().map(|best| &best.row)
+        match &self.plan {
+            Plan::Identification(identification) => identification.best(),
+            Plan::Propagation { .. } => self.history.first(),
+        }
     }
 
     /// What the path comes to so far.
     pub fn summary(&self) -> Summary {
+        let groups = match &self.plan {
+            Plan::Identification(identification) if self.is_grouped() => identification.endings(),
+            _ => Vec::new(),
+        };
+        let best = self.best().filter(|_| !self.is_grouped());
         Summary {
             digest: self.digest.finish(),
-            best: self.best().map(|row| row.number),
+            best: best.map(|row| row.number),
             history: self.history.clone(),
+            groups,
         }
     }
 
-    /// What the job leaves, given how it ended, computed by `version` of the program.
+    /// What the job leaves, given how it ended, computed by `version` of the program. Of groups,
+    /// whose outcomes are in the store only, nothing is known here.
     pub fn result(&self, ending: &Ending, version: &str) -> JobResult {
-        let outcomes = self.best.as_ref().map(|best| &*best.outcomes);
-        self.summary().result(&self.specification, ending, version, outcomes)
-    }
-
-    /// Refuses points until the method is done or asks for an admissible one.
-    fn refuse_inadmissible(&mut self) {
-        if let Plan::Identification { method, .. } = &mut self.plan {
-            method.refuse_inadmissible(&self.space);
-        }
-    }
-
-    fn ending(&self, stop: Stop) -> Ending {
-        let (status, reason) = match stop {
-            Stop::CostReached => (Status::Converged, None),
-            Stop::Settled => (Status::Converged, self.out_of_reach()),
-            Stop::EvaluationsUsedUp if self.best().is_none() => {
-                (Status::Failed, Some(self.no_feasible_point()))
-            }
-            Stop::EvaluationsUsedUp => (Status::MaxEvaluations, None),
-            Stop::RestartsUsedUp => {
-                let reason = format!(
-                    "the simplex collapsed, was restarted {RESTARTS_MAX} times and was still \
-                     finding better points; run on from the best point"
-                );
-                (Status::MaxEvaluations, Some(reason))
-            }
-            Stop::Infeasible => (Status::Failed, Some(self.no_feasible_point())),
+        let summary = self.summary();
+        let outcomes = match &self.plan {
+            Plan::Identification(identification) => identification.best_outcomes(),
+            Plan::Propagation { .. } => self.outcomes.as_deref(),
         };
-        Ending { status, reason }
+        let best = summary.best.zip(outcomes).and_then(|(number, outcomes)| {
+            summary.best_point(&self.specification, number, outcomes)
+        });
+        summary.result(&self.specification, ending, version, best, Vec::new())
+    }
+
+    fn is_grouped(&self) -> bool {
+        matches!(self.specification.data, Some(Data::Groups(_)))
     }
 
     fn propagated(&self, verdict: &Verdict) -> Ending {
         if verdict.feasible {
             return Ending { status: Status::Converged, reason: None };
         }
-        let reason = self.history.first().map_or_else(String::new, |row| self.failed(row));
-        Ending { status: Status::Failed, reason: Some(reason) }
-    }
-
-    /// Why a search that settled has no lower cost, where its method knows.
-    fn out_of_reach(&self) -> Option<String> {
-        let best =
-            self.best().filter(|_| self.specification.search.method == SearchMethod::Newton)?;
-        let on_bounds = self.space.on_bounds(&best.point);
-        let on_bounds: Vec<String> = on_bounds
-            .iter()
-            .map(|(parameter, side)| match side {
-                Side::Lower => format!("{} on its lower bound", parameter.name()),
-                Side::Upper => format!("{} on its upper bound", parameter.name()),
-            })
-            .collect();
-        let (where_it_is, cure) = if on_bounds.is_empty() {
-            (String::new(), "free more parameters")
-        } else {
-            (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
-        };
-        Some(format!(
-            "settled at a cost of {:.3e}, above cost_tolerance {:?}: no point near the best one{} \
-             matches the data better; {}",
-            best.cost.unwrap_or(f64::NAN),
-            self.specification.search.cost_tolerance,
-            where_it_is,
-            cure
-        ))
-    }
-
-    fn no_feasible_point(&self) -> String {
-        if self.best().is_some() {
-            return "every velocity of the points evaluated is the same: their coefficient of \
-                    variation has no logarithm; raise [monte_carlo] realizations"
-                .to_owned();
-        }
-        match self.history.first() {
-            None => "no feasible point: every point tried is inadmissible; \
-                     change the starts or the bounds of [parameters]"
-                .to_owned(),
-            Some(row) => format!(
-                "no feasible point among the {} evaluated; at the first {}; change the starts of \
-                 [parameters], raise [solver] refinement, or allow a larger \
-                 [monte_carlo] max_failed_fraction",
-                self.evaluations(),
-                self.failed(row)
-            ),
-        }
-    }
-
-    fn failed(&self, row: &Evaluation) -> String {
-        let kinds: Vec<String> =
-            row.failures.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
-        format!(
-            "{} of {} realizations failed ({}); max_failed_fraction is {}",
-            row.failures.total(),
-            self.specification.monte_carlo.realizations,
-            kinds.join(", "),
-            self.specification.monte_carlo.max_failed_fraction
-        )
+        let reason = self.history.first();
+        let reason = reason.map(|row| reasons::failed(row, &self.specification));
+        Ending { status: Status::Failed, reason: Some(reason.unwrap_or_default()) }
     }
 }
 
 impl Summary {
     /// The summary of a path without an evaluation.
     pub fn empty() -> Self {
-        Self { digest: PathDigest::new().finish(), best: None, history: Vec::new() }
+        Self {
+            digest: PathDigest::new().finish(),
+            best: None,
+            history: Vec::new(),
+            groups: Vec::new(),
+        }
+    }
+
+    /// Evaluation `number` as a best point, given its outcomes.
+    pub fn best_point(
+        &self,
+        specification: &JobSpecification,
+        number: u64,
+        outcomes: &[Outcome],
+    ) -> Option<BestPoint> {
+        let row = self.history.iter().find(|row| row.number == number)?;
+        let velocity: Option<Estimate> =
+            statistics::estimate(&specification.monte_carlo, &row.point, outcomes);
+        Some(BestPoint {
+            point: row.point,
+            cost: row.cost,
+            velocity,
+            failures: row.failures,
+            estimated_error: row.estimated_error,
+            outcomes: outcomes.to_vec(),
+        })
     }
 
     /// What a job with this path leaves, given how it ended, the version of the program that
-    /// computed it, and the outcomes of the best evaluation.
+    /// computed it, its best point, or those of its groups.
     pub fn result(
         &self,
         specification: &JobSpecification,
         ending: &Ending,
         version: &str,
-        outcomes: Option<&[Outcome]>,
+        best: Option<BestPoint>,
+        of_groups: Vec<Option<BestPoint>>,
     ) -> JobResult {
-        let row = self.history.iter().find(|row| Some(row.number) == self.best);
+        let data = specification.data.as_ref();
+        let data = data.filter(|_| specification.kind == JobKind::Identification);
+        let names = data.into_iter().flat_map(Data::names);
+        let found = names.zip(&self.groups).zip(of_groups).enumerate();
+        let groups = found.map(|(set, ((name, ending), best))| GroupResult {
+            name: name.to_owned(),
+            status: ending.status,
+            reason: ending.reason.clone(),
+            best,
+            data: data.map_or(NOWHERE, |data| data.moments(set)),
+        });
+        let searched = self.history.iter().filter(|row| row.role.varied.is_none());
         JobResult {
             status: ending.status,
             reason: ending.reason.clone(),
             digest: self.digest.clone(),
-            best: row.zip(outcomes).map(|(row, outcomes)| BestPoint {
-                point: row.point,
-                cost: row.cost,
-                velocity: statistics::estimate(&specification.monte_carlo, &row.point, outcomes),
-                failures: row.failures,
-                estimated_error: row.estimated_error,
-                outcomes: outcomes.to_vec(),
-            }),
-            data: match (specification.kind, &specification.data) {
-                (JobKind::Identification, Some(data)) => Some(data_moments(data)),
-                (JobKind::Propagation | JobKind::Identification, _) => None,
-            },
-            evaluations: self.history.len() as u64,
+            best,
+            groups: groups.collect(),
+            data: data.filter(|data| data.names().next().is_none()).map(|data| data.moments(0)),
+            evaluations: searched.count() as u64,
             realizations: specification.monte_carlo.realizations,
             seed: specification.monte_carlo.seed,
             sampling: specification.monte_carlo.sampling,
@@ -375,12 +322,5 @@ impl Summary {
     }
 }
 
-fn data_moments(data: &Data) -> Moments {
-    match data {
-        Data::Velocities(velocities) => statistics::moments(velocities)
-            .unwrap_or(Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN }),
-        Data::Moments { mean, coefficient_of_variation } => {
-            Moments { mean: *mean, coefficient_of_variation: *coefficient_of_variation }
-        }
-    }
-}
+/// Moments of no data.
+const NOWHERE: Moments = Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN };

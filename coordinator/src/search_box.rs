@@ -34,6 +34,23 @@ impl SearchBox {
         self.ranges.iter().filter_map(unit_start).collect()
     }
 
+    /// The box with its start at these coordinates, of which there may be more than are needed.
+    pub fn started_at(&self, coordinates: &[f64]) -> Self {
+        let mut coordinates = coordinates.iter();
+        Self {
+            ranges: self.ranges.map(|range| match range {
+                Range::Fixed(_) => range,
+                Range::Free { lower, upper, start } => match coordinates.next() {
+                    Some(u) => {
+                        let start = (lower + u * (upper - lower)).clamp(lower, upper);
+                        Range::Free { start, lower, upper }
+                    }
+                    None => Range::Free { start, lower, upper },
+                },
+            }),
+        }
+    }
+
     /// The point with these coordinates. A coordinate that never moved keeps the bits of its
     /// start.
     pub fn point(&self, at: &[f64]) -> Point {

@@ -254,7 +254,8 @@ fn parts(leftover: Leftover) -> impl Iterator<Item = Part> + Send {
     let outcomes = result.best.map(|best| best.outcomes).unwrap_or_default();
     let rows = (0..history.len().div_ceil(HISTORY_BLOCK_ROWS)).map(move |block| {
         let rows = history.iter().skip(block * HISTORY_BLOCK_ROWS).take(HISTORY_BLOCK_ROWS);
-        Part::History(HistoryBlock { rows: rows.map(results::evaluation_to_message).collect() })
+        let rows = rows.map(results::evaluation_to_message).collect();
+        Part::History(HistoryBlock { rows, groups: Vec::new() })
     });
     let blocks = (0..outcomes.len().div_ceil(REALIZATION_BLOCK)).map(move |block| {
         let first = block * REALIZATION_BLOCK;

@@ -7,7 +7,7 @@ use osteon_proto::specification::kind_to_message;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
-use crate::state::{EndedJob, Job, LostInARow, Stage, State, max_evaluations};
+use crate::state::{EndedJob, Job, LostInARow, Stage, State};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -25,7 +25,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
     let mut snapshot = JobSnapshot {
         job: id.to_string(),
         kind: kind_to_message(specification.kind).into(),
-        max_evaluations: max_evaluations(specification),
+        max_evaluations: specification.evaluations_max(),
         realizations,
         workers: workers(state),
         elapsed_s: now.saturating_sub(job.record.accepted).as_secs_f64(),

@@ -477,7 +477,7 @@ impl EndedJob {
             request: RequestName::of(record),
             identity: identity(specification),
             kind: specification.kind,
-            max_evaluations: max_evaluations(specification),
+            max_evaluations: specification.evaluations_max(),
             realizations: specification.monte_carlo.realizations,
             accepted: record.accepted,
             sequence: self::sequence(sequence, end.ended),
@@ -502,14 +502,6 @@ impl RequestName {
 /// clock it grows over restarts too.
 pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
     u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
-}
-
-/// Most evaluations that a job may take.
-pub(crate) fn max_evaluations(specification: &JobSpecification) -> u64 {
-    match specification.kind {
-        JobKind::Identification => specification.search.max_evaluations,
-        JobKind::Propagation => 1,
-    }
 }
 
 /// Digest of a specification: equal for equal ones only.

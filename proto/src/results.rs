@@ -3,8 +3,10 @@
 use osteon_common::job::{JobKind, MonteCarlo, Sampling};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
+use osteon_common::parameters::Parameter;
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Status,
+    BestPoint, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments,
+    Role, Status,
 };
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::violations::Violations;
@@ -20,13 +22,7 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         status: status_to_message(result.status).into(),
         reason: result.reason.clone().unwrap_or_default(),
         digest: result.digest.clone(),
-        best: result.best.as_ref().map(|best| v1::BestPoint {
-            point: best.point.0.to_vec(),
-            cost: best.cost,
-            velocity: best.velocity.as_ref().map(estimate_to_message),
-            failures: failures_to_message(&best.failures),
-            estimated_error: best.estimated_error.map(errors_to_message),
-        }),
+        best: result.best.as_ref().map(best_to_message),
         data: result.data.as_ref().map(moments_to_message),
         evaluations: result.evaluations,
         realizations: result.realizations,
@@ -37,7 +33,66 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         sampling: result.sampling.name().to_owned(),
         scrambles: result.scrambles,
         control_variate: result.control_variate,
+        groups: result.groups.iter().map(group_to_message).collect(),
     }
+}
+
+/// The message of how the search for a group ended.
+pub fn group_ending_to_message(ending: &GroupEnding) -> v1::GroupEnding {
+    v1::GroupEnding {
+        status: status_to_message(ending.status).into(),
+        reason: ending.reason.clone().unwrap_or_default(),
+        best: ending.best,
+    }
+}
+
+/// How the search for a group ended.
+///
+/// # Errors
+/// When the status is absent or unknown.
+pub fn group_ending_from_message(message: &v1::GroupEnding) -> Result<GroupEnding, Malformed> {
+    Ok(GroupEnding {
+        status: ended(message.status)?,
+        reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
+        best: message.best,
+    })
+}
+
+fn group_to_message(group: &GroupResult) -> v1::GroupResult {
+    v1::GroupResult {
+        name: group.name.clone(),
+        status: status_to_message(group.status).into(),
+        reason: group.reason.clone().unwrap_or_default(),
+        best: group.best.as_ref().map(best_to_message),
+        data: Some(moments_to_message(&group.data)),
+    }
+}
+
+fn group_from_message(message: &v1::GroupResult) -> Result<GroupResult, Malformed> {
+    let data = message.data.as_ref().ok_or(Malformed::Missing { field: "data" })?;
+    let best = message.best.as_ref().map(|best| best_from_message(best, Vec::new()));
+    Ok(GroupResult {
+        name: message.name.clone(),
+        status: ended(message.status)?,
+        reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
+        best: best.transpose()?,
+        data: moments_from_message(data),
+    })
+}
+
+fn best_to_message(best: &BestPoint) -> v1::BestPoint {
+    v1::BestPoint {
+        point: best.point.0.to_vec(),
+        cost: best.cost,
+        velocity: best.velocity.as_ref().map(estimate_to_message),
+        failures: failures_to_message(&best.failures),
+        estimated_error: best.estimated_error.map(errors_to_message),
+    }
+}
+
+/// The status of something that has ended.
+fn ended(number: i32) -> Result<Status, Malformed> {
+    status_from_message(number)?.ok_or(Malformed::Missing { field: "status" })
 }
 
 /// The result of a message, with the `outcomes` of its best point.
@@ -55,12 +110,12 @@ pub fn from_message(
     let (solver, picking) = settings_from_message(message)?;
     let (sampling, scrambles) = sampling_from_message(message)?;
     Ok(JobResult {
-        status: status_from_message(message.status)?
-            .ok_or(Malformed::Missing { field: "status" })?,
+        status: ended(message.status)?,
         reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
         digest: message.digest.clone(),
         best,
         data: message.data.as_ref().map(moments_from_message),
+        groups: message.groups.iter().map(group_from_message).collect::<Result<_, _>>()?,
         evaluations: message.evaluations,
         realizations: message.realizations,
         seed: message.seed,
@@ -82,16 +137,29 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
         cost: evaluation.cost,
         failures: failures_to_message(&evaluation.failures),
         estimated_error: evaluation.estimated_error.map(errors_to_message),
+        group: evaluation.role.group,
+        start: evaluation.role.start,
+        varied: evaluation.role.varied.map_or(0, |parameter| parameter as u32 + 1),
     }
 }
 
 /// One row of the history.
 ///
 /// # Errors
-/// When the point has not seven finite numbers, or a failure's code is not known.
+/// When the point has not seven finite numbers, or a failure's code or the varied parameter is not
+/// known.
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
+    let varied = match message.varied {
+        0 => None,
+        number => {
+            let value = number.into();
+            let parameter = Parameter::ALL.get(number as usize - 1).copied();
+            Some(parameter.ok_or(Malformed::UnknownValue { field: "varied", value })?)
+        }
+    };
     Ok(Evaluation {
         number: message.number,
+        role: Role { group: message.group, start: message.start, varied },
         point: batch::point(&message.point)?,
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,
@@ -251,148 +319,4 @@ fn failures_from_message(messages: &[v1::FailureCount]) -> Result<FailureCounts,
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-    use osteon_common::parameters::Point;
-
-    fn moments() -> impl Strategy<Value = Moments> {
-        (1.0..1e4, 0.0..1.0)
-            .prop_map(|(mean, coefficient_of_variation)| Moments { mean, coefficient_of_variation })
-    }
-
-    fn failures() -> impl Strategy<Value = FailureCounts> {
-        proptest::array::uniform5(0_u64..1000).prop_map(|counts| {
-            let mut failures = FailureCounts::default();
-            for (kind, count) in FailureKind::ALL.into_iter().zip(counts) {
-                failures.add(kind, count);
-            }
-            failures
-        })
-    }
-
-    fn estimated_error() -> impl Strategy<Value = Option<EstimatedError>> {
-        let errors = (0.0..1e-3, 0.0..1.0);
-        proptest::option::of(
-            errors.prop_map(|(median, largest)| EstimatedError { median, largest }),
-        )
-    }
-
-    fn cost() -> impl Strategy<Value = Option<f64>> {
-        proptest::option::of(prop_oneof![0.0..10.0, Just(f64::INFINITY)])
-    }
-
-    fn point() -> impl Strategy<Value = Point> {
-        proptest::array::uniform7(-1e12..1e12).prop_map(Point)
-    }
-
-    prop_compose! {
-        fn best()(
-            point in point(),
-            cost in cost(),
-            velocity in proptest::option::of((moments(), moments(), any::<bool>())),
-            failures in failures(),
-            estimated_error in estimated_error(),
-        ) -> BestPoint {
-            let velocity = velocity.map(|(moments, standard_error, controlled)| Estimate {
-                moments,
-                standard_error,
-                controlled,
-            });
-            let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
-            BestPoint { point, cost, velocity, failures, estimated_error, outcomes }
-        }
-    }
-
-    prop_compose! {
-        fn result()(
-            status in 0..Status::ALL.len(),
-            reason in proptest::option::of("[a-z ]{1,20}"),
-            best in proptest::option::of(best()),
-            data in proptest::option::of(moments()),
-            evaluations: u64,
-            realizations: u64,
-            seed: u64,
-            sampling in 0..Sampling::ALL.len(),
-            scrambles in 1..=SCRAMBLES_MAX,
-            control_variate: bool,
-        ) -> JobResult {
-            JobResult {
-                status: Status::ALL[status],
-                reason,
-                digest: "0123456789abcdef".repeat(4),
-                best,
-                data,
-                evaluations,
-                realizations,
-                seed,
-                sampling: Sampling::ALL[sampling],
-                scrambles,
-                control_variate,
-                solver: SolverSettings::default(),
-                picking: Picking::default(),
-                version: "0.1.0".to_owned(),
-            }
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn results_survive_the_wire(result in result()) {
-            let outcomes = result.best.as_ref().map(|best| best.outcomes.clone());
-            let message = to_message(&result);
-            prop_assert_eq!(from_message(&message, outcomes.unwrap_or_default()), Ok(result));
-        }
-
-        #[test]
-        fn evaluations_survive_the_wire(
-            number: u64,
-            point in point(),
-            moments in proptest::option::of(moments()),
-            cost in cost(),
-            failures in failures(),
-            estimated_error in estimated_error(),
-        ) {
-            let evaluation = Evaluation { number, point, moments, cost, failures, estimated_error };
-            let message = evaluation_to_message(&evaluation);
-            prop_assert_eq!(evaluation_from_message(&message), Ok(evaluation));
-        }
-    }
-
-    #[test]
-    fn what_no_coordinator_writes_is_refused() {
-        assert_eq!(
-            status_from_message(9),
-            Err(Malformed::UnknownValue { field: "status", value: 9 })
-        );
-        assert_eq!(kind_from_message(0), Err(Malformed::UnknownValue { field: "kind", value: 0 }));
-        let twice =
-            [v1::FailureCount { code: 1, count: 1 }, v1::FailureCount { code: 1, count: 2 }];
-        assert_eq!(
-            failures_from_message(&twice),
-            Err(Malformed::UnknownValue { field: "code", value: 1 })
-        );
-        for median in [-1e-9, f64::NAN, f64::INFINITY] {
-            let errors = v1::EstimatedError { median, largest: 1.0 };
-            assert!(errors_from_message(errors).is_err(), "{median}");
-        }
-        let sampling = |name: &str, scrambles| {
-            let sampling = name.to_owned();
-            sampling_from_message(&v1::JobResult { sampling, scrambles, ..Default::default() })
-        };
-        assert_eq!(sampling("", 0), Ok((Sampling::MonteCarlo, 1)));
-        assert_eq!(sampling("sobol", SCRAMBLES_MAX), Ok((Sampling::Sobol, SCRAMBLES_MAX)));
-        assert_eq!(sampling("dice", 1), Err(Malformed::UnknownName { field: "sampling" }));
-        assert!(sampling("sobol", SCRAMBLES_MAX + 1).is_err());
-        let unknown = [v1::FailureCount { code: 6, count: 1 }];
-        assert!(failures_from_message(&unknown).is_err());
-        let many = |count| failures_from_message(&[v1::FailureCount { code: 1, count }]);
-        assert_eq!(many(REALIZATIONS_MAX).unwrap().total(), REALIZATIONS_MAX);
-        assert!(many(REALIZATIONS_MAX + 1).is_err());
-        assert_eq!(
-            from_message(&v1::JobResult::default(), vec![]),
-            Err(Malformed::Missing { field: "solver" })
-        );
-    }
-}
+mod tests;

@@ -2,7 +2,8 @@
 
 use osteon_common::check;
 use osteon_common::job::{
-    Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    SearchMethod,
 };
 use osteon_common::parameters::Parameter;
 use osteon_common::violations::Violations;
@@ -82,37 +83,53 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
 fn data_to_message(data: &Data) -> v1::Data {
     match data {
         Data::Velocities(velocities) => {
-            v1::Data { velocities: velocities.clone(), mean: None, coefficient_of_variation: None }
+            v1::Data { velocities: velocities.clone(), ..v1::Data::default() }
+        }
+        Data::Groups(groups) => {
+            let group = |Group { name, velocities }: &Group| v1::VelocityGroup {
+                name: name.clone(),
+                velocities: velocities.clone(),
+            };
+            v1::Data { groups: groups.iter().map(group).collect(), ..v1::Data::default() }
         }
         Data::Moments { mean, coefficient_of_variation } => v1::Data {
-            velocities: Vec::new(),
             mean: Some(*mean),
             coefficient_of_variation: Some(*coefficient_of_variation),
+            ..v1::Data::default()
         },
     }
 }
 
 fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<Data> {
-    let v1::Data { velocities, mean, coefficient_of_variation } = message;
-    match (velocities.is_empty(), *mean, *coefficient_of_variation) {
-        (true, Some(mean), Some(coefficient_of_variation)) => {
+    let v1::Data { velocities, mean, coefficient_of_variation, groups } = message;
+    let moments = (*mean, *coefficient_of_variation);
+    match (velocities.is_empty(), groups.is_empty(), moments) {
+        (true, true, (Some(mean), Some(coefficient_of_variation))) => {
             Some(Data::Moments { mean, coefficient_of_variation })
         }
-        (false, None, None) => Some(Data::Velocities(velocities.clone())),
-        (false, ..) => {
-            violations.add("data", "has velocities and moments; give either one or the other");
-            None
+        (false, true, (None, None)) => Some(Data::Velocities(velocities.clone())),
+        (true, false, (None, None)) => {
+            let group = |group: &v1::VelocityGroup| Group {
+                name: group.name.clone(),
+                velocities: group.velocities.clone(),
+            };
+            Some(Data::Groups(groups.iter().map(group).collect()))
         }
-        (true, None, None) => {
+        (true, true, (None, None)) => {
             violations.add(
                 "data",
-                "is empty; give `velocities`, or `mean` and `coefficient_of_variation`",
+                "is empty; give `velocities`, or `groups`, or `mean` and `coefficient_of_variation`",
             );
             None
         }
-        (true, mean, _) => {
+        (true, true, (mean, _)) => {
             let missing = if mean.is_none() { "mean" } else { "coefficient_of_variation" };
             violations.add(format!("data.{missing}"), "is missing; moments need both numbers");
+            None
+        }
+        _ => {
+            violations
+                .add("data", "has two of velocities, groups and moments; give one of the three");
             None
         }
     }
@@ -215,6 +232,8 @@ fn search_to_message(search: &Search) -> v1::Search {
         cost_tolerance: Some(search.cost_tolerance),
         size_tolerance: Some(search.size_tolerance),
         initial_step: Some(search.initial_step),
+        starts: Some(search.starts),
+        sensitivities: Some(search.sensitivities),
         speculation: Some(search.speculation),
     }
 }
@@ -234,6 +253,8 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
         initial_step: message.initial_step.unwrap_or(default.initial_step),
+        starts: message.starts.unwrap_or(default.starts),
+        sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
         speculation: message.speculation.unwrap_or(default.speculation),
     }
 }

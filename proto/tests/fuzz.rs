@@ -119,6 +119,9 @@ fn row(number: u64) -> v1::EvaluationRow {
         cost: Some(f64::INFINITY),
         failures,
         estimated_error: Some(v1::EstimatedError { median: 1e-5, largest: 3e-5 }),
+        start: 1,
+        varied: if number == 2 { 7 } else { 0 },
+        ..v1::EvaluationRow::default()
     }
 }
 
@@ -126,17 +129,25 @@ fn result() -> v1::JobResult {
     let job = specification::to_message(&jobs()[0]);
     let (row, velocity) = (row(0), (Some(moments()), Some(moments())));
     let (moments, standard_error) = velocity;
+    let best = v1::BestPoint {
+        point: row.point,
+        cost: Some(1e-11),
+        velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
+        failures: row.failures,
+        estimated_error: row.estimated_error,
+    };
     v1::JobResult {
         status: v1::JobStatus::Converged.into(),
         digest: "00".repeat(32),
-        best: Some(v1::BestPoint {
-            point: row.point,
-            cost: Some(1e-11),
-            velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
-            failures: row.failures,
-            estimated_error: row.estimated_error,
-        }),
+        best: Some(best.clone()),
         data: moments,
+        groups: vec![v1::GroupResult {
+            name: "left".to_owned(),
+            status: v1::JobStatus::MaxEvaluations.into(),
+            best: Some(best),
+            data: moments,
+            ..v1::GroupResult::default()
+        }],
         evaluations: 3,
         realizations: 4,
         seed: 1,
@@ -153,7 +164,7 @@ fn result() -> v1::JobResult {
 fn fetches() -> Vec<Vec<u8>> {
     let parts = [
         Part::Result(result()),
-        Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect() }),
+        Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect(), groups: Vec::new() }),
         Part::Realizations(realizations::to_message(0, &outcomes())),
     ];
     parts.map(|part| v1::FetchResponse { part: Some(part) }.encode_to_vec()).to_vec()
@@ -180,9 +191,10 @@ fn check_result(message: &v1::JobResult) {
     let again = results::from_message(&written, outcomes()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    let JobSpecification { setup, search, .. } = jobs()[0].clone();
-    let identification = results_json::identification(&result, &setup, &search);
-    for text in [identification, results_json::propagation(&result, &setup)] {
+    let job = &jobs()[0];
+    let rows: Vec<_> = (0..3).map(|k| results::evaluation_from_message(&row(k)).unwrap()).collect();
+    let identification = results_json::identification(&result, job, &rows);
+    for text in [identification, results_json::propagation(&result, &job.setup)] {
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
 }
@@ -196,7 +208,8 @@ fn check_history(block: &v1::HistoryBlock) {
         let again = results::evaluation_to_message(&again);
         assert_eq!(again.encode_to_vec(), written.encode_to_vec());
     }
-    assert_eq!(results_csv::history(&rows).lines().count(), rows.len() + 1);
+    let searched = rows.iter().filter(|row| row.role.varied.is_none()).count();
+    assert_eq!(results_csv::history(&jobs()[0], &rows).lines().count(), searched + 1);
 }
 
 #[test]
@@ -249,7 +262,7 @@ fn large_and_deep_messages_take_no_more_than_their_share() {
         [failures, (1..=5).map(|code| v1::FailureCount { code, count: u64::MAX }).collect()]
     {
         let rows = vec![v1::EvaluationRow { failures, ..row(0) }];
-        let part = Some(Part::History(v1::HistoryBlock { rows }));
+        let part = Some(Part::History(v1::HistoryBlock { rows, groups: Vec::new() }));
         check_fetch(&v1::FetchResponse { part }.encode_to_vec());
     }
 }

@@ -116,7 +116,8 @@ fn found(
     data: Moments,
     draws: &Draws,
 ) -> Result<Found, PointError> {
-    let mut search = Search { max_evaluations: EVALUATIONS_MAX, ..Search::by(method) };
+    let mut search =
+        Search { max_evaluations: EVALUATIONS_MAX, sensitivities: false, ..Search::by(method) };
     if method == SearchMethod::Simplex {
         search.cost_tolerance = SIMPLEX_COST;
     }

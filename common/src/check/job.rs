@@ -1,8 +1,11 @@
 //! Rules on data, parameters, the Monte Carlo loop and the search.
 
+use std::collections::BTreeSet;
+
 use crate::accepted::{Interval, WholeRange};
+use crate::document::{element_path, entry_path};
 use crate::job::{
-    Data, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Range, Sampling, Search, SearchMethod,
 };
 use crate::limits;
 use crate::parameters::Parameter;
@@ -19,6 +22,8 @@ pub(crate) const SEED: WholeRange = WholeRange::new(0, limits::SEED_MAX);
 pub(crate) const SCRAMBLES: WholeRange = WholeRange::new(1, limits::SCRAMBLES_MAX);
 /// Range of `search.max_evaluations`.
 pub(crate) const EVALUATIONS: WholeRange = WholeRange::new(1, limits::EVALUATIONS_MAX);
+/// Range of `search.starts`.
+pub(crate) const STARTS: WholeRange = WholeRange::new(1, limits::STARTS_MAX);
 /// What a measured velocity accepts.
 pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");
 /// What the data's coefficient of variation accepts.
@@ -27,7 +32,8 @@ const MOMENTS_NEED: &str = "a coefficient of variation above 0 needs";
 /// Fewest velocities that have a coefficient of variation.
 pub(crate) const VELOCITIES_MIN: usize = 2;
 /// How `[data]` may be given.
-pub(crate) const DATA_FORMS: &str = "give either velocities, or mean and coefficient_of_variation";
+pub(crate) const DATA_FORMS: &str =
+    "give either velocities, or groups, or mean and coefficient_of_variation";
 
 /// Most velocities that are refused one by one.
 const REFUSED_MAX: usize = 10;
@@ -56,6 +62,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     monte_carlo(&specification.monte_carlo, violations);
     search(&specification.search, violations);
     enough_for_the_method(specification, violations);
+    evaluations(specification, violations);
 }
 
 /// The message for an identification without data.
@@ -66,10 +73,8 @@ pub(crate) fn no_data() -> String {
 /// Records everything that is wrong with measured `data`.
 pub fn data(data: &Data, violations: &mut Violations) {
     match data {
-        Data::Velocities(measured) if !known_wrong("data.velocities", violations) => {
-            velocities(measured, violations);
-        }
-        Data::Velocities(_) => {}
+        Data::Velocities(measured) => velocities("data.velocities", measured, violations),
+        Data::Groups(measured) => groups(measured, violations),
         Data::Moments { mean, coefficient_of_variation } => {
             number("data.mean", *mean, VELOCITY, violations);
             number(
@@ -82,34 +87,66 @@ pub fn data(data: &Data, violations: &mut Violations) {
     }
 }
 
-fn velocities(measured: &[f64], violations: &mut Violations) {
+fn groups(groups: &[Group], violations: &mut Violations) {
+    const FIELD: &str = "data.groups";
+    let count = groups.len();
+    if count == 0 || count > limits::GROUPS_MAX {
+        let most = limits::GROUPS_MAX;
+        violations.add(FIELD, format!("has {count} groups; 1 to {most} are allowed"));
+        return;
+    }
+    let all: usize = groups.iter().map(|group| group.velocities.len()).sum();
+    if all > limits::DATA_VELOCITIES_MAX {
+        let most = limits::DATA_VELOCITIES_MAX;
+        violations.add(FIELD, format!("has {all} velocities in all groups; at most {most}"));
+        return;
+    }
+    let mut names = BTreeSet::new();
+    for Group { name, velocities: measured } in groups {
+        let field = entry_path(FIELD, name);
+        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX || name.contains(char::is_control)
+        {
+            let most = limits::NAME_BYTES_MAX;
+            violations.add(
+                &field,
+                format!("is no name of a group: it must have 1 to {most} bytes, none of them a control character"),
+            );
+        } else if !names.insert(name) {
+            violations.add(&field, "is the name of two groups");
+        }
+        velocities(&field, measured, violations);
+    }
+}
+
+fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
+    if known_wrong(field, violations) {
+        return;
+    }
     let count = measured.len();
     if count > limits::DATA_VELOCITIES_MAX {
         let max = limits::DATA_VELOCITIES_MAX;
-        violations.add("data.velocities", format!("has {count} velocities; at most {max}"));
+        violations.add(field, format!("has {count} velocities; at most {max}"));
         return;
     }
     let refused =
         measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
     for (refusals, (index, &velocity)) in refused.enumerate() {
         if refusals == REFUSED_MAX {
-            violations.add("data.velocities", "has more velocities to refuse, not listed here");
+            violations.add(field, "has more velocities to refuse, not listed here");
             return;
         }
-        violations.add(format!("data.velocities[{index}]"), VELOCITY.refusal(velocity));
+        violations.add(element_path(field, index), VELOCITY.refusal(velocity));
     }
-    if violations.touches("data.velocities") {
+    if violations.touches(field) {
         return;
     }
     if count < VELOCITIES_MIN {
-        violations.add(
-            "data.velocities",
-            format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"),
-        );
+        violations
+            .add(field, format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"));
     } else if measured.iter().all(|velocity| velocity == &measured[0]) {
         let velocity = measured[0];
         violations.add(
-            "data.velocities",
+            field,
             format!("all {count} are {velocity:?} m/s; {MOMENTS_NEED} different velocities"),
         );
     } else if let Some(moments) = statistics::moments(measured) {
@@ -118,7 +155,7 @@ fn velocities(measured: &[f64], violations: &mut Violations) {
         if !VARIATION.contains(variation) {
             let message =
                 format!("their coefficient of variation {}", VARIATION.refusal(variation));
-            violations.add("data.velocities", message);
+            violations.add(field, message);
         }
     }
 }
@@ -227,6 +264,26 @@ fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
     }
 }
 
+/// All searches of a job together.
+fn evaluations(specification: &JobSpecification, violations: &mut Violations) {
+    let fields = ["search.max_evaluations", "search.starts", "data"];
+    if fields.iter().any(|field| known_wrong(field, violations)) {
+        return;
+    }
+    let (all, most) = (specification.evaluations_max(), limits::EVALUATIONS_MAX);
+    let sets = specification.data.as_ref().map_or(1, Data::sets) as u64;
+    let searches = specification.search.starts * sets;
+    if searches > 1 && all > most {
+        let each = specification.search.max_evaluations;
+        violations.add(
+            "search.max_evaluations",
+            format!(
+                "is {each}, of each of {searches} searches; all together may have at most {most}"
+            ),
+        );
+    }
+}
+
 /// One velocity has the coefficient of variation 0, which has no logarithm.
 fn enough_for_the_method(specification: &JobSpecification, violations: &mut Violations) {
     let realizations = specification.monte_carlo.realizations;
@@ -246,6 +303,7 @@ fn enough_for_the_method(specification: &JobSpecification, violations: &mut Viol
 fn search(search: &Search, violations: &mut Violations) {
     whole("search.max_evaluations", search.max_evaluations, EVALUATIONS, violations);
     // A step of at most half the box fits in from any start, up or down.
+    whole("search.starts", search.starts, STARTS, violations);
     for (key, value, accepted) in [
         ("cost_tolerance", search.cost_tolerance, Interval::from(0.0, "")),
         ("size_tolerance", search.size_tolerance, Interval::from_below(0.0, 1.0, "of the box")),

@@ -1,10 +1,10 @@
-//! `[data]`: measured velocities from a CSV file or inline, or their moments.
+//! `[data]`: measured velocities from a CSV file or inline, in groups or not, or their moments.
 
 use std::path::Path;
 
 use crate::check::{self, DATA_FORMS};
-use crate::document::Value;
-use crate::job::{Data, JobKind};
+use crate::document::{Value, entry_path};
+use crate::job::{Data, Group, JobKind};
 use crate::reader::{Reader, Table};
 use crate::velocities;
 
@@ -18,7 +18,8 @@ pub(super) fn read(
     directory: &Path,
     kind: JobKind,
 ) -> Option<Data> {
-    let table = reader.table(root, "data", &["velocities", MOMENTS[0], MOMENTS[1]]);
+    let keys = ["velocities", "group", "groups", MOMENTS[0], MOMENTS[1]];
+    let table = reader.table(root, "data", &keys);
     if !table.is_table() {
         if kind == JobKind::Identification && !root.has("data") {
             reader.lacks("data", &["data".to_owned()], check::no_data());
@@ -26,16 +27,29 @@ pub(super) fn read(
         return None;
     }
     let [has_mean, has_variation] = MOMENTS.map(|key| table.has(key));
-    let data = match (table.has("velocities"), has_mean || has_variation) {
-        (true, false) => velocities(reader, &table, directory, kind),
-        (false, true) => moments(reader, &table),
-        (true, true) => {
-            reader.violations.add("data", format!("has velocities and moments; {DATA_FORMS}"));
+    let has_moments = has_mean || has_variation;
+    if table.has("group") && !table.has("velocities") {
+        let message =
+            "names a column of the file of velocities, and there is none; give `velocities`";
+        reader.lacks(&table.path("group"), &[table.path("velocities")], message);
+    }
+    let data = match (table.has("velocities"), table.has("groups"), has_moments) {
+        (true, false, false) => velocities(reader, &table, directory, kind),
+        (false, true, false) => groups(reader, &table),
+        (false, false, true) => moments(reader, &table),
+        (false, false, false) => {
+            let cures = ["velocities", "groups", MOMENTS[0], MOMENTS[1]];
+            let cures = cures.map(|key| table.path(key));
+            reader.lacks("data", &cures, format!("has no velocities; {DATA_FORMS}"));
             None
         }
-        (false, false) => {
-            let cures = ["velocities", MOMENTS[0], MOMENTS[1]].map(|key| table.path(key));
-            reader.lacks("data", &cures, format!("has no velocities; {DATA_FORMS}"));
+        (velocities, groups, _) => {
+            let both = match (velocities, groups) {
+                (true, true) => "velocities and groups",
+                (true, false) => "velocities and moments",
+                _ => "groups and moments",
+            };
+            reader.violations.add("data", format!("has {both}; {DATA_FORMS}"));
             None
         }
     };
@@ -56,6 +70,34 @@ fn moments(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
     Some(Data::Moments { mean: mean?, coefficient_of_variation: variation? })
 }
 
+/// The table `groups`: a list of velocities for each name.
+fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
+    let path = table.path("groups");
+    let expected = "a table with a list of velocities (m/s) for each group";
+    let value = &table.get("groups")?.value;
+    let Value::Table(entries) = value else {
+        reader.wrong_type(path, expected, value);
+        return None;
+    };
+    let mut groups = Vec::new();
+    let mut complete = true;
+    for (name, node) in entries {
+        let path = entry_path(&path, name);
+        let velocities = match &node.value {
+            Value::List(elements) => reader.numbers(&path, elements),
+            other => {
+                reader.wrong_type(path, "a list of velocities (m/s)", other);
+                None
+            }
+        };
+        complete &= velocities.is_some();
+        if let Some(velocities) = velocities {
+            groups.push(Group { name: name.clone(), velocities });
+        }
+    }
+    complete.then_some(Data::Groups(groups))
+}
+
 fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
@@ -63,11 +105,18 @@ fn velocities(
     kind: JobKind,
 ) -> Option<Data> {
     let path = table.path("velocities");
+    let column = column(reader, table);
     match &table.get("velocities")?.value {
+        Value::List(_) if table.has("group") => {
+            let message = "names a column of a file, but velocities is a list; \
+                           give the name of a CSV file, or [data.groups]";
+            reader.violations.add(table.path("group"), message);
+            None
+        }
         Value::List(elements) => reader.numbers(&path, elements).map(Data::Velocities),
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match velocities::read(&directory.join(name)) {
-            Ok(velocities) => Some(Data::Velocities(velocities)),
+        Value::Text(name) => match from_file(&directory.join(name), column) {
+            Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
                     reader.violations.add(&path, problem.to_string());
@@ -79,5 +128,24 @@ fn velocities(
             reader.wrong_type(path, "the name of a CSV file, or a list of numbers (m/s)", other);
             None
         }
+    }
+}
+
+/// Name of the column of groups.
+fn column<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<&'a str> {
+    match &table.get("group")?.value {
+        Value::Text(column) => Some(column),
+        other => {
+            let expected = "the name of a column of the file of velocities";
+            reader.wrong_type(table.path("group"), expected, other);
+            None
+        }
+    }
+}
+
+fn from_file(path: &Path, column: Option<&str>) -> Result<Data, Vec<velocities::CsvError>> {
+    match column {
+        Some(column) => velocities::read_groups(path, column).map(Data::Groups),
+        None => velocities::read(path).map(Data::Velocities),
     }
 }

@@ -1,6 +1,6 @@
 //! `[monte_carlo]`, `[objective]` and `[search]`.
 
-use crate::check::{EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED};
+use crate::check::{EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, STARTS};
 use crate::job::{MonteCarlo, Objective, Sampling, Search, SearchMethod};
 use crate::reader::{Choice, Reader, Table};
 
@@ -43,6 +43,8 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         "cost_tolerance",
         "size_tolerance",
         "initial_step",
+        "starts",
+        "sensitivities",
         "speculation",
     ];
     let table = reader.table(root, "search", &keys);
@@ -57,6 +59,8 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         cost_tolerance: reader.number(&table, "cost_tolerance").unwrap_or(default.cost_tolerance),
         size_tolerance: reader.number(&table, "size_tolerance").unwrap_or(default.size_tolerance),
         initial_step: reader.number(&table, "initial_step").unwrap_or(default.initial_step),
+        starts: reader.whole(&table, "starts", STARTS).unwrap_or(default.starts),
+        sensitivities: reader.truth(&table, "sensitivities").unwrap_or(default.sensitivities),
         speculation: reader.truth(&table, "speculation").unwrap_or(default.speculation),
     }
 }

@@ -8,6 +8,7 @@
 //! a time, and gives it back when there is anything else for these threads. That is why nobody is
 //! charged for it.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
@@ -70,7 +71,7 @@ pub(super) fn begin(
 pub(super) fn prepare(
     state: &mut State,
     id: JobId,
-    outcomes: &[Outcome],
+    outcomes: &Arc<[Outcome]>,
     now: Duration,
     effects: &mut Effects,
 ) {

@@ -4,7 +4,7 @@ use std::ops::Bound;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::{Data, JobSpecification};
+use osteon_common::job::{Data, Group, JobSpecification};
 use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
@@ -113,6 +113,12 @@ fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
 fn bytes(specification: &JobSpecification) -> u64 {
     let velocities = match &specification.data {
         Some(Data::Velocities(velocities)) => size_of_val(velocities.as_slice()),
+        Some(Data::Groups(groups)) => {
+            let of = |group: &Group| {
+                size_of::<Group>() + group.name.len() + size_of_val(group.velocities.as_slice())
+            };
+            groups.iter().map(of).sum()
+        }
         Some(Data::Moments { .. }) | None => 0,
     };
     (size_of::<JobSpecification>() + velocities) as u64

@@ -5,7 +5,7 @@ use osteon_common::results::Moments;
 
 use crate::ask::Ask;
 use crate::newton::{self, Newton};
-use crate::search_box::{SearchBox, admissible};
+use crate::search_box::SearchBox;
 use crate::simplex::{self, Simplex};
 
 /// A method under way.
@@ -52,24 +52,19 @@ impl Method {
         }
     }
 
-    /// Refuses points until the method is done or asks for one of `space` that is admissible.
-    pub(super) fn refuse_inadmissible(&mut self, space: &SearchBox) {
-        while let Ask::At(at) = self.ask() {
-            if admissible(&space.point(at)) {
-                break;
-            }
-            match self {
-                Self::Simplex(simplex) => simplex.refuse(),
-                Self::Newton(newton) => newton.refuse(),
-            }
-        }
-    }
-
     /// Points that may be asked for after the present one, at most `most`, the likeliest first.
     pub(super) fn likely(&self, most: usize) -> Vec<Vec<f64>> {
         match self {
             Self::Simplex(simplex) => simplex.likely(most),
             Self::Newton(newton) => newton.likely(most),
+        }
+    }
+
+    /// The point asked for is inadmissible.
+    pub(super) fn refuse(&mut self) {
+        match self {
+            Self::Simplex(simplex) => simplex.refuse(),
+            Self::Newton(newton) => newton.refuse(),
         }
     }
 }

@@ -8,12 +8,12 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
-use osteon_common::results::{EstimatedError, JobResult};
+use osteon_common::results::{BestPoint, EstimatedError, JobResult};
 use osteon_common::version::{self, VERSION};
 use osteon_coordinator::effect::Record;
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, WorkerId};
-use osteon_coordinator::search::{Search as Driven, Step};
+use osteon_coordinator::search::{Ending, Search as Driven, Step};
 use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
 use osteon_proto::v1::WorkerHello;
@@ -47,7 +47,7 @@ pub(crate) fn identification(
             ..MonteCarlo::default()
         },
         objective: Objective::default(),
-        search: Search { max_evaluations, ..Search::default() },
+        search: Search { max_evaluations, sensitivities: false, ..Search::default() },
     }
 }
 
@@ -142,15 +142,37 @@ pub(crate) fn mix(number: u64) -> u64 {
 /// Result of a specification, computed in one loop without any coordinator.
 pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
     let mut search = Driven::new(Arc::new(specification.clone()));
+    let mut told = Vec::new();
     loop {
         match search.ask() {
             Step::Evaluate(point) => {
                 let (outcomes, estimated_error) = evaluation(specification, point);
+                told.push(Arc::clone(&outcomes));
                 search.tell(outcomes, estimated_error);
             }
-            Step::Done(ending) => return search.result(&ending, VERSION),
+            Step::Done(ending) => return left_by(&search, specification, &told, &ending),
         }
     }
+}
+
+/// What a job leaves, given the outcomes of all its evaluations.
+pub(crate) fn left_by(
+    search: &Driven,
+    specification: &JobSpecification,
+    told: &[Arc<[Outcome]>],
+    ending: &Ending,
+) -> JobResult {
+    let summary = search.summary();
+    let best = |number: Option<u64>| {
+        let number = number?;
+        summary.best_point(specification, number, &told[usize::try_from(number).unwrap()])
+    };
+    let of_groups = summary
+        .groups
+        .iter()
+        .map(|group| best(group.best).map(|best| BestPoint { outcomes: Vec::new(), ..best }));
+    let of_groups = of_groups.collect();
+    summary.result(specification, ending, VERSION, best(summary.best), of_groups)
 }
 
 /// All outcomes at one point, with the median and the largest of their estimated errors.

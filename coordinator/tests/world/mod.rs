@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::{JobSpecification, Search, SearchMethod};
+use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
 use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
@@ -560,6 +560,17 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
         let by = Search::by(SearchMethod::Newton);
         specification.search = Search { max_evaluations: evaluations, ..by };
     }
+    // One in four for two groups, one in four from two starts, one in two with derivatives.
+    if seed % 4 == 0 {
+        let group = |name: &str, velocity: f64| Group {
+            name: name.to_owned(),
+            velocities: vec![0.97 * velocity, 1.03 * velocity],
+        };
+        specification.data =
+            Some(Data::Groups(vec![group("left", 3900.0), group("right", 4000.0)]));
+    }
+    specification.search.starts = 1 + u64::from(seed % 4 == 1);
+    specification.search.sensitivities = seed % 3 != 0;
     specification
 }
 

@@ -38,6 +38,13 @@ fn data() -> impl Strategy<Value = Data> {
             velocities.insert(0, 999.0);
             Data::Velocities(velocities)
         }),
+        proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
+            let group = |(i, name): (usize, &String)| Group {
+                name: format!("{name}{i}"),
+                velocities: vec![999.0, 1000.0 + i as f64],
+            };
+            Data::Groups(names.iter().enumerate().map(group).collect())
+        }),
         (1000.0..6000.0, 0.001..0.5).prop_map(|(mean, coefficient_of_variation)| {
             Data::Moments { mean, coefficient_of_variation }
         }),
@@ -71,6 +78,8 @@ prop_compose! {
         method in proptest::sample::select(SearchMethod::ALL.to_vec()),
         max_evaluations in 1_u64..1000,
         initial_step in 0.01..0.5,
+        starts in 1_u64..100,
+        sensitivities: bool,
         speculation: bool,
         solver in solver(),
     ) -> JobSpecification {
@@ -88,7 +97,14 @@ prop_compose! {
                 max_failed_fraction,
             },
             objective: Objective::default(),
-            search: Search { max_evaluations, initial_step, speculation, ..Search::by(method) },
+            search: Search {
+                max_evaluations,
+                initial_step,
+                starts,
+                sensitivities,
+                speculation,
+                ..Search::by(method)
+            },
         }
     }
 }

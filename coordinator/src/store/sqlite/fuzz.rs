@@ -123,6 +123,6 @@ fn damaged_specifications_are_refused_or_read() {
 fn damaged_histories_are_refused_or_read() {
     let mut seeds = bytes("store");
     let rows = summary(1).history.iter().map(results::evaluation_to_message).collect();
-    seeds.push(v1::HistoryBlock { rows }.encode_to_vec());
+    seeds.push(v1::HistoryBlock { rows, groups: Vec::new() }.encode_to_vec());
     run(seeds, check_history);
 }

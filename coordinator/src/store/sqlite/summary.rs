@@ -1,5 +1,6 @@
 //! The table of summaries.
 
+use osteon_common::results::{Evaluation, GroupEnding};
 use osteon_proto::{results, v1};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, params};
@@ -11,7 +12,8 @@ use crate::search::Summary;
 /// Writes a summary.
 pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {
     let rows = summary.history.iter().map(results::evaluation_to_message).collect();
-    let history = v1::HistoryBlock { rows }.encode_to_vec();
+    let groups = summary.groups.iter().map(results::group_ending_to_message).collect();
+    let history = v1::HistoryBlock { rows, groups }.encode_to_vec();
     let checksum = summary_checksum(job, &summary.digest, summary.best, &history);
     let sql = "INSERT OR REPLACE INTO summary VALUES (?1, ?2, ?3, ?4, ?5)";
     let values = params![job.0, summary.digest, summary.best, history, checksum];
@@ -28,15 +30,17 @@ pub(super) fn get(
         let (digest, best): (String, Option<u64>) = (row.get(0)?, row.get(1)?);
         let (history, checksum) = (row.get_ref(2)?.as_blob()?, row.get_ref(3)?.as_blob()?);
         let intact = checksum == summary_checksum(job, &digest, best, history);
-        let history = intact.then(|| rows(history)).flatten();
-        Ok(history.map(|history| Summary { digest, best, history }))
+        let block = intact.then(|| block(history)).flatten();
+        Ok(block.map(|(history, groups)| Summary { digest, best, history, groups }))
     };
     connection.query_row(sql, params![job.0], read).optional()
 }
 
-fn rows(encoded: &[u8]) -> Option<Vec<osteon_common::results::Evaluation>> {
+fn block(encoded: &[u8]) -> Option<(Vec<Evaluation>, Vec<GroupEnding>)> {
     let block = v1::HistoryBlock::decode(encoded).ok()?;
-    block.rows.iter().map(|row| results::evaluation_from_message(row).ok()).collect()
+    let rows = block.rows.iter().map(|row| results::evaluation_from_message(row).ok());
+    let groups = block.groups.iter().map(|group| results::group_ending_from_message(group).ok());
+    Some((rows.collect::<Option<_>>()?, groups.collect::<Option<_>>()?))
 }
 
 pub(super) fn summary_checksum(

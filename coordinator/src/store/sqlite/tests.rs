@@ -6,7 +6,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
-use osteon_common::results::EstimatedError;
+use osteon_common::results::{EstimatedError, GroupEnding, Role, Status};
 
 use super::columns::checksum;
 use super::opening::{FILE, FORMAT, Journal, open_file};
@@ -77,13 +77,20 @@ fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord
 pub(super) fn summary(job: u64) -> Summary {
     let row = |number| osteon_common::results::Evaluation {
         number,
+        role: Role { group: 1, start: 2, varied: None },
         point: evaluation(job, number).point,
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
         failures: FailureCounts::of(&evaluation(job, number).outcomes),
         estimated_error: evaluation(job, number).estimated_error,
     };
-    Summary { digest: format!("{job:064x}"), best: Some(1), history: (0..2).map(row).collect() }
+    let ending = |best| GroupEnding { status: Status::Converged, reason: None, best };
+    Summary {
+        digest: format!("{job:064x}"),
+        best: Some(1),
+        history: (0..2).map(row).collect(),
+        groups: vec![ending(None), ending(Some(1))],
+    }
 }
 
 #[test]

@@ -1,0 +1,237 @@
+//! What the data say of the parameters, and what they cannot say: to first order around the best
+//! point.
+//!
+//! y = (ln v, ln Δ), the logarithms of mean and coefficient of variation of the velocities, depend on
+//! the free parameters x, in units of the box, through the Jacobian J that the search has measured
+//! by differences on common germs. A small error e of the data's or the model's moments moves the
+//! answer by J⁺ e, with J⁺ the pseudo-inverse, and by nothing that is known along the null space of
+//! J. With the covariance C of e, a quantity whose gradient is g has the variance (g J⁺) C (g J⁺)ᵀ,
+//! as far as g lies in the rows of J; the rest of g is what the data cannot say of it.
+//!
+//! C is the sum of two parts. That of the data, known where the velocities are, is that of the
+//! influence of each velocity on both logarithms (the delta method, without the assumption of a
+//! normal law). That of the model has the squares of the reported standard errors, relative, on its
+//! diagonal; what one error says of the other is neglected.
+
+mod jacobian;
+mod linear;
+mod noise;
+mod profile;
+mod solutions;
+#[cfg(test)]
+mod tests;
+
+use crate::bulk_velocity::bulk_velocity;
+use crate::job::{JobSpecification, Range};
+use crate::parameters::{Parameter, Point};
+use crate::results::{BestPoint, Evaluation, Moments};
+
+use self::linear::{Linear, Response};
+
+pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
+pub use self::noise::{LEVEL, Noise, noise};
+pub use self::profile::{PROFILE_POINTS, Profile, profiles};
+pub use self::solutions::{Solution, Spread, solutions, spread};
+
+/// A direction of the box that the data fix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// Singular value: change of ln v and ln Δ, together, for a step over the box.
+    pub singular_value: f64,
+    /// Unit vector, a component for each free parameter, in units of the box.
+    pub components: Vec<f64>,
+}
+
+/// A quantity that follows from the parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// Its value at the best point, in its unit.
+    pub value: f64,
+    /// What noise makes of it.
+    pub known: Option<Known>,
+}
+
+/// How well a quantity is known, as far as the data say anything of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Standard error.
+    pub standard_error: f64,
+    /// Ends of its confidence interval of level [`LEVEL`].
+    pub interval: [f64; 2],
+    /// Share of its gradient, in units of the box, that lies in directions which the data leave
+    /// free: sine of the angle between it and those that they fix.
+    pub free_share: f64,
+}
+
+/// What the data say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inference {
+    /// Whether the model matches the data to within noise.
+    pub matched: bool,
+    /// Errors of both moments.
+    pub noise: Noise,
+    /// The free parameters, in the order of the components of directions.
+    pub free: Vec<Parameter>,
+    /// Derivatives of both moments.
+    pub sensitivities: Vec<Sensitivity>,
+    /// Directions that the data fix, that of the largest singular value first.
+    pub fixed: Vec<Direction>,
+    /// Orthonormal directions that the data leave free.
+    pub undetermined: Vec<Vec<f64>>,
+    /// √(c1111/ρ), m/s.
+    pub bulk_velocity: Quantity,
+    /// The dispersion.
+    pub dispersion: Quantity,
+    /// The free parameters themselves, known only where no direction is left free.
+    pub parameters: Vec<(Parameter, Quantity)>,
+}
+
+/// What set number `set` of the data says, given the best evaluation of its search and all
+/// evaluations of the job. `None` where the derivatives were not measured, or cannot be told.
+pub fn inference(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+    history: &[Evaluation],
+) -> Option<Inference> {
+    let estimate = best.velocity?;
+    let data = specification.data.as_ref()?;
+    let jacobian = jacobian(specification, set, best, history)?;
+    let noise = noise(data, set, &estimate);
+    let linear = Linear::of(&jacobian);
+    let quantile = noise.quantile();
+    let matched = is_matched(specification, data.moments(set), best, &noise);
+    let context =
+        Context { specification, best, linear: &linear, noise: &noise, quantile, matched };
+    Some(Inference {
+        matched,
+        free: jacobian.free.clone(),
+        sensitivities: jacobian.sensitivities(&best.point, specification),
+        fixed: linear.fixed.clone(),
+        undetermined: linear.undetermined.clone(),
+        bulk_velocity: context.bulk_velocity(&jacobian.free)?,
+        dispersion: context.dispersion(&jacobian.free),
+        parameters: context.parameters(&jacobian.free),
+        noise,
+    })
+}
+
+/// Whether the moments differ by no more than three standard errors of all noise, or the cost is
+/// within the tolerance of the search.
+fn is_matched(
+    specification: &JobSpecification,
+    data: Moments,
+    best: &BestPoint,
+    noise: &Noise,
+) -> bool {
+    let Some(model) = best.velocity.map(|estimate| estimate.moments) else { return false };
+    let within = |model: f64, data: f64, axis: usize| {
+        let difference = libm::log(model / data);
+        difference * difference <= 9.0 * noise.covariance()[axis][axis]
+    };
+    best.cost.is_some_and(|cost| cost <= specification.search.cost_tolerance)
+        || (within(model.mean, data.mean, 0)
+            && within(model.coefficient_of_variation, data.coefficient_of_variation, 1))
+}
+
+struct Context<'a> {
+    specification: &'a JobSpecification,
+    best: &'a BestPoint,
+    linear: &'a Linear,
+    noise: &'a Noise,
+    quantile: f64,
+    matched: bool,
+}
+
+impl Context<'_> {
+    /// √(c1111/ρ): its logarithm is as good as normal.
+    fn bulk_velocity(&self, free: &[Parameter]) -> Option<Quantity> {
+        let bulk = bulk_velocity(&self.best.point).ok()?;
+        let slope = |&parameter: &Parameter| {
+            bulk.gradient[parameter as usize] * edge(self.specification.range(parameter))
+        };
+        let gradient: Vec<f64> = free.iter().map(slope).collect();
+        Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
+    }
+
+    fn dispersion(&self, free: &[Parameter]) -> Quantity {
+        let dispersion = self.best.point.dispersion();
+        let slope = |&parameter: &Parameter| match parameter {
+            Parameter::Dispersion => edge(self.specification.range(parameter)) / dispersion,
+            _ => 0.0,
+        };
+        let gradient: Vec<f64> = free.iter().map(slope).collect();
+        self.of_logarithm(dispersion, &gradient)
+    }
+
+    fn parameters(&self, free: &[Parameter]) -> Vec<(Parameter, Quantity)> {
+        let quantity = |(place, &parameter): (usize, &Parameter)| {
+            let value = self.best.point.get(parameter);
+            let axis = (0..free.len()).map(|other| if other == place { 1.0 } else { 0.0 });
+            let gradient: Vec<f64> = axis.collect();
+            let response = self.response(&gradient).filter(|_| self.linear.undetermined.is_empty());
+            let known = response.map(|Response { deviation, free_share }| {
+                let standard_error = deviation * edge(self.specification.range(parameter));
+                let reach = self.quantile * standard_error;
+                Known { standard_error, interval: [value - reach, value + reach], free_share }
+            });
+            (parameter, Quantity { value, known })
+        };
+        free.iter().enumerate().map(quantity).collect()
+    }
+
+    /// A quantity, given the gradient of its logarithm in units of the box.
+    fn of_logarithm(&self, value: f64, gradient: &[f64]) -> Quantity {
+        let known = self.response(gradient).map(|Response { deviation, free_share }| {
+            let factor = libm::exp(self.quantile * deviation);
+            let interval = [value / factor, value * factor];
+            Known { standard_error: value * deviation, interval, free_share }
+        });
+        Quantity { value, known }
+    }
+
+    /// What noise does to a quantity with this gradient; nothing is known of one where the model
+    /// does not match, or which does not depend on anything that was searched.
+    fn response(&self, gradient: &[f64]) -> Option<Response> {
+        if !self.matched || gradient.iter().all(|slope| *slope == 0.0) {
+            return None;
+        }
+        self.linear.response(gradient, &self.noise.covariance())
+    }
+}
+
+/// Edge of the box along a range; 0 where it is fixed.
+pub(crate) fn edge(range: Range) -> f64 {
+    match range {
+        Range::Fixed(_) => 0.0,
+        Range::Free { lower, upper, .. } => upper - lower,
+    }
+}
+
+/// Number of the first evaluation of a search from which on its lowest cost was below that of
+/// sampling noise alone: what it still gained is noise, another seed would lead elsewhere.
+pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
+    let estimate = best.velocity?;
+    let (moments, error) = (estimate.moments, estimate.standard_error);
+    let relative = [
+        error.mean / moments.mean,
+        error.coefficient_of_variation / moments.coefficient_of_variation,
+    ];
+    let cost = relative[0] * relative[0] + relative[1] * relative[1];
+    let searched = history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none());
+    let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
+    below.next().map(|row| row.number)
+}
+
+/// Whether an evaluation is for this set of data.
+fn is_of(row: &Evaluation, set: usize) -> bool {
+    row.role.group as usize == set
+}
+
+/// A parameter of a point in units of the box.
+fn coordinate(point: &Point, parameter: Parameter, range: Range) -> f64 {
+    match range {
+        Range::Fixed(_) => 0.0,
+        Range::Free { lower, upper, .. } => (point.get(parameter) - lower) / (upper - lower),
+    }
+}

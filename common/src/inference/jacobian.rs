@@ -1,0 +1,74 @@
+//! Derivatives of the logarithms of both moments, from differences on common germs.
+
+use super::{coordinate, edge, is_of};
+use crate::job::{JobSpecification, Range};
+use crate::parameters::{Parameter, Point};
+use crate::results::{BestPoint, Evaluation, Moments};
+
+/// d(ln v, ln Δ)/dx, a column for each free parameter, x in units of the box.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Jacobian {
+    /// The free parameters.
+    pub free: Vec<Parameter>,
+    /// Their columns: derivatives of ln v and of ln Δ.
+    pub columns: Vec<[f64; 2]>,
+}
+
+/// Derivatives of both moments along one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Relative change of the mean for a relative change of the parameter, ∂ ln v / ∂ ln p.
+    pub mean: f64,
+    /// That of the coefficient of variation, ∂ ln Δ / ∂ ln p.
+    pub coefficient_of_variation: f64,
+}
+
+/// The Jacobian at the best point of set number `set`: `None` where a derivative was not measured.
+pub fn jacobian(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+    history: &[Evaluation],
+) -> Option<Jacobian> {
+    let base = best.velocity?.moments;
+    let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new() };
+    for parameter in Parameter::ALL {
+        let range = specification.range(parameter);
+        if matches!(range, Range::Fixed(_)) {
+            continue;
+        }
+        let varied = |row: &&Evaluation| is_of(row, set) && row.role.varied == Some(parameter);
+        let row = history.iter().find(varied)?;
+        let step =
+            coordinate(&row.point, parameter, range) - coordinate(&best.point, parameter, range);
+        let column = logarithms(row.moments?, base).map(|change| change / step);
+        if !column.iter().all(|slope| slope.is_finite()) {
+            return None;
+        }
+        jacobian.free.push(parameter);
+        jacobian.columns.push(column);
+    }
+    (!jacobian.free.is_empty()).then_some(jacobian)
+}
+
+impl Jacobian {
+    /// The derivatives for relative changes of the parameters.
+    pub fn sensitivities(&self, at: &Point, specification: &JobSpecification) -> Vec<Sensitivity> {
+        let of = |(&parameter, column): (&Parameter, &[f64; 2])| {
+            let relative = at.get(parameter) / edge(specification.range(parameter));
+            let [mean, coefficient_of_variation] = column.map(|slope| slope * relative);
+            Sensitivity { parameter, mean, coefficient_of_variation }
+        };
+        self.free.iter().zip(&self.columns).map(of).collect()
+    }
+}
+
+/// ln of both moments over others.
+fn logarithms(moments: Moments, base: Moments) -> [f64; 2] {
+    [
+        libm::log(moments.mean / base.mean),
+        libm::log(moments.coefficient_of_variation / base.coefficient_of_variation),
+    ]
+}

@@ -1,0 +1,66 @@
+//! Errors of the logarithms of both moments, of the data's and of the model's.
+
+use crate::job::Data;
+use crate::results::Estimate;
+use crate::statistics;
+
+/// Level of every confidence interval.
+pub const LEVEL: f64 = 0.95;
+/// Quantile of the standard normal law at (1 + [`LEVEL`]) / 2.
+const NORMAL: f64 = 1.959_963_984_540_054;
+
+/// Covariances of (ln v, ln Δ).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of the data's moments, with the number of their velocities; `None` where only the moments
+    /// are known, and nobody can say how well.
+    pub data: Option<([[f64; 2]; 2], usize)>,
+    /// Of the model's: by sampling, on the diagonal.
+    pub model: [f64; 2],
+}
+
+/// The noise of set number `set` of the data, and of a model's estimate.
+pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
+    let (moments, error) = (model.moments, model.standard_error);
+    let relative = [
+        error.mean / moments.mean,
+        error.coefficient_of_variation / moments.coefficient_of_variation,
+    ];
+    let velocities = data.velocities(set);
+    let covariance = velocities.and_then(statistics::covariance_of_logarithms);
+    Noise {
+        data: covariance.zip(velocities.map(<[f64]>::len)),
+        model: relative.map(|error| error * error),
+    }
+}
+
+impl Noise {
+    /// Of both together.
+    pub fn covariance(&self) -> [[f64; 2]; 2] {
+        let mut sum = self.data.map_or([[0.0; 2]; 2], |(covariance, _)| covariance);
+        for (axis, variance) in self.model.into_iter().enumerate() {
+            sum[axis][axis] += variance;
+        }
+        sum
+    }
+
+    /// How many standard errors an interval reaches to each side.
+    pub fn quantile(&self) -> f64 {
+        self.data.map_or(NORMAL, |(_, count)| quantile(count))
+    }
+}
+
+/// Quantile of Student's law at (1 + [`LEVEL`]) / 2 for a sample of `count`: the first terms of its
+/// expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5), right to 1e-3 from six
+/// degrees of freedom on, too small below three.
+pub(super) fn quantile(count: usize) -> f64 {
+    let freedom = count.saturating_sub(1).max(1) as f64;
+    let square = NORMAL * NORMAL;
+    let terms = [
+        (square + 1.0) / 4.0,
+        ((5.0 * square + 16.0) * square + 3.0) / 96.0,
+        (((3.0 * square + 19.0) * square + 17.0) * square - 15.0) / 384.0,
+    ];
+    let series = terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom);
+    NORMAL * (1.0 + series)
+}

@@ -1,0 +1,114 @@
+//! Profiles of the cost: what it is at best with one parameter held at a value.
+//!
+//! They cost no evaluation: the mean velocity is taken to be √(c1111/ρ), and the coefficient of
+//! variation δ, each times its factor at the best point. Over the whole box that holds to about one
+//! per cent, so a profile says where the data can be matched, and not by how little they are missed.
+
+use crate::job::{JobSpecification, Range};
+use crate::parameters::{Parameter, Point};
+use crate::results::Moments;
+
+/// Points of a profile, from bound to bound.
+pub const PROFILE_POINTS: usize = 11;
+
+/// The profile of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its values, evenly from the lower bound to the upper, in its unit.
+    pub values: Vec<f64>,
+    /// The lowest cost with the parameter there and the other free ones anywhere in their bounds;
+    /// infinite where no such point is admissible.
+    pub costs: Vec<f64>,
+}
+
+/// The profile of each free parameter, given the best point and its moments.
+pub fn profiles(
+    specification: &JobSpecification,
+    best: &Point,
+    model: Moments,
+    data: Moments,
+) -> Vec<Profile> {
+    let free =
+        |parameter: &Parameter| matches!(specification.range(*parameter), Range::Free { .. });
+    let profile = |parameter: Parameter| {
+        let Range::Free { lower, upper, .. } = specification.range(parameter) else {
+            return Profile { parameter, values: Vec::new(), costs: Vec::new() };
+        };
+        let last = (PROFILE_POINTS - 1) as f64;
+        let value = |k: usize| lower + (upper - lower) * (k as f64 / last);
+        let values: Vec<f64> = (0..PROFILE_POINTS).map(value).collect();
+        let cost = |&value: &f64| {
+            let mut ranges = specification.parameters;
+            ranges[parameter as usize] = Range::Fixed(value);
+            lowest_cost(&ranges, best, model, data)
+        };
+        let costs = values.iter().map(cost).collect();
+        Profile { parameter, values, costs }
+    };
+    Parameter::ALL.into_iter().filter(free).map(profile).collect()
+}
+
+/// The lowest cost over the box of these ranges.
+fn lowest_cost(ranges: &[Range; 7], best: &Point, model: Moments, data: Moments) -> f64 {
+    let Some(here) = squared_velocities(&best.0.map(Range::Fixed)).map(|[only, _]| only) else {
+        return f64::INFINITY;
+    };
+    let Some(reach) = squared_velocities(ranges) else { return f64::INFINITY };
+    let of_mean = {
+        let wanted = data.mean / model.mean;
+        let [slowest, fastest] = reach.map(|square| (square / here).sqrt());
+        relative_square(wanted.clamp(slowest, fastest) / wanted)
+    };
+    let of_variation = {
+        let wanted = data.coefficient_of_variation / model.coefficient_of_variation;
+        let [lower, upper] = ends(ranges[Parameter::Dispersion as usize]);
+        let [lower, upper] = [lower, upper].map(|dispersion| dispersion / best.dispersion());
+        relative_square(wanted.clamp(lower, upper) / wanted)
+    };
+    of_mean + of_variation
+}
+
+fn relative_square(ratio: f64) -> f64 {
+    (1.0 - ratio) * (1.0 - ratio)
+}
+
+/// Smallest and largest c1111/ρ of the admissible points of the box; `None` if there is none.
+///
+/// c1111 = e_L / (1 - r) with r = 2 e_T ν_L² / (e_L (1 - ν_T)) grows with e_T, with ν_T and with |ν_L|,
+/// and has its minimum over e_L at r = ½; it grows without bound where r comes to 1, the edge of
+/// what is admissible.
+fn squared_velocities(ranges: &[Range; 7]) -> Option<[f64; 2]> {
+    let of = |parameter: Parameter| ends(ranges[parameter as usize]);
+    let density = of(Parameter::Density);
+    let young = of(Parameter::LongitudinalYoungModulus);
+    let [low, high] = of(Parameter::LongitudinalPoissonRatio);
+    let ratio_squares = [
+        if low <= 0.0 && high >= 0.0 { 0.0 } else { (low * low).min(high * high) },
+        (low * low).max(high * high),
+    ];
+    let transverse = of(Parameter::TransverseYoungModulus);
+    let ratio = of(Parameter::TransversePoissonRatio);
+    // 2 e_T ν_L² / (1 - ν_T): the part of r that e_L is not in.
+    let part = [0, 1].map(|end| 2.0 * transverse[end] * ratio_squares[end] / (1.0 - ratio[end]));
+    let stiffness = |young: f64, part: f64| young / (1.0 - part / young);
+    if young[1] <= part[0] {
+        return None;
+    }
+    let slowest_young = (2.0 * part[0]).clamp(young[0], young[1]);
+    let smallest = stiffness(slowest_young, part[0]) / density[1];
+    let largest = if young[0] <= part[1] {
+        f64::INFINITY
+    } else {
+        stiffness(young[0], part[1]).max(stiffness(young[1], part[1])) / density[0]
+    };
+    Some([smallest, largest])
+}
+
+fn ends(range: Range) -> [f64; 2] {
+    match range {
+        Range::Fixed(value) => [value; 2],
+        Range::Free { lower, upper, .. } => [lower, upper],
+    }
+}

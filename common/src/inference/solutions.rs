@@ -1,0 +1,74 @@
+//! The answers of searches from several starts: a sample of what matches the data equally well.
+
+use super::is_of;
+use crate::elasticity::Elasticity;
+use crate::parameters::{Parameter, Point};
+use crate::results::Evaluation;
+
+/// The best point of the search from one start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// Number of the start, from 0.
+    pub start: u32,
+    /// The point.
+    pub point: Point,
+    /// Its cost.
+    pub cost: f64,
+    /// Evaluations of this search.
+    pub evaluations: u64,
+}
+
+/// Smallest, largest and mean value of something over solutions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Smallest.
+    pub smallest: f64,
+    /// Largest.
+    pub largest: f64,
+    /// Mean.
+    pub mean: f64,
+}
+
+/// The best point of each start of set number `set` that found a feasible one.
+pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
+    let mut solutions: Vec<Solution> = Vec::new();
+    for row in history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none()) {
+        let cost = row.cost.unwrap_or(f64::INFINITY);
+        let here = Solution { start: row.role.start, point: row.point, cost, evaluations: 1 };
+        match solutions.last_mut().filter(|last| last.start == row.role.start) {
+            None => solutions.push(here),
+            Some(last) => {
+                let evaluations = last.evaluations + 1;
+                *last = Solution { evaluations, ..if cost < last.cost { here } else { *last } };
+            }
+        }
+    }
+    solutions.retain(|solution| solution.cost.is_finite());
+    solutions
+}
+
+/// The spread of each parameter, and of each entry of the elasticity matrix (Pa, Kelvin-Mandel) in
+/// and above the diagonal, row by row, over points; `None` of none.
+pub fn spread(points: &[Point]) -> Option<([Spread; 7], Vec<(usize, usize, Spread)>)> {
+    let of = |values: &mut dyn Iterator<Item = f64>| {
+        let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
+        for value in values {
+            spread.smallest = spread.smallest.min(value);
+            spread.largest = spread.largest.max(value);
+            spread.mean += value / points.len() as f64;
+        }
+        spread
+    };
+    if points.is_empty() {
+        return None;
+    }
+    let parameters =
+        Parameter::ALL.map(|parameter| of(&mut points.iter().map(|point| point.get(parameter))));
+    // Points that were evaluated are admissible.
+    let matrices: Vec<Elasticity> =
+        points.iter().filter_map(|point| point.constants().elasticity().ok()).collect();
+    let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
+    let entries =
+        entries.map(|(i, j)| (i, j, of(&mut matrices.iter().map(|matrix| matrix.rows()[i][j]))));
+    Some((parameters, entries.collect()))
+}

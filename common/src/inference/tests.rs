@@ -1,0 +1,278 @@
+//! What the data say, of models whose answer is known.
+
+use super::noise::quantile;
+use super::*;
+use crate::case::Setup;
+use crate::job::{Data, JobKind, MonteCarlo, Objective, Search};
+use crate::outcome::FailureCounts;
+use crate::results::{Estimate, Role};
+
+const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const BOUNDS: [(f64, f64); 7] = [
+    (1500.0, 2000.0),
+    (12e9, 25e9),
+    (0.2, 0.45),
+    (3e9, 6.5e9),
+    (8e9, 16e9),
+    (0.2, 0.5),
+    (0.02, 0.3),
+];
+
+/// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
+fn model(point: &Point) -> Moments {
+    Moments {
+        mean: 0.99 * libm::exp(bulk_velocity(point).unwrap().logarithm),
+        coefficient_of_variation: 0.27 * point.dispersion(),
+    }
+}
+
+fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecification {
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    JobSpecification {
+        kind: JobKind::Identification,
+        setup: Setup::default(),
+        data: Some(
+            velocities.map_or(Data::Moments { mean, coefficient_of_variation }, Data::Velocities),
+        ),
+        parameters: Parameter::ALL.map(|parameter| {
+            let (start, (lower, upper)) = (OPTIMUM.get(parameter), BOUNDS[parameter as usize]);
+            if free.contains(&parameter) {
+                Range::Free { start, lower, upper }
+            } else {
+                Range::Fixed(start)
+            }
+        }),
+        monte_carlo: MonteCarlo::default(),
+        objective: Objective::default(),
+        search: Search::default(),
+    }
+}
+
+fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
+    Evaluation {
+        number: 0,
+        role: Role { varied, ..Role::default() },
+        point,
+        moments: Some(model(&point)),
+        cost: Some(0.0),
+        failures: FailureCounts::default(),
+        estimated_error: None,
+    }
+}
+
+/// What is found at the optimum, with relative standard errors of the model's moments.
+fn found(specification: &JobSpecification, errors: [f64; 2]) -> Inference {
+    let moments = model(&OPTIMUM);
+    let standard_error = Moments {
+        mean: errors[0] * moments.mean,
+        coefficient_of_variation: errors[1] * moments.coefficient_of_variation,
+    };
+    let best = BestPoint {
+        point: OPTIMUM,
+        cost: Some(0.0),
+        velocity: Some(Estimate { moments, standard_error, controlled: false }),
+        failures: FailureCounts::default(),
+        estimated_error: None,
+        outcomes: Vec::new(),
+    };
+    let mut rows = vec![row(OPTIMUM, None)];
+    for parameter in Parameter::ALL {
+        let mut point = OPTIMUM;
+        point.0[parameter as usize] += 1e-5 * edge(specification.range(parameter));
+        rows.push(row(point, Some(parameter)));
+    }
+    inference(specification, 0, &best, &rows).unwrap()
+}
+
+fn close(found: f64, expected: f64, relative: f64) {
+    assert!((found - expected).abs() <= relative * expected.abs(), "{found}, expected {expected}");
+}
+
+#[test]
+fn of_seven_free_parameters_two_combinations_are_identified() {
+    let found = found(&specification(&Parameter::ALL, None), [1e-3, 2e-2]);
+    assert_eq!((found.fixed.len(), found.undetermined.len()), (2, 5));
+    close(found.bulk_velocity.value, model(&OPTIMUM).mean / 0.99, 1e-12);
+    let known = found.bulk_velocity.known.unwrap();
+    close(known.standard_error / found.bulk_velocity.value, 1e-3, 1e-5);
+    assert!(known.free_share < 1e-4, "{known:?}");
+    let known = found.dispersion.known.unwrap();
+    close(known.standard_error / 0.1029, 2e-2, 1e-4);
+    let half = libm::log(known.interval[1] / known.interval[0]) / 2.0;
+    close(half, 1.96 * 2e-2, 1e-3);
+    // No single parameter is known.
+    assert!(found.parameters.iter().all(|(_, quantity)| quantity.known.is_none()));
+}
+
+#[test]
+fn directions_are_orthonormal_and_change_what_they_say() {
+    let found = found(&specification(&Parameter::ALL, None), [1e-3; 2]);
+    let fixed = found.fixed.iter().map(|direction| &direction.components);
+    let all: Vec<&Vec<f64>> = fixed.chain(&found.undetermined).collect();
+    for (i, one) in all.iter().enumerate() {
+        for (j, other) in all.iter().enumerate() {
+            let product: f64 = one.iter().zip(*other).map(|(a, b)| a * b).sum();
+            assert!((product - f64::from(i == j)).abs() < 1e-9, "{i} {j}: {product}");
+        }
+    }
+    // A small step along each: the moments change by the singular value, or by nothing.
+    let values: Vec<f64> = found.fixed.iter().map(|direction| direction.singular_value).collect();
+    for (i, direction) in all.iter().enumerate() {
+        let mut moved = OPTIMUM;
+        for ((x, (lower, upper)), d) in moved.0.iter_mut().zip(BOUNDS).zip(direction.iter()) {
+            *x += 1e-5 * d * (upper - lower);
+        }
+        let (here, there) = (model(&OPTIMUM), model(&moved));
+        let change = [
+            libm::log(there.mean / here.mean),
+            libm::log(there.coefficient_of_variation / here.coefficient_of_variation),
+        ];
+        let size = (change[0] * change[0] + change[1] * change[1]).sqrt() / 1e-5;
+        let expected = values.get(i).copied().unwrap_or(0.0);
+        assert!((size - expected).abs() < 1e-3, "{i}: {size}, expected {expected}");
+    }
+}
+
+/// c1111 ∝ e_L to the power 0.5848 at the optimum: the standard error of e_L is that of v over half
+/// of it.
+#[test]
+fn of_two_free_parameters_both_are_known() {
+    let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
+    let found = found(&specification(&free, None), [1e-3, 2e-2]);
+    assert!(found.undetermined.is_empty());
+    let slope = found.sensitivities[0].mean;
+    close(slope, 0.2924, 1e-3);
+    let [(young, one), (dispersion, other)] = found.parameters[..] else { panic!("two are free") };
+    assert_eq!([young, dispersion], free);
+    close(one.known.unwrap().standard_error / one.value, 1e-3 / slope, 1e-4);
+    close(other.known.unwrap().standard_error / other.value, 2e-2, 1e-4);
+}
+
+#[test]
+fn noise_of_the_data_counts() {
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    // Two values: the influence on ln Δ is that of the mean alone.
+    let velocities: Vec<f64> = (0..100)
+        .map(|k| mean * (1.0 + coefficient_of_variation * if k % 2 == 0 { 1.0 } else { -1.0 }))
+        .collect();
+    let free = [Parameter::Density, Parameter::Dispersion];
+    let found = found(&specification(&free, Some(velocities)), [0.0; 2]);
+    let expected = coefficient_of_variation / 99.0_f64.sqrt();
+    close(found.noise.covariance()[0][0].sqrt(), expected, 1e-12);
+    close(found.noise.covariance()[1][1].sqrt(), expected, 1e-12);
+    close(
+        found.bulk_velocity.known.unwrap().standard_error / found.bulk_velocity.value,
+        expected,
+        1e-4,
+    );
+}
+
+#[test]
+fn nothing_is_known_where_the_model_does_not_match() {
+    let mut specification = specification(&Parameter::ALL, None);
+    specification.data = Some(Data::Moments { mean: 3000.0, coefficient_of_variation: 0.1 });
+    let mut rows = vec![row(OPTIMUM, None)];
+    for parameter in Parameter::ALL {
+        let mut point = OPTIMUM;
+        point.0[parameter as usize] *= 1.0 + 1e-5;
+        rows.push(row(point, Some(parameter)));
+    }
+    let moments = model(&OPTIMUM);
+    let standard_error = Moments { mean: 1.0, coefficient_of_variation: 1e-4 };
+    let best = BestPoint {
+        point: OPTIMUM,
+        cost: Some(0.6),
+        velocity: Some(Estimate { moments, standard_error, controlled: false }),
+        failures: FailureCounts::default(),
+        estimated_error: None,
+        outcomes: Vec::new(),
+    };
+    let found = inference(&specification, 0, &best, &rows).unwrap();
+    assert!(!found.matched && found.bulk_velocity.known.is_none());
+    // Without one of the differences nothing is said at all.
+    rows.pop();
+    assert_eq!(inference(&specification, 0, &best, &rows), None);
+}
+
+/// Quantiles of tables.
+#[test]
+fn quantiles_are_students() {
+    for (count, expected) in [(7, 2.4469), (11, 2.2281), (31, 2.0423), (101, 1.9840)] {
+        close(quantile(count), expected, 1e-3);
+    }
+    close(quantile(1_000_000), 1.95996, 1e-5);
+}
+
+/// Against a fine grid over the box.
+#[test]
+fn a_profile_is_the_lowest_cost() {
+    let free = [
+        Parameter::Density,
+        Parameter::LongitudinalYoungModulus,
+        Parameter::LongitudinalPoissonRatio,
+        Parameter::Dispersion,
+    ];
+    let mut specification = specification(&free, None);
+    // So fast that no light bone within the bounds is.
+    let data = Moments { mean: 1.2 * model(&OPTIMUM).mean, ..model(&OPTIMUM) };
+    specification.data = None;
+    let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data);
+    assert_eq!(profiles.len(), 4);
+    for profile in profiles {
+        for (&value, &cost) in profile.values.iter().zip(&profile.costs).step_by(5) {
+            let mut lowest = f64::INFINITY;
+            let grid = |parameter: Parameter, k: u32| {
+                let (lower, upper) = BOUNDS[parameter as usize];
+                if parameter == profile.parameter {
+                    value
+                } else {
+                    lower + (upper - lower) * f64::from(k) / 40.0
+                }
+            };
+            for (i, j, k) in
+                (0..41).flat_map(|i| (0..41).flat_map(move |j| (0..41).map(move |k| (i, j, k))))
+            {
+                let mut point = OPTIMUM;
+                point.0[0] = grid(Parameter::Density, i);
+                point.0[1] = grid(Parameter::LongitudinalYoungModulus, j);
+                point.0[2] = grid(Parameter::LongitudinalPoissonRatio, k);
+                if bulk_velocity(&point).is_ok() {
+                    let v = model(&point).mean / data.mean;
+                    lowest = lowest.min((1.0 - v) * (1.0 - v));
+                }
+            }
+            if profile.parameter == Parameter::Dispersion {
+                lowest += (1.0 - value / OPTIMUM.dispersion()).powi(2);
+            }
+            assert!(cost <= lowest + 1e-12, "{:?} {value}: {cost}, {lowest}", profile.parameter);
+            assert!(lowest - cost < 2e-3, "{:?} {value}: {cost}, {lowest}", profile.parameter);
+        }
+    }
+}
+
+#[test]
+fn solutions_are_the_best_of_each_start() {
+    let at = |start: u32, density: f64, cost: f64| {
+        let mut point = OPTIMUM;
+        point.0[0] = density;
+        let role = Role { start, ..Role::default() };
+        Evaluation { role, cost: Some(cost), ..row(point, None) }
+    };
+    let rows = [
+        at(0, 1500.0, 1.0),
+        at(0, 1600.0, 1e-13),
+        at(1, 1700.0, f64::INFINITY),
+        at(2, 1800.0, 1e-14),
+        at(2, 1900.0, 1e-3),
+    ];
+    let found = solutions(0, &rows);
+    let expected = [(0, 1600.0, 2), (2, 1800.0, 2)];
+    let seen = found.iter().map(|one| (one.start, one.point.density(), one.evaluations));
+    assert!(seen.eq(expected), "{found:?}");
+    let points: Vec<Point> = found.iter().map(|one| one.point).collect();
+    let (parameters, entries) = spread(&points).unwrap();
+    assert_eq!((parameters[0].smallest, parameters[0].largest), (1600.0, 1800.0));
+    assert_eq!(entries.len(), 21);
+    close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);
+    assert_eq!(spread(&[]), None);
+}

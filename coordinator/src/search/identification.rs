@@ -1,0 +1,121 @@
+//! The searches of an identification: one set of data after the other.
+
+use std::sync::Arc;
+
+use osteon_common::job::{Data, JobSpecification};
+use osteon_common::outcome::Outcome;
+use osteon_common::parameters::Point;
+use osteon_common::results::{Evaluation, GroupEnding, Status};
+use osteon_common::statistics::Verdict;
+
+use super::Ending;
+use super::one_set::OneSet;
+
+/// An identification under way.
+#[derive(Debug, Clone)]
+pub(super) struct Identification {
+    /// How the searches for the sets before the present one ended.
+    ended: Vec<GroupEnding>,
+    /// The search for the present set, the last one when all have ended.
+    present: OneSet,
+}
+
+impl Identification {
+    /// Of a specification that has data.
+    pub(super) fn new(specification: &JobSpecification) -> Self {
+        let present = OneSet::new(specification, 0);
+        let mut identification = Self { ended: Vec::new(), present };
+        identification.begin_next(specification);
+        identification
+    }
+
+    /// The next point, unless all searches have ended.
+    pub(super) fn point(&self) -> Option<Point> {
+        self.present.point()
+    }
+
+    /// Points of the present set that may be asked for after that, at most `most`, the likeliest
+    /// first.
+    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
+        self.present.likely(most)
+    }
+
+    /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
+    pub(super) fn tell(
+        &mut self,
+        specification: &JobSpecification,
+        row: Evaluation,
+        verdict: Verdict,
+        outcomes: Arc<[Outcome]>,
+    ) -> Evaluation {
+        let row = self.present.tell(specification, row, verdict, outcomes);
+        self.begin_next(specification);
+        row
+    }
+
+    /// The best evaluation of the present set.
+    pub(super) fn best(&self) -> Option<&Evaluation> {
+        self.present.best()
+    }
+
+    /// Its outcomes.
+    pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
+        self.present.best_outcomes()
+    }
+
+    /// How the searches that have ended did.
+    pub(super) fn endings(&self) -> Vec<GroupEnding> {
+        let last = self.present.ending().cloned();
+        self.ended.iter().cloned().chain(last).collect()
+    }
+
+    /// How all searches together ended.
+    pub(super) fn ending(&self, specification: &JobSpecification) -> Ending {
+        let endings = self.endings();
+        match (&specification.data, endings.as_slice()) {
+            (Some(Data::Groups(groups)), endings) => {
+                let names = groups.iter().map(|group| group.name.as_str());
+                together(&names.zip(endings).collect::<Vec<_>>())
+            }
+            (_, [GroupEnding { status, reason, .. }]) => {
+                Ending { status: *status, reason: reason.clone() }
+            }
+            // Only what has ended is asked how it did.
+            _ => Ending { status: Status::Cancelled, reason: None },
+        }
+    }
+
+    /// Goes to the next set whose search has something to evaluate.
+    fn begin_next(&mut self, specification: &JobSpecification) {
+        let sets = specification.data.as_ref().map_or(1, Data::sets);
+        while let Some(ending) = self.present.ending() {
+            let next = self.ended.len() + 1;
+            if next >= sets {
+                return;
+            }
+            self.ended.push(ending.clone());
+            self.present = OneSet::new(specification, next);
+        }
+    }
+}
+
+/// How the searches for groups ended, given the name of each.
+fn together(groups: &[(&str, &GroupEnding)]) -> Ending {
+    for (status, what) in [(Status::Failed, "failed"), (Status::MaxEvaluations, "did not converge")]
+    {
+        let of_status: Vec<_> =
+            groups.iter().filter(|(_, ending)| ending.status == status).collect();
+        if let Some((name, first)) = of_status.first() {
+            let why = first.reason.as_ref().map_or_else(
+                || ", whose evaluations are used up".to_owned(),
+                |reason| format!(": {reason}"),
+            );
+            let (count, all) = (of_status.len(), groups.len());
+            let reason = format!(
+                "the searches for {count} of {all} groups {what}; the first is {name:?}{why}"
+            );
+            return Ending { status, reason: Some(reason) };
+        }
+    }
+    Ending { status: Status::Converged, reason: None }
+}

@@ -1,0 +1,234 @@
+//! The search for one set of data: from one start or several, then the derivatives at the best point.
+
+use std::sync::Arc;
+
+use osteon_common::ensemble::Germs;
+use osteon_common::job::{JobSpecification, Range};
+use osteon_common::outcome::Outcome;
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::results::{Evaluation, GroupEnding, Moments, Role};
+use osteon_common::statistics::Verdict;
+
+use super::method::Method;
+use super::{NOWHERE, reasons};
+use crate::ask::{Ask, Stop};
+use crate::search_box::{SearchBox, admissible};
+
+/// Steps of the differences that measure derivatives, in edges of the box.
+const DIFFERENCE: f64 = 1e-4;
+/// Random points of the box that are tried for an admissible start.
+const START_TRIES: u64 = 64;
+
+/// The search for one set of data.
+#[derive(Debug, Clone)]
+pub(super) struct OneSet {
+    /// Number of the set.
+    set: u32,
+    data: Moments,
+    /// Number of the present start.
+    start: u32,
+    space: SearchBox,
+    method: Method,
+    /// Points evaluated for this set, and the first of them.
+    evaluations: u64,
+    first: Option<Evaluation>,
+    best: Option<Best>,
+    /// How the search ended that found the best point, or, while there is none, the last one.
+    stop: Option<Stop>,
+    /// Points that measure derivatives, the next one last.
+    differences: Vec<(Parameter, Point)>,
+    ending: Option<GroupEnding>,
+}
+
+/// The best feasible evaluation so far.
+#[derive(Debug, Clone)]
+struct Best {
+    row: Evaluation,
+    outcomes: Arc<[Outcome]>,
+}
+
+impl OneSet {
+    /// The search for set number `set` of the data, at its beginning.
+    pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
+        let data = specification.data.as_ref().map_or(NOWHERE, |data| data.moments(set));
+        let space = SearchBox::new(specification.parameters);
+        let mut search = Self {
+            // A job has at most a thousand.
+            set: u32::try_from(set).unwrap_or(u32::MAX),
+            data,
+            start: 0,
+            space,
+            method: Method::new(&specification.search, space, data),
+            evaluations: 0,
+            first: None,
+            best: None,
+            stop: None,
+            differences: Vec::new(),
+            ending: None,
+        };
+        search.settle(specification);
+        search
+    }
+
+    /// The next point, unless the search has ended.
+    pub(super) fn point(&self) -> Option<Point> {
+        if self.ending.is_some() {
+            return None;
+        }
+        match (self.differences.last(), self.method.ask()) {
+            (Some((_, point)), _) => Some(*point),
+            (None, Ask::At(at)) => Some(self.space.point(at)),
+            (None, Ask::Stopped(_)) => None,
+        }
+    }
+
+    /// Points that may be asked for after that, at most `most`, the likeliest first.
+    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
+        if self.differences.is_empty() {
+            let likely = self.method.likely(most);
+            return likely.iter().map(|at| self.space.point(at)).filter(admissible).collect();
+        }
+        self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
+    }
+
+    /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
+    pub(super) fn tell(
+        &mut self,
+        specification: &JobSpecification,
+        mut row: Evaluation,
+        verdict: Verdict,
+        outcomes: Arc<[Outcome]>,
+    ) -> Evaluation {
+        let cost = verdict.cost(self.data);
+        row.cost = Some(cost);
+        row.role = Role { group: self.set, start: self.start, varied: None };
+        if let Some((varied, _)) = self.differences.pop() {
+            let start = self.best().map_or(0, |best| best.role.start);
+            row.role = Role { start, varied: Some(varied), ..row.role };
+            row.moments = verdict.moments.filter(|_| self.fails_alike(&outcomes));
+        } else {
+            self.method.tell(cost, verdict.moments);
+            self.evaluations += 1;
+            self.first.get_or_insert(row);
+            self.keep_if_better(specification, row, outcomes);
+        }
+        self.settle(specification);
+        row
+    }
+
+    /// The best evaluation, if a point was feasible: of equal costs the first, and what matches the
+    /// data is not improved upon.
+    pub(super) fn best(&self) -> Option<&Evaluation> {
+        self.best.as_ref().map(|best| &best.row)
+    }
+
+    /// Its outcomes.
+    pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
+        self.best.as_ref().map(|best| &*best.outcomes)
+    }
+
+    /// How the search ended, if it has.
+    pub(super) fn ending(&self) -> Option<&GroupEnding> {
+        self.ending.as_ref()
+    }
+
+    /// Whether the same realizations failed as at the best point.
+    fn fails_alike(&self, outcomes: &[Outcome]) -> bool {
+        self.best_outcomes().is_some_and(|best| {
+            best.iter().zip(outcomes).all(|(one, other)| one.is_err() == other.is_err())
+        })
+    }
+
+    fn keep_if_better(
+        &mut self,
+        specification: &JobSpecification,
+        row: Evaluation,
+        outcomes: Arc<[Outcome]>,
+    ) {
+        let (Some(cost), tolerance) = (row.cost, specification.search.cost_tolerance) else {
+            return;
+        };
+        let lowest = self.best.as_ref().and_then(|best| best.row.cost);
+        if cost.is_finite() && lowest.is_none_or(|lowest| lowest > tolerance && cost < lowest) {
+            self.best = Some(Best { row, outcomes });
+        }
+    }
+
+    /// Goes on to a point that is to be evaluated, or to the end.
+    fn settle(&mut self, specification: &JobSpecification) {
+        while self.ending.is_none() && self.differences.is_empty() {
+            match self.method.ask() {
+                Ask::At(at) if admissible(&self.space.point(at)) => return,
+                Ask::At(_) => self.method.refuse(),
+                Ask::Stopped(stop) => self.stopped(specification, stop),
+            }
+        }
+    }
+
+    /// Begins the search from the next start, or what comes after the last.
+    fn stopped(&mut self, specification: &JobSpecification, stop: Stop) {
+        if u64::from(self.start) == specification.search.starts {
+            return self.end(specification);
+        }
+        if self.best().is_none_or(|best| best.role.start == self.start) {
+            self.stop = Some(stop);
+        }
+        self.start += 1;
+        if u64::from(self.start) < specification.search.starts {
+            self.space = random_start(specification, self.start.into());
+            self.method = Method::new(&specification.search, self.space, self.data);
+            return;
+        }
+        if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {
+            self.differences = differences(specification, &best.row.point);
+        }
+        if self.differences.is_empty() {
+            self.end(specification);
+        }
+    }
+
+    fn end(&mut self, specification: &JobSpecification) {
+        let evidence = reasons::Evidence {
+            best: self.best(),
+            first: self.first.as_ref(),
+            evaluations: self.evaluations,
+        };
+        // It was noted before the end.
+        let stop = self.stop.unwrap_or(Stop::Settled);
+        let super::Ending { status, reason } = reasons::ending(stop, &evidence, specification);
+        let best = self.best().map(|row| row.number);
+        self.ending = Some(GroupEnding { status, reason, best });
+    }
+}
+
+/// The box with its start at a random point, the same for every set of data.
+fn random_start(specification: &JobSpecification, start: u64) -> SearchBox {
+    let space = SearchBox::new(specification.parameters);
+    let tries = (0..START_TRIES).map(|attempt| {
+        // No realization has an index this large.
+        let index = u64::MAX - (start * START_TRIES + attempt);
+        space.started_at(Germs::draw(specification.monte_carlo.seed, index).values())
+    });
+    let mut usable = tries.filter(|moved| admissible(&moved.point(&moved.start())));
+    usable.next().unwrap_or(space)
+}
+
+/// Points a little beside `best`, each in one free parameter, the first parameter last.
+fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter, Point)> {
+    let beside = |parameter: Parameter| {
+        let Range::Free { lower, upper, .. } = specification.range(parameter) else {
+            return None;
+        };
+        let step = DIFFERENCE * (upper - lower);
+        let value = best.get(parameter);
+        let moved = |value: f64| {
+            let mut point = *best;
+            point.0[parameter as usize] = value;
+            (parameter, point)
+        };
+        let steps = [value + step, value - step].into_iter();
+        let within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
+        within.filter(|(_, point)| admissible(point)).next()
+    };
+    Parameter::ALL.into_iter().rev().filter_map(beside).collect()
+}

@@ -1,0 +1,103 @@
+//! How a search ended, in words.
+
+use osteon_common::job::{JobSpecification, SearchMethod};
+use osteon_common::results::{Evaluation, Status};
+
+use super::Ending;
+use crate::ask::Stop;
+use crate::search_box::{SearchBox, Side};
+use crate::simplex::RESTARTS_MAX;
+
+/// What a search has seen.
+pub(super) struct Evidence<'a> {
+    /// The best feasible evaluation.
+    pub(super) best: Option<&'a Evaluation>,
+    /// The first evaluation.
+    pub(super) first: Option<&'a Evaluation>,
+    /// How many there were.
+    pub(super) evaluations: u64,
+}
+
+/// How a search ended that stopped for this reason.
+pub(super) fn ending(
+    stop: Stop,
+    evidence: &Evidence<'_>,
+    specification: &JobSpecification,
+) -> Ending {
+    let (status, reason) = match stop {
+        Stop::CostReached => (Status::Converged, None),
+        Stop::Settled => (Status::Converged, out_of_reach(evidence.best, specification)),
+        Stop::EvaluationsUsedUp if evidence.best.is_none() => {
+            (Status::Failed, Some(no_feasible_point(evidence, specification)))
+        }
+        Stop::EvaluationsUsedUp => (Status::MaxEvaluations, None),
+        Stop::RestartsUsedUp => {
+            let reason = format!(
+                "the simplex collapsed, was restarted {RESTARTS_MAX} times and was still \
+                 finding better points; run on from the best point"
+            );
+            (Status::MaxEvaluations, Some(reason))
+        }
+        Stop::Infeasible => (Status::Failed, Some(no_feasible_point(evidence, specification))),
+    };
+    Ending { status, reason }
+}
+
+/// Which realizations of an evaluation failed.
+pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> String {
+    let kinds: Vec<String> =
+        row.failures.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
+    format!(
+        "{} of {} realizations failed ({}); max_failed_fraction is {}",
+        row.failures.total(),
+        specification.monte_carlo.realizations,
+        kinds.join(", "),
+        specification.monte_carlo.max_failed_fraction
+    )
+}
+
+/// Why a search that settled has no lower cost, where its method knows.
+fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> Option<String> {
+    let best = best.filter(|_| specification.search.method == SearchMethod::Newton)?;
+    let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
+    let on_bounds: Vec<String> = on_bounds
+        .iter()
+        .map(|(parameter, side)| match side {
+            Side::Lower => format!("{} on its lower bound", parameter.name()),
+            Side::Upper => format!("{} on its upper bound", parameter.name()),
+        })
+        .collect();
+    let (where_it_is, cure) = if on_bounds.is_empty() {
+        (String::new(), "free more parameters")
+    } else {
+        (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
+    };
+    Some(format!(
+        "settled at a cost of {:.3e}, above cost_tolerance {:?}: no point near the best one{} \
+         matches the data better; {}",
+        best.cost.unwrap_or(f64::NAN),
+        specification.search.cost_tolerance,
+        where_it_is,
+        cure
+    ))
+}
+
+fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) -> String {
+    if evidence.best.is_some() {
+        return "every velocity of the points evaluated is the same: their coefficient of \
+                variation has no logarithm; raise [monte_carlo] realizations"
+            .to_owned();
+    }
+    match evidence.first {
+        None => "no feasible point: every point tried is inadmissible; \
+                 change the starts or the bounds of [parameters]"
+            .to_owned(),
+        Some(row) => format!(
+            "no feasible point among the {} evaluated; at the first {}; change the starts of \
+             [parameters], raise [solver] refinement, or allow a larger \
+             [monte_carlo] max_failed_fraction",
+            evidence.evaluations,
+            failed(row, specification)
+        ),
+    }
+}
