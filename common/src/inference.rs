@@ -31,7 +31,7 @@ use self::linear::{Linear, Response};
 pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
 pub use self::noise::{LEVEL, Noise, noise};
 pub use self::profile::{PROFILE_POINTS, Profile, profiles};
-pub use self::solutions::{Solution, Spread, solutions, spread};
+pub use self::solutions::{Solution, Spread, Spreads, solutions, spread};
 
 /// A direction of the box that the data fix.
 #[derive(Debug, Clone, PartialEq)]

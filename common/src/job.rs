@@ -240,6 +240,9 @@ pub struct Search {
     /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
     /// free parameter.
     pub sensitivities: bool,
+    /// Whether workers that nobody else has work for compute points that may be asked for next. It
+    /// changes when a result is there, and no bit of it.
+    pub speculation: bool,
 }
 
 impl Search {
@@ -256,6 +259,7 @@ impl Search {
             initial_step: 0.15,
             starts: 1,
             sensitivities: true,
+            speculation: true,
         }
     }
 }

@@ -164,5 +164,6 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "size_tolerance = {:?}", search.size_tolerance)?;
     writeln!(out, "initial_step = {:?}", search.initial_step)?;
     writeln!(out, "starts = {}", search.starts)?;
-    writeln!(out, "sensitivities = {}", search.sensitivities)
+    writeln!(out, "sensitivities = {}", search.sensitivities)?;
+    writeln!(out, "speculation = {}", search.speculation)
 }

@@ -177,6 +177,8 @@ fn run() {
             ("max_evaluations = 300", "max_evaluations = 10000\nstarts = 200"),
             ("initial_step = 0.1", "sensitivities = 1"),
             ("initial_step = 0.1", "sensitivity = true"),
+            ("speculation = false", "speculation = 1"),
+            ("speculation = false", "speculative = true"),
         ],
     );
 }

@@ -83,6 +83,8 @@ pub struct Evaluation {
     pub(crate) audits_out: usize,
     /// Answers that differ.
     pub(crate) disputes: Vec<Dispute>,
+    /// A worker was lost over it. Nobody is risked for it any more before the search asks for it.
+    pub(crate) lost_over: bool,
 }
 
 impl Evaluation {
@@ -104,6 +106,7 @@ impl Evaluation {
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
+            lost_over: false,
         }
     }
 
@@ -127,6 +130,17 @@ impl Evaluation {
             self.queue.pop_front();
         }
         Some(taken)
+    }
+
+    /// Puts indices back that a worker was told to forget, before all others.
+    pub fn put_back(&mut self, indices: Indices) {
+        match self.queue.front_mut() {
+            Some(front) if front.first == indices.end() => {
+                front.first = indices.first;
+                front.count += indices.count;
+            }
+            _ => self.queue.push_front(indices),
+        }
     }
 
     /// Puts the indices of a lost worker back, in halves, before all others.

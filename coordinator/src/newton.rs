@@ -187,6 +187,18 @@ impl Newton {
         self.evaluations
     }
 
+    /// Points that may be asked for after the pending one, at most `most`: the others at which
+    /// slopes are measured. Where a step goes depends on all that is told before.
+    pub fn likely(&self, most: usize) -> Vec<Vec<f64>> {
+        let Purpose::Difference { axis, .. } = self.purpose else {
+            return Vec::new();
+        };
+        let left = self.settings.max_evaluations.saturating_sub(self.evaluations + 1);
+        let axes = (axis + 1..self.anchor().len()).take(most);
+        let axes = axes.take(usize::try_from(left).unwrap_or(usize::MAX));
+        axes.map(|axis| self.beside(axis, self.difference(axis))).collect()
+    }
+
     fn stop_when_used_up(&mut self) {
         if self.stop.is_none() && self.evaluations >= self.settings.max_evaluations {
             self.stop = Some(Stop::EvaluationsUsedUp);
@@ -294,17 +306,27 @@ impl Newton {
 
     /// Asks for the difference along `axis`, or goes on when all are there.
     fn measure_from(&mut self, axis: usize) {
-        let Some(u) = self.anchor().get(axis) else {
+        if axis < self.anchor().len() {
+            self.measure(axis, self.difference(axis));
+        } else {
             self.go_on(false);
-            return;
-        };
-        let step = if u + DIFFERENCE <= 1.0 { DIFFERENCE } else { -DIFFERENCE };
-        self.measure(axis, step);
+        }
+    }
+
+    /// Step of the difference along `axis` that is tried first.
+    fn difference(&self, axis: usize) -> f64 {
+        if self.anchor()[axis] + DIFFERENCE <= 1.0 { DIFFERENCE } else { -DIFFERENCE }
+    }
+
+    /// Where steps begin, moved along `axis`.
+    fn beside(&self, axis: usize, step: f64) -> Vec<f64> {
+        let mut at = self.anchor().to_vec();
+        at[axis] += step;
+        at
     }
 
     fn measure(&mut self, axis: usize, step: f64) {
-        self.pending = self.anchor().to_vec();
-        self.pending[axis] += step;
+        self.pending = self.beside(axis, step);
         self.purpose = Purpose::Difference { axis, step };
     }
 

@@ -7,9 +7,12 @@ use crate::effect::Effect;
 use crate::event::Event;
 use crate::state::State;
 
+mod ahead;
 mod batches;
 mod checks;
+mod copies;
 mod dispatch;
+mod due;
 mod expulsion;
 mod jobs;
 mod prune;
@@ -20,6 +23,7 @@ mod suspects;
 mod ticks;
 mod workers;
 
+pub(crate) use ahead::LIKELY_MAX;
 pub use restore::Restored;
 
 #[cfg(test)]

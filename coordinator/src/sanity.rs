@@ -1,14 +1,17 @@
 //! Re-derives every cross reference of a state, for tests and simulations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use osteon_common::parameters::Point;
 use thiserror::Error;
 
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
+use crate::reactor::LIKELY_MAX;
 use crate::state::{
-    BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Purpose, RequestName, SETTLED_MAX, Stage, State,
+    Ahead, BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Job, Purpose, RequestName, SETTLED_MAX, Stage,
+    State,
 };
 use crate::worker_name::WorkerName;
 
@@ -58,6 +61,9 @@ pub enum Insane {
     /// An answer of an expelled worker counts, or it is attached.
     #[error("worker {0} is expelled, and still counts")]
     Expelled(WorkerName),
+    /// What is computed ahead is none of the points that a search may ask for.
+    #[error("job {0} is ahead with what its search does not ask for")]
+    Ahead(JobId),
     /// A number that is handed out next is not above all in use.
     #[error("a number is about to be given twice")]
     Numbers,
@@ -72,10 +78,11 @@ pub fn sanity_check(state: &State) -> Result<(), Insane> {
     check_workers(state)?;
     check_batches(state)?;
     for (&id, job) in &state.jobs {
-        if let Stage::Computing(evaluation) = &job.stage {
+        for evaluation in job.evaluations() {
             check_evaluation(state, id, evaluation)?;
             check_checks(state, id, evaluation)?;
         }
+        check_ahead(job)?;
     }
     let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
     let batches = state.batches.last_key_value();
@@ -124,11 +131,31 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
     }
 }
 
+/// What is ahead is of points that may be asked for, once each, while an evaluation is under way.
+fn check_ahead(job: &Job) -> Result<(), Insane> {
+    let Ahead { likely, evaluations } = &job.ahead;
+    let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
+    let bits = |point: &Point| point.0.map(f64::to_bits);
+    let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
+    let known = |of: &Evaluation| likely.iter().any(|at| bits(at) == bits(&of.point));
+    let fits = evaluations.iter().all(known)
+        && points.len() == job.evaluations().count()
+        && likely.len() <= LIKELY_MAX
+        && (under_way || likely.is_empty())
+        && evaluations.iter().all(|ahead| ahead.audits_out == 0);
+    if fits { Ok(()) } else { Err(Insane::Ahead(job.record.job)) }
+}
+
+/// Whether a batch is of this evaluation.
+fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
+    batch.assignment.job == job && batch.assignment.round == evaluation.round
+}
+
 /// Audits and judges are with workers, and nobody who is expelled has a say.
 fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let with = |purpose: fn(&Purpose) -> bool| {
-        let of_job = |batch: &&Batch| batch.assignment.job == job && purpose(&batch.purpose);
-        state.batches.values().filter(of_job).count()
+        let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
+        state.batches.values().filter(of).count()
     };
     let judged = |dispute: &&Dispute| {
         let judge = dispute.judge.and_then(|judge| state.batches.get(&judge));
@@ -162,7 +189,10 @@ fn check_workers(state: &State) -> Result<(), Insane> {
         let exclusive = |batch: &BatchId| state.batches.get(batch).is_some_and(|b| b.exclusive);
         let held = worker.in_flight.len();
         let alone = !worker.in_flight.iter().any(exclusive) || held == 1;
-        if held > BATCHES_IN_FLIGHT_MAX || !alone || worker.settled.len() > SETTLED_MAX {
+        let ahead = |batch: &&BatchId| state.batches.get(batch).is_some_and(|b| b.ahead);
+        let ahead = worker.in_flight.iter().filter(ahead).count();
+        if held > BATCHES_IN_FLIGHT_MAX || !alone || ahead > 1 || worker.settled.len() > SETTLED_MAX
+        {
             return Err(Insane::Credit(id));
         }
         for batch in &worker.in_flight {
@@ -175,8 +205,10 @@ fn check_workers(state: &State) -> Result<(), Insane> {
 }
 
 fn check_batches(state: &State) -> Result<(), Insane> {
-    let copyable =
-        |batch: &Batch| batch.purpose == Purpose::Fill && batch.twin.is_none() && !batch.exclusive;
+    let copyable = |batch: &Batch| {
+        let alone = batch.twin.is_none() && !batch.exclusive;
+        batch.purpose == Purpose::Fill && alone && !batch.ahead
+    };
     let expected = state.batches.iter().filter(|(_, batch)| copyable(batch)).map(|(id, _)| id);
     if !state.copyable.iter().eq(expected) {
         return Err(Insane::Copyable);
@@ -197,11 +229,11 @@ fn check_batches(state: &State) -> Result<(), Insane> {
                 return Err(Insane::Twin(id));
             }
         }
-        let current = match state.jobs.get(&batch.assignment.job).map(|job| &job.stage) {
-            Some(Stage::Computing(evaluation)) => evaluation.round == batch.assignment.round,
-            _ => false,
-        };
-        if !current {
+        let round = batch.assignment.round;
+        let job = state.jobs.get(&batch.assignment.job);
+        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.round == round);
+        let ahead = job.is_some_and(|job| job.ahead.evaluations.iter().any(|it| it.round == round));
+        if asked_for == ahead || batch.ahead != ahead {
             return Err(Insane::Stray(id));
         }
     }
@@ -221,7 +253,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()
-        .filter(|batch| batch.assignment.job == job && batch.purpose == Purpose::Fill)
+        .filter(|batch| is_of(batch, job, evaluation) && batch.purpose == Purpose::Fill)
         .map(|batch| (batch.assignment.indices.first, batch.assignment.indices.count))
         .collect();
     for (first, count) in queued.chain(quarantine).chain(out) {

@@ -20,6 +20,9 @@ use thiserror::Error;
 
 use self::identification::Identification;
 
+pub(crate) use self::ahead::same_point;
+
+mod ahead;
 mod identification;
 mod method;
 mod one_set;
@@ -159,15 +162,7 @@ impl Search {
         };
         let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
         self.digest.add_evaluation(&point, &outcomes);
-        let mut row = Evaluation {
-            number: self.evaluations(),
-            role: Role::default(),
-            point,
-            moments: verdict.moments,
-            cost: None,
-            failures: FailureCounts::of(&outcomes),
-            estimated_error,
-        };
+        let mut row = Evaluation { estimated_error, ..self.row(point, &verdict, &outcomes) };
         match &mut self.plan {
             Plan::Identification(identification) => {
                 row = identification.tell(&self.specification, row, verdict, outcomes);
@@ -178,6 +173,19 @@ impl Search {
             }
         }
         self.history.push(row);
+    }
+
+    /// What is known of the point asked for before its cost is.
+    fn row(&self, point: Point, verdict: &Verdict, outcomes: &[Outcome]) -> Evaluation {
+        Evaluation {
+            number: self.evaluations(),
+            role: Role::default(),
+            point,
+            moments: verdict.moments,
+            cost: None,
+            failures: FailureCounts::of(outcomes),
+            estimated_error: None,
+        }
     }
 
     /// Points whose outcomes were told.

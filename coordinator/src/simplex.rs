@@ -23,6 +23,7 @@
 
 use crate::ask::{Ask, Stop};
 
+mod likely;
 #[cfg(test)]
 mod tests;
 
@@ -196,12 +197,17 @@ impl Simplex {
         }
     }
 
-    /// One step of the algorithm: the pending point has this cost.
+    /// The pending point has this cost.
     fn take(&mut self, cost: f64) {
         if self.settings.costs.reached(cost) {
             self.stop = Some(Stop::CostReached);
-            return;
+        } else {
+            self.step(cost);
         }
+    }
+
+    /// The step that a cost above the tolerance leads to.
+    fn step(&mut self, cost: f64) {
         let trial = Vertex { at: std::mem::take(&mut self.pending), cost };
         match std::mem::replace(&mut self.purpose, Move::Build) {
             Move::Build => self.built(trial),

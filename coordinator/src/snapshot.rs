@@ -137,7 +137,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
             let oldest = state
                 .batches
                 .values()
-                .filter(|batch| batch.assignment.job == job.record.job)
+                .filter(|batch| batch.assignment.job == job.record.job && !batch.ahead)
                 .min_by_key(|batch| batch.sent);
             match oldest.and_then(|batch| Some((batch, state.workers.get(&batch.worker)?))) {
                 Some((batch, worker)) => format!(

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::WORKERS_MAX;
+use osteon_common::parameters::Point;
 use osteon_proto::batch::Work;
 use osteon_proto::specification;
 use prost::Message as _;
@@ -86,6 +87,8 @@ pub(crate) struct Job {
     pub(crate) identity: Identity,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
+    /// What is computed before the search asks for it.
+    pub(crate) ahead: Ahead,
     /// How many evaluations the store has of it; those that the search was not told are read
     /// before it goes on.
     pub(crate) stored: u64,
@@ -107,6 +110,15 @@ pub(crate) struct Job {
     pub(crate) tokens: Vec<Token>,
     /// The store's refusal of the present record.
     pub(crate) trouble: Option<Trouble>,
+}
+
+/// Points that a search may ask for next. Nothing of them is stored or shown.
+#[derive(Debug, Default)]
+pub(crate) struct Ahead {
+    /// The points, the likeliest first.
+    pub(crate) likely: Vec<Point>,
+    /// The evaluations that are begun of them, in the order of their beginning.
+    pub(crate) evaluations: Vec<Evaluation>,
 }
 
 /// How far a job is.
@@ -252,6 +264,8 @@ pub(crate) struct Batch {
     pub(crate) twin: Option<BatchId>,
     /// A suspect: its worker holds nothing else, and it is never copied.
     pub(crate) exclusive: bool,
+    /// Of a point that the search has not asked for.
+    pub(crate) ahead: bool,
 }
 
 impl State {
@@ -306,9 +320,7 @@ impl State {
     /// The work of an assignment, while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
         let job = self.jobs.get(&assignment.job)?;
-        let Stage::Computing(evaluation) = &job.stage else {
-            return None;
-        };
+        let evaluation = job.evaluations().find(|it| it.round == assignment.round)?;
         let specification = &job.record.specification;
         Some(Work {
             setup: specification.setup,
@@ -329,7 +341,8 @@ impl State {
 
     /// The evaluation that a batch is about, while this attempt at it is under way.
     pub(crate) fn attempt_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
-        self.evaluation_mut(assignment.job).filter(|found| found.round == assignment.round)
+        let job = self.jobs.get_mut(&assignment.job)?;
+        job.evaluations_mut().find(|found| found.round == assignment.round)
     }
 
     /// A number for the next attempt at an evaluation.
@@ -417,6 +430,7 @@ impl Job {
         Self {
             identity: identity(&record.specification),
             search: Search::new(record.specification.clone()),
+            ahead: Ahead::default(),
             record,
             stage,
             stored,
@@ -430,6 +444,28 @@ impl Job {
             tokens: Vec::new(),
             trouble: None,
         }
+    }
+
+    /// The evaluation that the search asked for, while it is under way.
+    pub(crate) fn evaluation(&self) -> Option<&Evaluation> {
+        match &self.stage {
+            Stage::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        }
+    }
+
+    /// All evaluations under way, that which the search asked for first.
+    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
+        self.evaluation().into_iter().chain(&self.ahead.evaluations)
+    }
+
+    /// As [`Job::evaluations`].
+    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut Evaluation> {
+        let asked_for = match &mut self.stage {
+            Stage::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        };
+        asked_for.into_iter().chain(&mut self.ahead.evaluations)
     }
 }
 

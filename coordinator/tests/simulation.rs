@@ -1,7 +1,7 @@
 //! Coordinator, workers and store in one thread under a false clock. One seed decides order,
 //! delays, deaths, stalls, answers that come late, twice, malformed or contradict each other,
 //! a node that dies over whatever it gets, refusals, damage and long outages of the store, cancellations,
-//! pauses, clean stops and restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
+//! points that are computed ahead, pauses, clean stops and restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
 //! cancelled, or failed because of a contradiction, what the loop has found by then.
 //!
 //! `OSTEON_SIMULATION_SEED=N` runs one seed, for a look at a failure.
@@ -39,6 +39,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     // A simulation in which nothing goes wrong tests nothing.
     if seeds.end - seeds.start == SCHEDULES {
         let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
+        let world::Counts { ahead, dropped, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -47,6 +48,8 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("restarts", restarts),
             ("refusals of the store", refusals),
             ("batches computed again to compare", checked),
+            ("points computed ahead of their search", ahead),
+            ("points computed ahead that no search asked for", dropped),
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }

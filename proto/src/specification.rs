@@ -234,6 +234,7 @@ fn search_to_message(search: &Search) -> v1::Search {
         initial_step: Some(search.initial_step),
         starts: Some(search.starts),
         sensitivities: Some(search.sensitivities),
+        speculation: Some(search.speculation),
     }
 }
 
@@ -254,6 +255,7 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         initial_step: message.initial_step.unwrap_or(default.initial_step),
         starts: message.starts.unwrap_or(default.starts),
         sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
+        speculation: message.speculation.unwrap_or(default.speculation),
     }
 }
 

@@ -29,6 +29,16 @@ pub struct Spread {
     pub mean: f64,
 }
 
+/// Spreads over a set of points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spreads {
+    /// Of each parameter.
+    pub parameters: [Spread; 7],
+    /// Of the entries of the elasticity matrix in and above the diagonal, row by row, with row and
+    /// column from 0 (Pa, Kelvin-Mandel).
+    pub entries: Vec<(usize, usize, Spread)>,
+}
+
 /// The best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
@@ -47,9 +57,8 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     solutions
 }
 
-/// The spread of each parameter, and of each entry of the elasticity matrix (Pa, Kelvin-Mandel) in
-/// and above the diagonal, row by row, over points; `None` of none.
-pub fn spread(points: &[Point]) -> Option<([Spread; 7], Vec<(usize, usize, Spread)>)> {
+/// The spreads over points; `None` of none.
+pub fn spread(points: &[Point]) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
         for value in values {
@@ -70,5 +79,5 @@ pub fn spread(points: &[Point]) -> Option<([Spread; 7], Vec<(usize, usize, Sprea
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let entries =
         entries.map(|(i, j)| (i, j, of(&mut matrices.iter().map(|matrix| matrix.rows()[i][j]))));
-    Some((parameters, entries.collect()))
+    Some(Spreads { parameters, entries: entries.collect() })
 }

@@ -277,7 +277,7 @@ fn solutions_are_the_best_of_each_start() {
     let seen = found.iter().map(|one| (one.start, one.point.density(), one.evaluations));
     assert!(seen.eq(expected), "{found:?}");
     let points: Vec<Point> = found.iter().map(|one| one.point).collect();
-    let (parameters, entries) = spread(&points).unwrap();
+    let Spreads { parameters, entries } = spread(&points).unwrap();
     assert_eq!((parameters[0].smallest, parameters[0].largest), (1600.0, 1800.0));
     assert_eq!(entries.len(), 21);
     close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);

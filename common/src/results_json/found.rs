@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use super::{failures, measured, moments};
 use crate::inference::{
     self, Direction, Inference, LEVEL, Noise, Profile, Quantity, Sensitivity, Solution, Spread,
+    Spreads,
 };
 use crate::job::{JobSpecification, Objective, SearchMethod};
 use crate::parameters::{Parameter, Point};
@@ -89,7 +90,7 @@ pub(super) fn inference(
 ) {
     let specification = asked.specification;
     let found = best.and_then(|best| inference::inference(specification, set, best, asked.history));
-    put("sensitivities", found.as_ref().map_or(Value::Null, |found| sensitivities(found)));
+    put("sensitivities", found.as_ref().map_or(Value::Null, sensitivities));
     put("identified", found.as_ref().map_or(Value::Null, identified));
     // Those of a likelihood would be another matter.
     if let (Some(best), Some(data), Objective::Moments) =
@@ -202,7 +203,7 @@ fn solutions(asked: &Asked<'_>, set: usize, best: Option<&BestPoint>) -> Value {
             "dispersion": one.point.dispersion(),
         })
     };
-    let spread = inference::spread(&matching).map(|(parameters, entries)| {
+    let spread = inference::spread(&matching).map(|Spreads { parameters, entries }| {
         let parameters = Parameter::ALL.iter().zip(&parameters);
         let parameters = parameters.map(|(name, over)| (name.name().to_owned(), range(over)));
         let entries =

@@ -342,3 +342,31 @@ fn without_a_free_parameter_there_is_one_evaluation() {
     let found = search(space, far, SETTINGS, |_| None);
     assert_eq!((found.stop, found.evaluations), (Stop::Infeasible, 1));
 }
+
+#[test]
+fn the_points_that_measure_slopes_are_foreseen() {
+    // No point matches: slopes are measured before the search gives up.
+    let space = all_free(&[0.5; 7]);
+    let data = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
+    let mut newton = Newton::new(space, data, SETTINGS);
+    let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
+    while let Ask::At(pending) = newton.ask() {
+        let pending = pending.to_vec();
+        if !admissible(&space.point(&pending)) {
+            newton.refuse();
+            foreseen.clear();
+            continue;
+        }
+        if !foreseen.is_empty() {
+            assert_eq!(foreseen[0], pending);
+            asked += 1;
+        }
+        let before = newton.clone();
+        foreseen = newton.likely(8);
+        assert_eq!(newton, before, "what is likely is a question");
+        assert!(newton.likely(2).len() <= 2);
+        let moments = bone(&space.point(&pending));
+        newton.tell(statistics::cost(data, moments), Some(moments));
+    }
+    assert!(asked >= 6, "{asked} points were foreseen");
+}

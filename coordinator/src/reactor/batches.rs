@@ -9,7 +9,7 @@ use crate::effect::{CloseReason, Effect};
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::losses::{Cause, Loss};
-use crate::state::{Assignment, Batch, Purpose, State};
+use crate::state::{Ahead, Assignment, Batch, Job, Purpose, State};
 use crate::worker_name::WorkerName;
 
 /// Weight of the newest measurement in a worker's rate.
@@ -67,7 +67,7 @@ pub(super) fn answered(
         }
         None => checks::compare(state, &assignment, &solved, &name, now, effects),
     }
-    jobs::store_if_complete(state, assignment.job, effects);
+    jobs::store_if_complete(state, assignment.job, now, effects);
     workers::dismiss_if_drained(state, worker, now, effects);
 }
 
@@ -79,12 +79,15 @@ pub(super) fn revoke(state: &mut State, batch: BatchId, now: Duration, effects: 
     }
 }
 
-/// Takes back every batch of a job.
+/// Takes back every batch of a job, and drops what it is ahead with.
 pub(super) fn revoke_all(state: &mut State, job: JobId, now: Duration, effects: &mut Effects) {
     let of_job = state.batches.iter().filter(|(_, batch)| batch.assignment.job == job);
     let batches: Vec<BatchId> = of_job.map(|(id, _)| *id).collect();
     for batch in batches {
         revoke(state, batch, now, effects);
+    }
+    if let Some(job) = state.jobs.get_mut(&job) {
+        job.ahead = Ahead::default();
     }
 }
 
@@ -106,6 +109,7 @@ pub(super) fn orphaned(state: &mut State, batch: BatchId, loss: &Loss) {
         return;
     };
     let indices = assignment.indices;
+    evaluation.lost_over |= loss.cause != Cause::Announced;
     if twin.is_some() {
         return;
     }
@@ -129,7 +133,9 @@ fn fill(
     let before = evaluation.filled();
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
-    if let Some(job) = state.jobs.get_mut(&assignment.job) {
+    let asked_for =
+        |job: &&mut Job| job.evaluation().is_some_and(|it| it.round == assignment.round);
+    if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.progressed = now;
     }
@@ -148,7 +154,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     *known += RATE_WEIGHT * (rate - *known);
     let seconds = batch.assignment.indices.count as f64 / rate;
     let took = fairness::thread_time(seconds, worker.hello.threads);
-    if let Some(job) = state.jobs.get(&batch.assignment.job) {
+    if let Some(job) = state.jobs.get(&batch.assignment.job).filter(|_| !batch.ahead) {
         state.shares.correct(&job.record.client, batch.charged, took);
     }
 }

@@ -218,7 +218,7 @@ pub(super) fn give_up(state: &mut State, now: Duration, effects: &mut Effects) {
     let active: Vec<JobId> = state.active.iter().copied().collect();
     for job in active {
         give_up_audits(state, job);
-        jobs::store_if_complete(state, job, effects);
+        jobs::store_if_complete(state, job, now, effects);
         if let Some(failure) = undecided(state, job, now) {
             jobs::fail(state, job, &failure, now, effects);
         }

@@ -5,8 +5,8 @@
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
-//! or more than the quarter. A worker that has nothing to do gets a copy of the batch that is out
-//! longest. Whom a realization waits for that is to be computed alone is not refilled.
+//! or more than the quarter. A worker that has nothing to do gets a copy of a batch that is late,
+//! then what may be done ahead (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to be computed alone is not refilled.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::{Effects, checks, suspects};
+use super::{Effects, ahead, checks, copies, suspects};
 use crate::effect::Effect;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
@@ -35,7 +35,11 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     }
     let kept = suspects::hand_out(state, now, effects);
     while work_waits(state) && hand_one(state, &kept, now, effects) {}
-    copy_slowest(state, now, effects);
+    copies::of_late_ones(state, now, effects);
+    if kept.is_empty() && !work_waits(state) {
+        ahead::hand_out(state, now, effects);
+    }
+    copies::of_slow_ones(state, now, effects);
 }
 
 /// Whether there is anything to hand out but suspects.
@@ -69,11 +73,17 @@ fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
         .iter()
         .filter(|(id, worker)| !worker.draining && !kept.contains(id))
         .filter(|(_, worker)| !worker.in_flight.iter().any(exclusive))
-        .map(|(id, worker)| (worker.in_flight.len(), *id));
-    let mut free: Vec<(usize, WorkerId)> = free.collect();
+        .map(|(id, worker)| (held(state, worker), worker.in_flight.len(), *id));
+    let mut free: Vec<(usize, usize, WorkerId)> = free.collect();
     free.sort_unstable();
-    let free = free.into_iter().filter(|(held, _)| *held < BATCHES_IN_FLIGHT_MAX);
-    free.map(|(_, worker)| worker).collect()
+    let free = free.into_iter().filter(|(held, ..)| *held < BATCHES_IN_FLIGHT_MAX);
+    free.map(|(.., worker)| worker).collect()
+}
+
+/// Batches that a worker holds, what is done ahead aside.
+pub(super) fn held(state: &State, worker: &Worker) -> usize {
+    let ahead = |held: &&BatchId| state.batches.get(held).is_some_and(|batch| batch.ahead);
+    worker.in_flight.len() - worker.in_flight.iter().filter(ahead).count()
 }
 
 /// Gives a worker a batch of the job whose turn it is.
@@ -124,7 +134,7 @@ pub(super) fn next_job(state: &State) -> Option<JobId> {
 }
 
 /// Charges the client of a batch for the time that it will take, as far as that is known.
-fn charge(state: &mut State, id: BatchId) {
+pub(super) fn charge(state: &mut State, id: BatchId) {
     let target = state.config.batch_target.as_secs_f64();
     let Some(batch) = state.batches.get_mut(&id) else {
         return;
@@ -172,35 +182,6 @@ fn mean_rate_per_thread(state: &State, job: JobId) -> f64 {
     if threads > 0.0 { rates / threads } else { 1.0 }
 }
 
-/// Gives each idle worker a copy of the batch that is out longest. Batches younger than half the
-/// target time are about to be answered and are not worth a copy.
-fn copy_slowest(state: &mut State, now: Duration, effects: &mut Effects) {
-    let patience = state.config.batch_target / 2;
-    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
-    let idle = |worker: &Worker| !worker.draining && worker.in_flight.is_empty();
-    let is_old = |state: &State, id: &BatchId| state.batches.get(id).is_some_and(old);
-    if !state.copyable.first().is_some_and(|slowest| is_old(state, slowest)) {
-        return;
-    }
-    let idle: Vec<WorkerId> =
-        state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
-    for worker in idle {
-        let Some(slowest) = state.copyable.first().copied().filter(|id| is_old(state, id)) else {
-            return;
-        };
-        let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
-            return;
-        };
-        let copy = send(state, worker, assignment, Purpose::Fill, now, effects);
-        for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
-            if let Some((id, batch)) = one.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
-                batch.twin = other;
-                state.copyable.remove(&id);
-            }
-        }
-    }
-}
-
 /// Sends a batch to a worker; its number, if its evaluation is under way.
 pub(super) fn send(
     state: &mut State,
@@ -211,6 +192,7 @@ pub(super) fn send(
     effects: &mut Effects,
 ) -> Option<BatchId> {
     let work = state.work(&assignment)?;
+    ahead::make_way(state, worker, assignment.indices.count, now, effects);
     let id = BatchId(state.next_batch);
     state.next_batch += 1;
     let batch = Batch {
@@ -221,6 +203,7 @@ pub(super) fn send(
         charged: Duration::ZERO,
         twin: None,
         exclusive: false,
+        ahead: false,
     };
     state.batches.insert(id, batch);
     if purpose == Purpose::Fill {

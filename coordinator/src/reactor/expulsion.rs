@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Effects, batches, jobs, reread, workers};
+use super::{Effects, ahead, batches, jobs, reread, workers};
 use crate::effect::{CloseReason, Effect, Record};
 use crate::evaluation::Evaluation;
 use crate::ids::{JobId, WorkerId};
@@ -47,6 +47,7 @@ pub(super) fn expel(
 
 /// Takes the answers of a worker out of a job.
 fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effects: &mut Effects) {
+    ahead::forget(state, id, name, now, effects);
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
@@ -72,7 +73,13 @@ fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effect
                 batches::revoke(state, judge, now, effects);
             }
         }
-        Stage::Storing { record, .. } => job.rewind |= told || record.workers.contains(name),
+        Stage::Storing { record, .. } => {
+            job.rewind |= told || record.workers.contains(name);
+            if job.rewind {
+                // Where the search goes after that is another matter.
+                ahead::drop_all(state, id, now, effects);
+            }
+        }
         Stage::Finishing(_) if told => {
             // What is on its way to the store as the end of a job has ended, unless it is refused.
             let on_its_way = job.trouble.as_ref().is_none_or(|trouble| trouble.on_its_way);

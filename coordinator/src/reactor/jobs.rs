@@ -6,9 +6,8 @@ use std::time::Duration;
 
 use osteon_common::results::Status;
 
-use super::{Effects, batches, expulsion, reread};
+use super::{Effects, ahead, batches, expulsion, reread};
 use crate::effect::{Answer, Effect, Record, Refusal};
-use crate::evaluation::Evaluation;
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
@@ -142,7 +141,12 @@ pub(super) fn store_again(job: &mut Job, effects: &mut Effects) {
 }
 
 /// Stores the evaluation of a job once it is complete and checked.
-pub(super) fn store_if_complete(state: &mut State, id: JobId, effects: &mut Effects) {
+pub(super) fn store_if_complete(
+    state: &mut State,
+    id: JobId,
+    now: Duration,
+    effects: &mut Effects,
+) {
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
@@ -158,7 +162,11 @@ pub(super) fn store_if_complete(state: &mut State, id: JobId, effects: &mut Effe
     let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    let outcomes = record.outcomes.clone();
     job.stage = Stage::Storing { record, is_last };
+    if is_last {
+        ahead::prepare(state, id, &outcomes, now, effects);
+    }
 }
 
 /// Ends a job because of `failure`.
@@ -241,13 +249,13 @@ fn begin(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
         job.progressed = now;
         state.shares.begin(&job.record.client);
         state.active.insert(id);
+        ahead::keep_bound(state, now, effects);
         advance(state, id, now, effects);
     }
 }
 
 /// Goes where the search wants to go, after it was told what the store has.
 pub(super) fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    let round = state.round();
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
@@ -259,9 +267,7 @@ pub(super) fn advance(state: &mut State, id: JobId, now: Duration, effects: &mut
     let ending = match job.search.ask() {
         Step::Evaluate(_) if job.cancelled => cancelled(),
         Step::Evaluate(point) => {
-            let realizations = job.record.specification.monte_carlo.realizations;
-            let evaluation = Evaluation::new(job.search.evaluations(), round, point, realizations);
-            job.stage = Stage::Computing(evaluation);
+            ahead::begin(state, id, point, now, effects);
             return;
         }
         Step::Done(ending) => ending,

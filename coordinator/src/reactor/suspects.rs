@@ -15,7 +15,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
-use super::{Effects, dispatch, jobs};
+use super::{Effects, ahead, dispatch, jobs};
 use crate::evaluation::{Evaluation, Indices};
 use crate::failure::Failure;
 use crate::ids::{JobId, WorkerId};
@@ -41,10 +41,12 @@ pub(super) fn hand_out(
     let active: Vec<JobId> = state.active.iter().copied().collect();
     for job in active {
         while let Some((index, worker)) = next(state, job, now) {
-            if state.workers.get(&worker).is_none_or(|worker| !worker.in_flight.is_empty()) {
+            let holds = |worker: &Worker| dispatch::held(state, worker) > 0;
+            if state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
             }
+            ahead::give_back(state, worker, now, effects);
             send(state, job, index, worker, now, effects);
         }
     }
@@ -66,7 +68,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// answered nothing yet shows first that it answers something else, if there is something else.
 fn taker(state: &State, losses: &Losses, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
-        let held = if losses.is_empty() { worker.in_flight.len() } else { 0 };
+        let held = if losses.is_empty() { dispatch::held(state, worker) } else { 0 };
         (standing(state, worker, losses), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);
@@ -105,9 +107,7 @@ pub(super) fn forgive(state: &mut State, name: &WorkerName) {
         lost.workers.retain(|lost| lost != name);
     }
     for job in state.jobs.values_mut() {
-        if let Stage::Computing(evaluation) = &mut job.stage {
-            evaluation.forgive(name);
-        }
+        job.evaluations_mut().for_each(|evaluation| evaluation.forgive(name));
     }
 }
 

@@ -16,6 +16,7 @@ use crate::event::{Hello, RecordKey, Request};
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::sanity::sanity_check;
 
+mod ahead;
 mod checks;
 mod dispatch;
 mod fairness;
@@ -112,7 +113,8 @@ fn propagation(realizations: u64) -> JobSpecification {
         parameters: [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
         monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
         objective: Objective::default(),
-        search: Search::default(),
+        // What is done ahead would be in the way of what is looked at.
+        search: Search { speculation: false, ..Search::default() },
     }
 }
 

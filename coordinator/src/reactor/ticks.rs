@@ -6,7 +6,7 @@ use super::{Effects, checks, expulsion, jobs, prune, suspects, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
-use crate::state::{Stage, State, Worker, sequence};
+use crate::state::{State, Worker, sequence};
 
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
@@ -40,7 +40,7 @@ fn excuse(state: &mut State, now: Duration) {
     }
     state.batches.values_mut().for_each(|batch| excused(&mut batch.sent));
     for job in state.jobs.values_mut() {
-        if let Stage::Computing(evaluation) = &mut job.stage {
+        for evaluation in job.evaluations_mut() {
             evaluation.suspects.values_mut().for_each(|losses| losses.excuse(excused));
             for dispute in &mut evaluation.disputes {
                 excused(&mut dispute.since);

@@ -6,7 +6,7 @@ use std::time::Duration;
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
-use super::{Effects, batches, suspects};
+use super::{Effects, ahead, batches, suspects};
 use crate::effect::{CloseReason, Effect};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
@@ -64,6 +64,7 @@ pub(super) fn drains(state: &mut State, worker: WorkerId, now: Duration, effects
     if let Some(attached) = state.workers.get_mut(&worker) {
         attached.draining = true;
     }
+    ahead::give_back(state, worker, now, effects);
     dismiss_if_drained(state, worker, now, effects);
 }
 

@@ -34,6 +34,12 @@ impl Identification {
         self.present.point()
     }
 
+    /// Points of the present set that may be asked for after that, at most `most`, the likeliest
+    /// first.
+    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
+        self.present.likely(most)
+    }
+
     /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
     pub(super) fn tell(
         &mut self,

@@ -61,6 +61,14 @@ impl Method {
         }
     }
 
+    /// Points that may be asked for after the present one, at most `most`, the likeliest first.
+    pub(super) fn likely(&self, most: usize) -> Vec<Vec<f64>> {
+        match self {
+            Self::Simplex(simplex) => simplex.likely(most),
+            Self::Newton(newton) => newton.likely(most),
+        }
+    }
+
     /// The point asked for is inadmissible.
     pub(super) fn refuse(&mut self) {
         match self {

@@ -82,6 +82,15 @@ impl OneSet {
         }
     }
 
+    /// Points that may be asked for after that, at most `most`, the likeliest first.
+    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
+        if self.differences.is_empty() {
+            let likely = self.method.likely(most);
+            return likely.iter().map(|at| self.space.point(at)).filter(admissible).collect();
+        }
+        self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
+    }
+
     /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
     pub(super) fn tell(
         &mut self,
@@ -230,7 +239,7 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
         };
         let steps = [value + step, value - step].into_iter();
         let within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
-        within.filter(|(_, point)| admissible(point)).next()
+        within.into_iter().find(|(_, point)| admissible(point))
     };
     Parameter::ALL.into_iter().rev().filter_map(beside).collect()
 }

@@ -578,3 +578,30 @@ fn velocities_that_are_all_the_same_have_no_likelihood() {
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("every velocity of the first point is the same"));
 }
+
+#[test]
+fn where_a_search_goes_is_known_before_it_is_told() {
+    for specification in [specification(60), by_newton(60)] {
+        let mut search = Search::new(Arc::new(specification));
+        let mut foreseen = 0;
+        while let Step::Evaluate(point) = search.ask() {
+            let likely = search.likely(8);
+            let outcomes = outcomes(&point);
+            let after = search.likely_after(&outcomes, 8);
+            assert!(likely.len() <= 8 && after.len() <= 8);
+            assert!(likely.iter().all(|at| !same_point(at, &point)), "{point:?} is asked for");
+            assert_eq!(search.ask(), Step::Evaluate(point), "a question changes nothing");
+            search.tell(outcomes, ERRORS);
+            match search.ask() {
+                Step::Evaluate(next) => {
+                    assert!(same_point(&after[0], &next), "{after:?} and not {next:?}");
+                    foreseen += u32::from(likely.iter().any(|at| same_point(at, &next)));
+                }
+                Step::Done(_) => assert_eq!(after, []),
+            }
+        }
+        let by_simplex = search.specification.search.method == SearchMethod::Simplex;
+        assert!(foreseen > 20 || !by_simplex, "{foreseen} points were foreseen");
+        assert_eq!(search.likely(8), []);
+    }
+}

@@ -272,3 +272,75 @@ fn logarithms_are_minimised_by_their_differences() {
         assert!(found.at.iter().all(|u| (u - 0.3).abs() < 1e-5), "{offset}: {:?}", found.at);
     }
 }
+
+/// How many of the points that a search for the least `cost` asks for, after the first, were among
+/// the `most` likely ones before; of all of them.
+fn foreseen(start: &[f64], most: usize, cost: impl Fn(&[f64]) -> f64) -> f64 {
+    let mut simplex = Simplex::new(start, SETTINGS);
+    let (mut asked, mut foreseen) = (0, 0);
+    let mut likely: Option<Vec<Vec<f64>>> = None;
+    while let Ask::At(point) = simplex.ask() {
+        let point = point.to_vec();
+        if let Some(likely) = likely {
+            asked += 1;
+            foreseen += u32::from(likely.contains(&point));
+        }
+        let before = simplex.clone();
+        let found = simplex.likely(most);
+        assert_eq!(simplex, before, "what is likely is a question");
+        assert!(found.len() <= most);
+        for (i, at) in found.iter().enumerate() {
+            assert!(at.iter().all(|u| (0.0..=1.0).contains(u)), "outside the box: {at:?}");
+            assert!(*at != point && !found[..i].contains(at), "twice: {at:?}");
+        }
+        likely = Some(found);
+        simplex.tell(cost(&point));
+    }
+    f64::from(foreseen) / f64::from(asked)
+}
+
+#[test]
+fn most_points_are_foreseen() {
+    let check = |start: &[f64], most: usize, cost: fn(&[f64]) -> f64, least: f64| {
+        let share = foreseen(start, most, cost);
+        assert!(share >= least, "{share:.3} of {most} from {start:?}");
+    };
+    for start in [0.3, 0.5, 0.6] {
+        check(&[start; 7], 3, flat_valley, 0.6);
+        check(&[start; 7], 8, flat_valley, 0.75);
+    }
+    check(&[0.8; 2], 8, sphere, 0.9);
+    check(&[0.8; 7], 8, sphere, 0.6);
+    check(&[0.2, 0.75], 8, rosenbrock, 0.9);
+}
+
+proptest! {
+    // All but those after which a whole simplex is put into order.
+    #[test]
+    fn with_room_enough_every_point_of_a_step_is_foreseen(
+        start in proptest::collection::vec(0.0_f64..=1.0, 1..4),
+        seed: u64,
+    ) {
+        // Any number at any point, infinite ones among them.
+        let cost = |at: &[f64]| {
+            let noise = at.iter().fold(seed, |mixed, u| {
+                (mixed ^ u.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+            });
+            if noise % 5 == 0 { f64::INFINITY } else { 1.0 + (noise >> 40) as f64 }
+        };
+        let settings = Settings { max_evaluations: 60, ..SETTINGS };
+        let mut simplex = Simplex::new(&start, settings);
+        while let Ask::At(point) = simplex.ask() {
+            let made = matches!(simplex.purpose, Move::Build | Move::Shrink { .. });
+            let found = simplex.likely(60);
+            let before = point.to_vec();
+            let told = cost(point);
+            simplex.tell(told);
+            // What is worth a restart is another question.
+            if let Ask::At(next) = simplex.ask() && !made && simplex.restarts == 0 {
+                let known = next == before || found.iter().any(|at| at == next);
+                prop_assert!(known, "after {told}: {next:?}");
+            }
+        }
+    }
+}

@@ -1,9 +1,10 @@
 //! What clients hear, and what jobs leave.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::results::{JobResult, Status};
+use osteon_common::results::{Evaluation, JobResult, Status};
 use osteon_coordinator::effect::Answer;
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::leftover;
@@ -11,7 +12,7 @@ use osteon_coordinator::search::{Ending, Search, Step};
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
 
-use super::World;
+use super::{World, point_key};
 use crate::fake;
 
 impl World {
@@ -66,12 +67,39 @@ impl World {
         } else {
             fake::plain_run(&record.specification)
         };
+        self.count_ahead(&record.specification, &left.history, lied);
         // Who is never caught may deceive.
         if !self.deceived.contains(&record.job) {
             self.counts.repaired += u64::from(lied && end.ending.status != Status::Failed);
             // As text: an unknown standard error is NaN, which equals nothing.
             assert_eq!(format!("{:?}", left.result), format!("{expected:?}"));
         }
+    }
+
+    /// Counts points of a path that were sent before the one before them was durable, and points
+    /// that were sent and are not on it.
+    fn count_ahead(
+        &mut self,
+        specification: &JobSpecification,
+        history: &[Evaluation],
+        lied: bool,
+    ) {
+        let seed = specification.monte_carlo.seed;
+        let mut sent: BTreeMap<u64, u64> = BTreeMap::new();
+        for ((_, point), durable) in self.first_sent.range((seed, 0)..=(seed, u64::MAX)) {
+            sent.insert(*point, *durable);
+        }
+        let on_path =
+            history.iter().filter_map(|row| Some((row, sent.remove(&point_key(&row.point))?)));
+        let ahead = on_path.filter(|(row, durable)| *durable < row.number).count() as u64;
+        let search = &specification.search;
+        // On the path that comes of a lie a point may be asked for sooner.
+        assert!(
+            ahead == 0 || search.speculation || lied,
+            "nobody wanted points to be computed ahead"
+        );
+        self.counts.ahead += ahead;
+        self.counts.dropped += u64::from(search.speculation) * sent.len() as u64;
     }
 
     fn stored(&self, job: JobId) -> Option<StoredJob> {

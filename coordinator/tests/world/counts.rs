@@ -31,6 +31,10 @@ pub(crate) struct Counts {
     pub(crate) remembered: u64,
     /// Jobs that ended right although somebody had lied in them.
     pub(crate) repaired: u64,
+    /// Points that were computed before their search asked for them, and are on its path.
+    pub(crate) ahead: u64,
+    /// Points that were computed and are not on the path of their search.
+    pub(crate) dropped: u64,
     /// Jobs forgotten.
     pub(crate) pruned: u64,
     /// Stored evaluations that were damaged.
@@ -60,6 +64,8 @@ impl Counts {
         self.confirmed += other.confirmed;
         self.remembered += other.remembered;
         self.repaired += other.repaired;
+        self.ahead += other.ahead;
+        self.dropped += other.dropped;
         self.pruned += other.pruned;
         self.bad_deaths += other.bad_deaths;
         self.pauses += other.pauses;

@@ -55,12 +55,28 @@ impl World {
             let (job, key) = record.key();
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
-            if let Record::Evaluation { record, .. } = record {
-                self.damaged.remove(&(record.job, record.number));
-            }
-            fake::written(&mut self.store, record)
+            self.written(record)
         };
         self.within(5, Happening::Report(event));
+    }
+
+    /// A record is durable.
+    pub(super) fn written(&mut self, record: &Record) -> Event {
+        match record {
+            Record::Evaluation { record, is_last } => {
+                self.damaged.remove(&(record.job, record.number));
+                if let Some(seed) = self.seeds.get(&record.job) {
+                    let durable = self.durable.entry(*seed).or_default();
+                    let before = if *is_last { 0 } else { *durable };
+                    *durable = before.max(record.number + 1);
+                }
+            }
+            Record::Job(record) => {
+                self.seeds.insert(record.job, record.specification.monte_carlo.seed);
+            }
+            Record::End { .. } | Record::Expulsion(_) => {}
+        }
+        fake::written(&mut self.store, record)
     }
 
     pub(super) fn read(&mut self, job: JobId, number: u64) {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
+use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
@@ -115,6 +116,12 @@ pub(crate) struct World {
     expelled: BTreeSet<u32>,
     /// Seed, point and indices of batches that were answered in this life of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
+    /// Seed of each job.
+    seeds: BTreeMap<JobId, u64>,
+    /// How many evaluations of the job with a seed are durable.
+    durable: BTreeMap<u64, u64>,
+    /// How many were, of each seed, when a point was sent first.
+    first_sent: BTreeMap<(u64, u64), u64>,
     /// Evaluations that were found damaged in the store.
     damaged: BTreeSet<(JobId, u64)>,
     /// Jobs that end while somebody who lied in them is not found out.
@@ -185,6 +192,9 @@ impl World {
             lies: BTreeSet::new(),
             expelled: BTreeSet::new(),
             answered_batches: BTreeSet::new(),
+            seeds: BTreeMap::new(),
+            durable: BTreeMap::new(),
+            first_sent: BTreeMap::new(),
             damaged: BTreeSet::new(),
             deceived: BTreeSet::new(),
             ends: BTreeMap::new(),
@@ -418,7 +428,7 @@ impl World {
             match happening {
                 Happening::Write(record) => {
                     if self.draw(2) == 0 {
-                        fake::written(&mut self.store, &record);
+                        self.written(&record);
                     }
                 }
                 Happening::Forget(_, jobs) => {
@@ -495,6 +505,9 @@ impl World {
     /// A worker gets a batch; the dice say what becomes of it.
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
         self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
+        let (seed, point, ..) = key(&work);
+        let durable = self.durable.get(&seed).copied().unwrap_or(0);
+        self.first_sent.entry((seed, point)).or_insert(durable);
         let known = self.workers.get_mut(&worker).unwrap();
         let bad = known.bad;
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
@@ -532,8 +545,11 @@ impl World {
 
 /// What a batch is about.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
-    let point = work.point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()));
-    (work.germs.seed, point, work.first, work.count)
+    (work.germs.seed, point_key(&work.point), work.first, work.count)
+}
+
+fn point_key(point: &Point) -> u64 {
+    point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()))
 }
 
 /// An identification, one in three by `newton`, which takes two realizations at least.
@@ -545,7 +561,7 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
         specification.search = Search { max_evaluations: evaluations, ..by };
     }
     // One in four for two groups, one in four from two starts, one in two with derivatives.
-    if seed % 4 == 0 {
+    if seed.is_multiple_of(4) {
         let group = |name: &str, velocity: f64| Group {
             name: name.to_owned(),
             velocities: vec![0.97 * velocity, 1.03 * velocity],
@@ -554,7 +570,7 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
             Some(Data::Groups(vec![group("left", 3900.0), group("right", 4000.0)]));
     }
     specification.search.starts = 1 + u64::from(seed % 4 == 1);
-    specification.search.sensitivities = seed % 3 != 0;
+    specification.search.sensitivities = !seed.is_multiple_of(3);
     specification
 }
 
@@ -566,6 +582,8 @@ fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
                 0 => fake::propagation(1 + draw(60), 4 * seed + number),
                 _ => searched(draw(3), 1 + draw(40), 2 + draw(12), 4 * seed + number),
             };
+            let search = Search { speculation: draw(3) > 0, ..specification.search };
+            let specification = JobSpecification { search, ..specification };
             let request_id = format!("request {number}");
             let cancels = draw(6) == 0;
             Client {

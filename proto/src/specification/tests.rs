@@ -80,6 +80,7 @@ prop_compose! {
         initial_step in 0.01..0.5,
         starts in 1_u64..100,
         sensitivities: bool,
+        speculation: bool,
         solver in solver(),
     ) -> JobSpecification {
         JobSpecification {
@@ -101,6 +102,7 @@ prop_compose! {
                 initial_step,
                 starts,
                 sensitivities,
+                speculation,
                 ..Search::by(method)
             },
         }

@@ -1,0 +1,176 @@
+//! What idle threads compute ahead, and when they had better wait.
+//!
+//! A realization that is begun is not given up before its end, so a thread that is wanted in a
+//! moment waits for that: it waits where the evaluation of the same job is about to be complete,
+//! since then another point may be likelier, and where another job is about to want it.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_common::parameters::Point;
+
+use super::{realizations, realizations_held};
+use crate::evaluation::{Evaluation, Indices};
+use crate::fairness;
+use crate::ids::{BatchId, JobId, WorkerId};
+use crate::reactor::{Effects, dispatch, due};
+use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
+
+/// When the last batch of what each search waits for should be answered.
+type Dues = BTreeMap<JobId, Duration>;
+
+/// Hands out what may be done ahead to the workers with idle threads.
+pub(in crate::reactor) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) {
+    if next(state).is_none() {
+        return;
+    }
+    let idle = state.workers.iter().map(|(id, worker)| (*id, spare(state, worker)));
+    let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, threads)| *threads > 0).collect();
+    let mut threads: u64 = idle.iter().map(|(_, threads)| threads).sum();
+    let dues = due::dues(state);
+    let mut wanted = next(state);
+    for (worker, spare) in idle {
+        let Some((job, point)) = wanted else {
+            return;
+        };
+        if !waits(state, job, &point, worker, threads, &dues, now) {
+            send(state, job, point, worker, now, effects);
+            threads -= spare;
+            wanted = next(state);
+        }
+    }
+}
+
+/// The point to compute ahead next: what a search will ask for as soon as a record is durable, then
+/// of all jobs that which is likeliest among its job's, then as for other work; and its job.
+fn next(state: &State) -> Option<(JobId, Point)> {
+    let of_job = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let has_room = || {
+            let more = job.record.specification.monte_carlo.realizations;
+            realizations(state) + more <= state.config.active_realizations_max
+        };
+        let place = job.ahead.likely.iter().position(|at| match job.ahead.at(at) {
+            Some(begun) => !begun.queue.is_empty() && !begun.lost_over,
+            None => has_room(),
+        })?;
+        let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });
+        let had = state.shares.used(&job.record.client);
+        Some((!certain, place, had, Reverse(job.record.priority), *id))
+    };
+    let (_, place, .., id) = state.active.iter().filter_map(of_job).min()?;
+    let point = state.jobs.get(&id)?.ahead.likely.get(place)?;
+    Some((id, *point))
+}
+
+/// Whether the idle threads of a worker, of `threads` that are idle, had better wait.
+fn waits(
+    state: &State,
+    id: JobId,
+    point: &Point,
+    worker: WorkerId,
+    threads: u64,
+    dues: &Dues,
+    now: Duration,
+) -> bool {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return true;
+    };
+    let spare = spare(state, attached);
+    // What is begun on each thread is not given up before it ends.
+    let begun = spare.min(queued(job, point)) as f64;
+    let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
+    let takes = fairness::thread_time(seconds, 1);
+    let soon = |due: &Duration| now < *due + takes / 2 && *due < now + takes / 2;
+    dues.get(&id).is_some_and(soon)
+        || threads < spare + wanted_by_others(state, id, now + takes, dues)
+}
+
+/// Realizations of a point that nobody computes.
+fn queued(job: &Job, point: &Point) -> u64 {
+    let realizations = job.record.specification.monte_carlo.realizations;
+    job.ahead.at(point).map_or(realizations, Evaluation::queued)
+}
+
+/// Threads that jobs other than `but` will want before `until`, besides those they have.
+fn wanted_by_others(state: &State, but: JobId, until: Duration, dues: &Dues) -> u64 {
+    let wanted = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let specification = &job.record.specification;
+        let realizations = specification.monte_carlo.realizations;
+        match &job.stage {
+            Stage::Storing { .. } if specification.kind == JobKind::Propagation => None,
+            Stage::Computing(evaluation) => {
+                let soon = dues.get(id).is_some_and(|due| *due < until);
+                soon.then_some(evaluation.filled())
+            }
+            Stage::Storing { .. } if has_next(job) => None,
+            Stage::Storing { .. } | Stage::Rereading { .. } => Some(realizations),
+            Stage::Accepting | Stage::Waiting | Stage::Finishing(_) => None,
+        }
+    };
+    state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
+}
+
+/// Whether all of the point is handed out that a job will ask for when its record is durable.
+fn has_next(job: &Job) -> bool {
+    let next = job.ahead.likely.first().and_then(|next| job.ahead.at(next));
+    next.is_some_and(|next| next.queue.is_empty())
+}
+
+/// Gives the idle threads of a worker a batch of a point.
+fn send(
+    state: &mut State,
+    id: JobId,
+    point: Point,
+    worker: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return;
+    };
+    let (queued, spare) = (queued(job, &point), spare(state, attached));
+    let size = match realizations_held(state, attached) {
+        0 => dispatch::batch_size(state, attached, id, queued).max(spare.min(queued)),
+        _ => spare,
+    };
+    let Some((round, indices)) = take(state, id, point, size) else {
+        return;
+    };
+    let assignment = Assignment { job: id, round, indices };
+    let batch = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
+    if let Some((batch, sent)) = batch.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
+        sent.ahead = true;
+        state.copyable.remove(&batch);
+    }
+}
+
+/// Takes indices of a point, which is begun now if it was not; with the number of the attempt.
+fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
+    let round = state.round();
+    let job = state.jobs.get_mut(&id)?;
+    if job.ahead.at(&point).is_none() {
+        // The soonest that it may become; which decides no more than what is audited.
+        let number = job.search.evaluations() + 1;
+        let realizations = job.record.specification.monte_carlo.realizations;
+        job.ahead.evaluations.push(Evaluation::new(number, round, point, realizations));
+    }
+    let evaluation = job.ahead.at_mut(&point)?;
+    Some((evaluation.round, evaluation.take(size)?))
+}
+
+/// Threads of a worker that nobody has work for.
+fn spare(state: &State, worker: &Worker) -> u64 {
+    let taken = |held: &BatchId| {
+        state.batches.get(held).is_some_and(|batch| batch.ahead || batch.exclusive)
+    };
+    let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
+    let failing = state.is_failing(worker.name.host());
+    if worker.draining || full || failing || worker.in_flight.iter().any(taken) {
+        return 0;
+    }
+    u64::from(worker.hello.threads).saturating_sub(realizations_held(state, worker))
+}

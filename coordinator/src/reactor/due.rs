@@ -1,0 +1,43 @@
+//! When batches should be answered, by the rates of their workers.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::fairness;
+use crate::ids::JobId;
+use crate::state::{Batch, State};
+
+/// When the last batch of what each search waits for should be answered.
+pub(super) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
+    let mut dues = BTreeMap::new();
+    for batch in state.batches.values().filter(|batch| !batch.ahead) {
+        if let Some(answered) = answered(state, batch) {
+            let due: &mut Duration = dues.entry(batch.assignment.job).or_default();
+            *due = answered.max(*due);
+        }
+    }
+    dues
+}
+
+/// When a batch should be answered.
+fn answered(state: &State, batch: &Batch) -> Option<Duration> {
+    let worker = state.workers.get(&batch.worker)?;
+    // Two of more than half a worker's threads are computed one after the other.
+    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.threads.into();
+    if !large(batch) {
+        return Some(batch.sent + expected(state, batch));
+    }
+    let held = worker.in_flight.iter().filter_map(|id| state.batches.get(id));
+    let before = held.filter(|held| held.sent < batch.sent && large(held));
+    let waits: Duration = before.map(|held| expected(state, held)).sum();
+    Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
+}
+
+/// Time that a batch should take, as far as that is known.
+pub(super) fn expected(state: &State, batch: &Batch) -> Duration {
+    let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
+    let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
+    rate.map_or(Duration::ZERO, |rate| {
+        fairness::thread_time(batch.assignment.indices.count as f64 / rate, 1)
+    })
+}

@@ -1,0 +1,245 @@
+//! A coordinator and its workers in virtual time: realizations, messages and the store take times
+//! that are fixed beforehand. What is measured is a function of the schedule alone.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::results::JobResult;
+use osteon_coordinator::config::Config;
+use osteon_coordinator::effect::{Effect, Record};
+use osteon_coordinator::event::{Event, Hello, Request};
+use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::leftover;
+use osteon_coordinator::reactor::react;
+use osteon_coordinator::sanity::sanity_check;
+use osteon_coordinator::state::State;
+use osteon_coordinator::store::EndRecord;
+use osteon_coordinator::store::memory::MemoryStore;
+use osteon_proto::batch::Work;
+
+use crate::fake;
+
+/// One realization on one thread, on average.
+const REALIZATION: Duration = Duration::from_millis(10);
+/// A message, one way.
+const MESSAGE: Duration = Duration::from_micros(200);
+/// A record until it is durable.
+const RECORD: Duration = Duration::from_millis(2);
+const TICK: Duration = Duration::from_millis(100);
+/// No run takes longer than this.
+const DAY: Duration = Duration::from_secs(86_400);
+
+enum Happening {
+    Tick,
+    /// Something reaches the coordinator.
+    Event(Event),
+    /// A batch reaches a worker.
+    Batch(WorkerId, BatchId, Work),
+    /// A worker is told to forget a batch.
+    Revoked(WorkerId, BatchId),
+    /// A thread of a worker ends a realization of a batch.
+    Realized(WorkerId, BatchId),
+    Write(Record),
+}
+
+/// How long realizations take.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Times {
+    /// All as long.
+    Equal,
+    /// From half of the average to half as much again, each time the same one.
+    Spread,
+}
+
+/// A worker: batches begin in the order in which they come, one of whose realizations is given up
+/// between two.
+struct Worker {
+    idle_threads: u32,
+    /// What is not begun of each batch.
+    queue: VecDeque<(BatchId, u32)>,
+    batches: BTreeMap<BatchId, Held>,
+}
+
+struct Held {
+    work: Work,
+    begun: Duration,
+    realized: u32,
+}
+
+/// How a job ended.
+pub(crate) struct Ended {
+    /// When, since all were submitted.
+    pub(crate) at: Duration,
+    pub(crate) result: JobResult,
+}
+
+pub(crate) struct Clockwork {
+    times: Times,
+    now: Duration,
+    number: u64,
+    agenda: BTreeMap<(Duration, u64), Happening>,
+    state: State,
+    store: MemoryStore,
+    workers: BTreeMap<WorkerId, Worker>,
+    unfinished: BTreeSet<JobId>,
+    ends: BTreeMap<JobId, (Duration, EndRecord)>,
+}
+
+impl Clockwork {
+    /// Workers of so many threads.
+    pub(crate) fn new(threads: &[u32], times: Times) -> Self {
+        let mut clockwork = Self {
+            times,
+            now: Duration::ZERO,
+            number: 0,
+            agenda: BTreeMap::new(),
+            state: State::new(Config::default(), Duration::ZERO),
+            store: MemoryStore::new(),
+            workers: BTreeMap::new(),
+            unfinished: BTreeSet::new(),
+            ends: BTreeMap::new(),
+        };
+        for (process, &threads) in (1..).zip(threads) {
+            let worker = WorkerId(process.into());
+            let idle =
+                Worker { idle_threads: threads, queue: VecDeque::new(), batches: BTreeMap::new() };
+            clockwork.workers.insert(worker, idle);
+            let hello = Hello { threads, ..fake::hello(process) };
+            clockwork.react(Event::Hello { worker, hello });
+        }
+        clockwork.after(TICK, Happening::Tick);
+        clockwork
+    }
+
+    /// Runs jobs, each of a client of its own, to their ends.
+    pub(crate) fn run(mut self, specifications: &[JobSpecification]) -> Vec<Ended> {
+        for (number, specification) in (1..).zip(specifications) {
+            self.unfinished.insert(JobId(number));
+            let mut request = fake::submission(specification, "");
+            if let Request::Submit { client, .. } = &mut request {
+                *client = format!("client {number}");
+            }
+            self.react(Event::Requested { token: Token(number), request });
+        }
+        while !self.unfinished.is_empty() {
+            let ((at, _), happening) = self.agenda.pop_first().expect("something is to happen");
+            assert!(at < DAY, "still not done: {:?}", self.state);
+            self.now = at;
+            self.happen(happening);
+        }
+        let mut ended = Vec::new();
+        for (at, end) in std::mem::take(&mut self.ends).into_values() {
+            let result = leftover::read(&mut self.store, &end).unwrap().result;
+            ended.push(Ended { at, result });
+        }
+        ended
+    }
+
+    fn after(&mut self, time: Duration, happening: Happening) {
+        self.number += 1;
+        self.agenda.insert((self.now + time, self.number), happening);
+    }
+
+    fn happen(&mut self, happening: Happening) {
+        match happening {
+            Happening::Tick => {
+                self.after(TICK, Happening::Tick);
+                let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
+                for worker in workers {
+                    self.react(Event::Heartbeat { worker });
+                }
+                self.react(Event::Tick);
+            }
+            Happening::Event(event) => self.react(event),
+            Happening::Batch(worker, batch, work) => {
+                let known = self.workers.get_mut(&worker).unwrap();
+                known.queue.push_back((batch, work.count));
+                known.batches.insert(batch, Held { work, begun: Duration::MAX, realized: 0 });
+                self.begin(worker);
+            }
+            Happening::Revoked(worker, batch) => {
+                let known = self.workers.get_mut(&worker).unwrap();
+                known.queue.retain(|(queued, _)| *queued != batch);
+                known.batches.remove(&batch);
+            }
+            Happening::Realized(worker, batch) => {
+                self.workers.get_mut(&worker).unwrap().idle_threads += 1;
+                self.realized(worker, batch);
+                self.begin(worker);
+            }
+            Happening::Write(record) => {
+                let event = fake::written(&mut self.store, &record);
+                if let Record::End { end, .. } = record {
+                    self.unfinished.remove(&end.job);
+                    self.ends.insert(end.job, (self.now, end));
+                }
+                self.react(event);
+            }
+        }
+    }
+
+    /// Idle threads begin what waits.
+    fn begin(&mut self, worker: WorkerId) {
+        let known = self.workers.get_mut(&worker).unwrap();
+        let mut begun = Vec::new();
+        while known.idle_threads > 0
+            && let Some((batch, left)) = known.queue.front_mut()
+        {
+            known.idle_threads -= 1;
+            *left -= 1;
+            let held = known.batches.get_mut(batch).unwrap();
+            held.begun = held.begun.min(self.now);
+            begun.push((*batch, time(self.times, &held.work, *left)));
+            if *left == 0 {
+                known.queue.pop_front();
+            }
+        }
+        for (batch, time) in begun {
+            self.after(time, Happening::Realized(worker, batch));
+        }
+    }
+
+    fn realized(&mut self, worker: WorkerId, batch: BatchId) {
+        let known = self.workers.get_mut(&worker).unwrap();
+        let Some(held) = known.batches.get_mut(&batch) else {
+            return;
+        };
+        held.realized += 1;
+        if held.realized == held.work.count {
+            let elapsed_s = (self.now - held.begun).as_secs_f64();
+            let solved = fake::solved(&held.work);
+            known.batches.remove(&batch);
+            let answer = Event::Answered { worker, batch, solved, elapsed_s };
+            self.after(MESSAGE, Happening::Event(answer));
+        }
+    }
+
+    fn react(&mut self, event: Event) {
+        let effects = react(&mut self.state, event, self.now);
+        sanity_check(&self.state).unwrap();
+        for effect in effects {
+            match effect {
+                Effect::Send { worker, batch, work } => {
+                    self.after(MESSAGE, Happening::Batch(worker, batch, work));
+                }
+                Effect::Revoke { worker, batch } => {
+                    self.after(MESSAGE, Happening::Revoked(worker, batch));
+                }
+                Effect::Store(record) => self.after(RECORD, Happening::Write(record)),
+                Effect::Close { worker, reason } => panic!("{worker} is closed: {reason}"),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// How long the realization of a batch takes that has `left` after it.
+fn time(times: Times, work: &Work, left: u32) -> Duration {
+    let index = work.first + u64::from(work.count - 1 - left);
+    let noise = work.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));
+    match times {
+        Times::Equal => REALIZATION,
+        Times::Spread => REALIZATION / 2 + REALIZATION * (noise % 1024) as u32 / 1024,
+    }
+}
