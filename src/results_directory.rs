@@ -216,8 +216,11 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
     // A version that did not know a key did what is its default.
     let directory = path.parent().unwrap_or(Path::new(""));
-    let complete = job_file::parse(stored, Format::Toml, directory, specification.kind)
-        .map_or_else(|_| stored.to_owned(), |there| job_file::to_toml(&there));
+    // Only that of an identification has data.
+    let complete = [JobKind::Identification, JobKind::Propagation]
+        .into_iter()
+        .find_map(|kind| job_file::parse(stored, Format::Toml, directory, kind).ok())
+        .map_or_else(|| stored.to_owned(), |there| job_file::to_toml(&there));
     match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
         Some(difference) => Err(Failure::bad_input(anyhow!(

@@ -150,7 +150,6 @@ fn run() {
             (SAMPLING, "control_variates = true"),
             ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
             ("kind = \"moments\"", "kind = \"entropy\""),
-            ("kind = \"moments\"", "kind = \"likelihood\""),
             (
                 "kind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
                 "kind = \"likelihood\"\n\n[search]\nmethod = \"newton\"",

@@ -1,6 +1,8 @@
 //! What failed realizations do to the moments, where it is known: of draws that have velocities, the slowest
 //! are made failures.
 
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
 use osteon_common::case::Setup;
 use osteon_common::job::{MonteCarlo, Sampling};
 use osteon_common::outcome::{FailureKind, Outcome};

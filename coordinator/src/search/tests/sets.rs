@@ -1,0 +1,129 @@
+//! Groups of data, several starts, and the derivatives at the end.
+
+use super::*;
+
+#[test]
+fn derivatives_are_measured_beside_the_best_point() {
+    let (search, _) = run(&specification(400));
+    let best = search.best().unwrap();
+    let (searched, beside) = search.history().split_at(search.history().len() - 2);
+    assert!(searched.iter().all(|row| row.role.varied.is_none()));
+    for (row, parameter) in
+        beside.iter().zip([Parameter::LongitudinalYoungModulus, Parameter::Dispersion])
+    {
+        assert_eq!(row.role.varied, Some(parameter));
+        let place = parameter as usize;
+        let edge = [13e9, 0.28][usize::from(parameter == Parameter::Dispersion)];
+        let step = (row.point.0[place] - best.point.0[place]) / edge;
+        assert!((step - 1e-4).abs() < 1e-9, "{parameter:?}: {step}");
+        let others = (0..7).filter(|other| *other != place);
+        assert!(others.into_iter().all(|k| row.point.0[k] == best.point.0[k]));
+    }
+    // At an upper bound the step goes down.
+    let mut bounded = specification(400);
+    bounded.parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 16e9 };
+    let (search, _) = run(&bounded);
+    let (best, row) = (search.best().unwrap(), &search.history()[search.history().len() - 2]);
+    assert!((best.point.0[1] / 16e9 - 1.0).abs() < 1e-6);
+    assert!(row.point.0[1] < best.point.0[1]);
+}
+
+#[test]
+fn derivatives_need_the_same_realizations() {
+    let mut specification = specification(400);
+    specification.monte_carlo.max_failed_fraction = 0.5;
+    let mut search = Search::new(Arc::new(specification));
+    let mut told = 0;
+    while let Step::Evaluate(point) = search.ask() {
+        let mut outcomes: Vec<_> = outcomes(&point).to_vec();
+        // One fails everywhere, another one only in the last evaluation.
+        outcomes[0] = Err(FailureKind::NoArrival);
+        let rows = search.history();
+        if rows.last().is_some_and(|row| row.role.varied.is_some()) {
+            outcomes[1] = Err(FailureKind::NoArrival);
+        }
+        search.tell(outcomes.into(), ERRORS);
+        told += 1;
+    }
+    let [.., first, last] = search.history() else { panic!("{told} evaluations") };
+    assert!(first.role.varied.is_some() && first.moments.is_some());
+    assert!(last.role.varied.is_some() && last.moments.is_none());
+}
+
+#[test]
+fn without_derivatives_the_search_ends_with_the_method() {
+    let mut specification = specification(400);
+    specification.search.sensitivities = false;
+    let (search, _) = run(&specification);
+    assert_eq!(search.result(&ending(&search), "1").evaluations, search.history().len() as u64);
+}
+
+/// Groups whose mean velocities are these; all have the dispersion of the start.
+fn grouped(means: &[f64]) -> JobSpecification {
+    let group = |(k, mean): (usize, &f64)| Group {
+        name: format!("group {k}"),
+        velocities: vec![0.97 * mean, 1.03 * mean],
+    };
+    let groups = means.iter().enumerate().map(group).collect();
+    JobSpecification { data: Some(Data::Groups(groups)), ..by_newton(60) }
+}
+
+#[test]
+fn each_group_is_identified_by_itself() {
+    let means = [3800.0, 3900.0, 4000.0];
+    let (search, told) = run(&grouped(&means));
+    assert_eq!(ending(&search), Ending { status: Status::Converged, reason: None });
+    let summary = search.summary();
+    assert_eq!((summary.best, summary.groups.len()), (None, 3));
+    for (k, (group, mean)) in summary.groups.iter().zip(means).enumerate() {
+        let row = &summary.history[usize::try_from(group.best.unwrap()).unwrap()];
+        assert_eq!(row.role, Role { group: u32::try_from(k).unwrap(), ..Role::default() });
+        assert!((row.point.0[1] / (17.7e9 * mean / 3900.0) - 1.0).abs() < 1e-5, "{row:?}");
+    }
+    // All begin at the start of the job.
+    let firsts = (0..3).map(|k| summary.history.iter().find(|row| row.role.group == k).unwrap());
+    assert!(firsts.into_iter().all(|row| row.point == told[0].0));
+    assert_eq!(search.result(&ending(&search), "1").best, None);
+}
+
+#[test]
+fn a_group_that_fails_leaves_the_others_what_they_have() {
+    // Twice as fast as any point of the box.
+    let (search, _) = run(&grouped(&[3800.0, 9000.0, 4000.0]));
+    let summary = search.summary();
+    assert_eq!(ending(&search).status, Status::Converged);
+    let reasons = summary.groups.iter().map(|group| group.reason.is_some());
+    assert!(reasons.eq([false, true, false]), "{:?}", summary.groups);
+
+    let mut few = grouped(&[3800.0, 3850.0]);
+    few.search.max_evaluations = 2;
+    let (search, _) = run(&few);
+    let Ending { status, reason } = ending(&search);
+    assert_eq!(status, Status::MaxEvaluations);
+    let reason = reason.unwrap();
+    assert!(reason.starts_with("the searches for 2 of 2 groups did not converge"), "{reason}");
+}
+
+#[test]
+fn several_starts_give_several_answers() {
+    let mut specification = by_newton(60);
+    specification.parameters[0] = Range::Free { start: 1600.0, lower: 1500.0, upper: 2000.0 };
+    specification.search.starts = 4;
+    let (search, _) = run(&specification);
+    let starts = (0..4).map(|start| {
+        let rows = search.history().iter();
+        let mut rows = rows.filter(|row| row.role.start == start && row.role.varied.is_none());
+        let first = *rows.next().unwrap();
+        (first, rows.next_back().map_or(first, |last| *last))
+    });
+    let starts: Vec<(Evaluation, Evaluation)> = starts.collect();
+    for (k, (first, last)) in starts.iter().enumerate() {
+        assert!(last.cost.unwrap() <= 1e-12, "{last:?}");
+        let another = starts.iter().skip(k + 1).all(|(other, _)| other.point != first.point);
+        assert!(another, "start {k} twice");
+    }
+    // The first one matches the data: it is the answer.
+    assert_eq!(search.best().unwrap().number, starts[0].1.number);
+    let again = run(&specification).0;
+    assert_eq!(search.summary(), again.summary());
+}
