@@ -1,5 +1,7 @@
 //! The text of results: exact keys, columns and digits.
 
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
 use std::path::Path;
 
 use osteon_common::case::Setup;
