@@ -219,6 +219,16 @@ impl SearchMethod {
     }
 }
 
+/// A value that a free parameter is drawn to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// The value, within the parameter's bounds, in its unit.
+    pub value: f64,
+    /// What the cost grows by where the parameter is off by the whole width of its bounds, above 0;
+    /// by the square of less.
+    pub weight: f64,
+}
+
 /// The search loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
@@ -243,6 +253,8 @@ pub struct Search {
     /// Whether workers that nobody else has work for compute points that may be asked for next. It
     /// changes when a result is there, and no bit of it.
     pub speculation: bool,
+    /// Values that [`Parameter::ALL`] are drawn to, in that order, where they are free.
+    pub priors: [Option<Prior>; 7],
 }
 
 impl Search {
@@ -260,6 +272,7 @@ impl Search {
             starts: 1,
             sensitivities: true,
             speculation: true,
+            priors: [None; 7],
         }
     }
 }
@@ -293,6 +306,23 @@ impl JobSpecification {
     /// Range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]
+    }
+
+    /// What priors add to the cost of a point: w (p - prior)²/(upper - lower)², summed over them
+    /// (Tikhonov's regularisation).
+    pub fn penalty(&self, point: &Point) -> f64 {
+        let of = |parameter: Parameter| {
+            let prior = self.search.priors[parameter as usize]?;
+            let Range::Free { lower, upper, .. } = self.range(parameter) else { return None };
+            let off = (point.get(parameter) - prior.value) / (upper - lower);
+            Some(prior.weight * (off * off))
+        };
+        Parameter::ALL.into_iter().filter_map(of).sum()
+    }
+
+    /// Whether there is a prior.
+    pub fn has_priors(&self) -> bool {
+        self.search.priors.iter().any(Option::is_some)
     }
 
     /// Most evaluations of the whole job.

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 
 use crate::case::{Case, Setup};
 use crate::elasticity::Elasticity;
-use crate::job::{Data, JobSpecification, Range};
+use crate::job::{Data, JobSpecification, Prior, Range, Search};
 use crate::layers::Fluid;
 use crate::parameters::Parameter;
 use crate::settings::{Method, SolverSettings};
@@ -165,5 +165,16 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "initial_step = {:?}", search.initial_step)?;
     writeln!(out, "starts = {}", search.starts)?;
     writeln!(out, "sensitivities = {}", search.sensitivities)?;
-    writeln!(out, "speculation = {}", search.speculation)
+    writeln!(out, "speculation = {}", search.speculation)?;
+    priors(out, search)
+}
+
+fn priors(out: &mut String, search: &Search) -> fmt::Result {
+    for (parameter, prior) in Parameter::ALL.iter().zip(&search.priors) {
+        if let Some(Prior { value, weight }) = prior {
+            writeln!(out, "\n[search.priors.{}]", parameter.name())?;
+            writeln!(out, "value = {value:?}\nweight = {weight:?}")?;
+        }
+    }
+    Ok(())
 }

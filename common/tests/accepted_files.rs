@@ -99,6 +99,7 @@ fn a_minimal_job_has_the_documented_defaults() {
             starts: 1,
             sensitivities: true,
             speculation: true,
+            priors: [None; 7],
         },
     };
     assert_eq!(given, expected);

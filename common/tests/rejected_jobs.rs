@@ -177,6 +177,19 @@ fn run() {
             ("initial_step = 0.1", "sensitivities = 1"),
             ("initial_step = 0.1", "sensitivity = true"),
             ("speculation = false", "speculation = 1"),
+            ("speculation = false", "priors = 1"),
+            ("speculation = false", "priors = { densty = { value = 1700.0, weight = 1e-3 } }"),
+            ("speculation = false", "priors = { dispersion = 0.1 }"),
+            ("speculation = false", "priors = { dispersion = { value = 0.1 } }"),
+            ("speculation = false", "priors = { dispersion = { value = 0.4, weight = 0.0 } }"),
+            (
+                "speculation = false",
+                "priors = { longitudinal_shear_modulus = { value = 4e9, weight = 1.0 } }",
+            ),
+            (
+                "method = \"simplex\"",
+                "method = \"newton\"\npriors = { dispersion = { value = 0.1, weight = 1.0 } }",
+            ),
             ("speculation = false", "speculative = true"),
         ],
     );

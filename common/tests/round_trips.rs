@@ -9,7 +9,7 @@ use osteon_common::document::Format;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::file_error::ContentError;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
     SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
@@ -157,6 +157,7 @@ fn search() -> impl Strategy<Value = Search> {
             starts,
             sensitivities: truths.0,
             speculation: truths.1,
+            priors: [None; 7],
         },
     )
 }
@@ -174,8 +175,18 @@ fn job() -> impl Strategy<Value = JobSpecification> {
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
     (any::<bool>(), setup(), data(), parameters, monte_carlo(), search(), objective).prop_map(
-        |(identification, setup, data, parameters, monte_carlo, search, objective)| {
+        |(identification, setup, data, parameters, monte_carlo, mut search, objective)| {
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
+            let parameters = [rho, e_l, nu_l, g_l, e_t, nu_t, delta];
+            let by_simplex = search.method == SearchMethod::Simplex;
+            for (prior, range) in search.priors.iter_mut().zip(parameters) {
+                // Of some that are free.
+                if let (true, Range::Free { start, lower, .. }) = (by_simplex, range)
+                    && start.to_bits().is_multiple_of(3)
+                {
+                    *prior = Some(Prior { value: start, weight: 1.0 + lower.abs() / 7.0 });
+                }
+            }
             let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
             let searched = has_law && search.method == SearchMethod::Simplex;
             let objective = if searched { objective } else { Objective::Moments };
@@ -183,7 +194,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 kind: KINDS[usize::from(!identification)],
                 setup,
                 data: identification.then_some(data),
-                parameters: [rho, e_l, nu_l, g_l, e_t, nu_t, delta],
+                parameters,
                 monte_carlo,
                 objective,
                 search,

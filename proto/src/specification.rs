@@ -2,7 +2,7 @@
 
 use osteon_common::check;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
     SearchMethod,
 };
 use osteon_common::parameters::Parameter;
@@ -235,6 +235,7 @@ fn search_to_message(search: &Search) -> v1::Search {
         starts: Some(search.starts),
         sensitivities: Some(search.sensitivities),
         speculation: Some(search.speculation),
+        priors: priors_to_message(&search.priors),
     }
 }
 
@@ -256,7 +257,40 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         starts: message.starts.unwrap_or(default.starts),
         sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
         speculation: message.speculation.unwrap_or(default.speculation),
+        priors: priors_from_message(&message.priors, violations),
     }
+}
+
+fn priors_to_message(priors: &[Option<Prior>; 7]) -> Vec<v1::Prior> {
+    let message = |(parameter, prior): (&Parameter, &Option<Prior>)| {
+        let Prior { value, weight } = (*prior)?;
+        Some(v1::Prior { parameter: parameter.name().to_owned(), value, weight })
+    };
+    Parameter::ALL.iter().zip(priors).filter_map(message).collect()
+}
+
+fn priors_from_message(messages: &[v1::Prior], violations: &mut Violations) -> [Option<Prior>; 7] {
+    let mut priors = [None; 7];
+    for v1::Prior { parameter, value, weight } in messages {
+        let known = Parameter::ALL.into_iter().find(|known| known.name() == parameter);
+        match known.map(|known| &mut priors[known as usize]) {
+            Some(slot @ None) => *slot = Some(Prior { value: *value, weight: *weight }),
+            Some(Some(_)) => {
+                let known = parameter.as_str();
+                violations.add(format!("search.priors.{known}"), "is given twice");
+            }
+            None => {
+                let names = Parameter::ALL.map(Parameter::name).join(", ");
+                violations.add(
+                    "search.priors",
+                    format!("has one for an unknown parameter; it must be one of {names}"),
+                );
+                // One is enough to read.
+                return priors;
+            }
+        }
+    }
+    priors
 }
 
 #[cfg(test)]

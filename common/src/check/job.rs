@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::accepted::{Interval, WholeRange};
 use crate::document::{element_path, entry_path};
 use crate::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
     SearchMethod,
 };
 use crate::limits;
@@ -62,6 +62,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     something_to_search(specification, violations);
     monte_carlo(&specification.monte_carlo, violations);
     search(&specification.search, violations);
+    priors(specification, violations);
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
     likelihood(specification, violations);
@@ -332,6 +333,39 @@ fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
         violations.add(
             "monte_carlo.realizations",
             "is 1; the objective \"likelihood\" needs the law of velocities that differ, so at least 2",
+        );
+    }
+}
+
+fn priors(specification: &JobSpecification, violations: &mut Violations) {
+    for parameter in Parameter::ALL {
+        let Some(Prior { value, weight }) = specification.search.priors[parameter as usize] else {
+            continue;
+        };
+        let path = format!("search.priors.{}", parameter.name());
+        number(&format!("{path}.weight"), weight, Interval::above(0.0, ""), violations);
+        match specification.range(parameter) {
+            Range::Free { lower, upper, .. } => {
+                let within = Interval::from_to(lower, upper, "the bounds");
+                if !known_wrong(&format!("parameters.{}", parameter.name()), violations) {
+                    number(&format!("{path}.value"), value, within, violations);
+                }
+            }
+            Range::Fixed(_) if !violations.touches(&path) => {
+                violations
+                    .add(path, "is for a parameter that is fixed; only free ones have priors");
+            }
+            Range::Fixed(_) => {}
+        }
+    }
+    if specification.search.method == SearchMethod::Newton
+        && specification.has_priors()
+        && !known_wrong("search.priors", violations)
+    {
+        violations.add(
+            "search.priors",
+            "cannot be had with the method \"newton\", whose answer is nearest to the starts of \
+             the parameters: make the prior values the starts, or use \"simplex\"",
         );
     }
 }

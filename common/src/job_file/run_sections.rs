@@ -1,7 +1,8 @@
 //! `[monte_carlo]`, `[objective]` and `[search]`.
 
 use crate::check::{EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, STARTS};
-use crate::job::{MonteCarlo, Objective, Sampling, Search, SearchMethod};
+use crate::job::{MonteCarlo, Objective, Prior, Sampling, Search, SearchMethod};
+use crate::parameters::Parameter;
 use crate::reader::{Choice, Reader, Table};
 
 /// The Monte Carlo loop, with defaults where `root` is silent or wrong.
@@ -46,6 +47,7 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         "starts",
         "sensitivities",
         "speculation",
+        "priors",
     ];
     let table = reader.table(root, "search", &keys);
     let method = Choice { all: &SearchMethod::ALL, name: SearchMethod::name, reserved: &[] };
@@ -62,5 +64,29 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         starts: reader.whole(&table, "starts", STARTS).unwrap_or(default.starts),
         sensitivities: reader.truth(&table, "sensitivities").unwrap_or(default.sensitivities),
         speculation: reader.truth(&table, "speculation").unwrap_or(default.speculation),
+        priors: priors(reader, &table),
     }
+}
+
+/// A table `{ value, weight }` for each parameter that has one; numbers that could not be read are
+/// NaN, and recorded.
+fn priors(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; 7] {
+    let table = reader.table(search, "priors", &Parameter::ALL.map(Parameter::name));
+    Parameter::ALL.map(|parameter| {
+        if !table.has(parameter.name()) {
+            return None;
+        }
+        let prior = reader.table(&table, parameter.name(), &["value", "weight"]);
+        if !prior.is_table() {
+            return None;
+        }
+        let [value, weight] = ["value", "weight"].map(|key| {
+            if !prior.has(key) {
+                let expected = "a number; a prior has a value and a weight";
+                reader.missing(&prior, key, expected);
+            }
+            reader.number(&prior, key).unwrap_or(f64::NAN)
+        });
+        Some(Prior { value, weight })
+    })
 }

@@ -7,7 +7,7 @@ use crate::inference::{
     self, Direction, Inference, LEVEL, Noise, Profile, Quantity, Sensitivity, Solution, Spread,
     Spreads,
 };
-use crate::job::{JobSpecification, Objective, SearchMethod};
+use crate::job::{JobSpecification, Objective, Prior, Search, SearchMethod};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, GroupResult, Moments};
 
@@ -67,12 +67,25 @@ pub(super) fn search(asked: &Asked<'_>, best: Option<&BestPoint>) -> Value {
     }
     put("starts", json!(search.starts));
     put("sensitivities", json!(search.sensitivities));
+    if asked.specification.has_priors() {
+        put("priors", priors(search));
+        put("penalty", json!(best.map(|best| asked.specification.penalty(&best.point))));
+    }
     let cost = best.and_then(|best| best.cost);
     put("point", json!(cost.map(|cost| meaning(asked.specification, cost))));
-    let below = best.filter(|_| asked.specification.objective == Objective::Moments);
+    let by_moments = asked.specification.objective == Objective::Moments;
+    let below = best.filter(|_| by_moments && !asked.specification.has_priors());
     let below = below.and_then(|best| inference::first_below_noise(0, best, asked.history));
     put("below_noise_from", json!(below));
     Value::Object(object)
+}
+
+fn priors(search: &Search) -> Value {
+    let of = |(parameter, prior): (&Parameter, &Option<Prior>)| {
+        let Prior { value, weight } = (*prior)?;
+        Some((parameter.name().to_owned(), json!({ "value": value, "weight": weight })))
+    };
+    Value::Object(Parameter::ALL.iter().zip(&search.priors).filter_map(of).collect())
 }
 
 /// The cost that is low enough; a likelihood has none.

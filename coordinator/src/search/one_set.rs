@@ -108,6 +108,7 @@ impl OneSet {
             }
             _ => verdict.cost(self.data),
         };
+        let cost = cost + specification.penalty(&row.point);
         row.cost = Some(cost);
         row.role = Role { group: self.set, start: self.start, varied: None };
         if let Some((varied, _)) = self.differences.pop() {

@@ -2,7 +2,7 @@
 
 use osteon_common::case::Setup;
 use osteon_common::job::{
-    Group, MonteCarlo, Objective, Range, Sampling, Search as SearchSettings, SearchMethod,
+    Group, MonteCarlo, Objective, Prior, Range, Sampling, Search as SearchSettings, SearchMethod,
 };
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;

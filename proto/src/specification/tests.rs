@@ -81,8 +81,14 @@ prop_compose! {
         starts in 1_u64..100,
         sensitivities: bool,
         speculation: bool,
+        weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
         solver in solver(),
     ) -> JobSpecification {
+        let mut priors = [None; 7];
+        for ((prior, weight), range) in priors.iter_mut().zip(weights).zip(&parameters) {
+            let drawn = matches!(range, Range::Free { .. }) && method == SearchMethod::Simplex;
+            *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
+        }
         JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
             setup: Setup { solver, ..Setup::default() },
@@ -103,6 +109,7 @@ prop_compose! {
                 starts,
                 sensitivities,
                 speculation,
+                priors,
                 ..Search::by(method)
             },
         }

@@ -58,6 +58,49 @@ fn without_derivatives_the_search_ends_with_the_method() {
     assert_eq!(search.result(&ending(&search), "1").evaluations, search.history().len() as u64);
 }
 
+/// Three parameters are free and two moments are given: of the points that match them, about, the
+/// answer is the one that the priors ask for, whatever the start.
+#[test]
+fn priors_choose_among_the_points_that_match() {
+    let mut specification = specification(1000);
+    for (parameter, start, lower, upper) in [(0, 1700.0, 1500.0, 2000.0), (1, 20e9, 12e9, 25e9)] {
+        specification.parameters[parameter] = Range::Free { start, lower, upper };
+    }
+    let of_density = |point: &Point| point.density() / 1598.8;
+    let told = |point: &Point| -> Arc<[Outcome]> {
+        let outcomes = outcomes(point);
+        outcomes.iter().map(|outcome| outcome.map(|v| v / of_density(point))).collect()
+    };
+    let found = |specification: &JobSpecification| {
+        let mut search = Search::new(Arc::new(specification.clone()));
+        while let Step::Evaluate(point) = search.ask() {
+            search.tell(told(&point), ERRORS);
+        }
+        assert_eq!(ending(&search).status, Status::Converged);
+        *search.best().unwrap()
+    };
+    for value in [1550.0, 1650.0, 1750.0] {
+        specification.search.priors[0] = Some(Prior { value, weight: 1e-3 });
+        for start in [1520.0, 1900.0] {
+            specification.parameters[0] = Range::Free { start, lower: 1500.0, upper: 2000.0 };
+            let best = found(&specification);
+            assert!((best.point.density() - value).abs() < 2.0, "{best:?}, prior {value}");
+            let moments = best.moments.unwrap();
+            assert!((moments.mean / 3900.0 - 1.0).abs() < 1e-3, "{best:?}");
+        }
+    }
+    // Away from what the data say, both have their say: the cost counts both.
+    specification.search.priors[6] = Some(Prior { value: 0.2, weight: 0.5 });
+    let best = found(&specification);
+    let penalty = specification.penalty(&best.point);
+    let Moments { mean, coefficient_of_variation } = best.moments.unwrap();
+    let data = Moments { mean: 3900.0, coefficient_of_variation: 0.03 };
+    let misfit = statistics::cost(data, Moments { mean, coefficient_of_variation });
+    assert!((best.cost.unwrap() - misfit - penalty).abs() < 1e-15);
+    assert!(penalty > 1e-3 && misfit > 1e-3, "{misfit} {penalty}");
+    assert!((0.125..0.195).contains(&best.point.dispersion()), "{best:?}");
+}
+
 /// Groups whose mean velocities are these; all have the dispersion of the start.
 fn grouped(means: &[f64]) -> JobSpecification {
     let group = |(k, mean): (usize, &f64)| Group {
