@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::document::Format;
-use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
 use osteon_common::{job_file, results_csv, results_json};
@@ -167,7 +167,7 @@ impl ResultsDirectory {
                 let history = results_csv::history(&fetched.specification, &fetched.history);
                 write(&self.path.join(HISTORY), &history)?;
             }
-            if !fetched.result.groups.is_empty() {
+            if matches!(fetched.specification.data, Some(Data::Groups(_))) {
                 let Fetched { specification, result, history } = fetched;
                 let groups = results_csv::groups(specification, result, history);
                 write(&self.path.join(GROUPS), &groups)?;

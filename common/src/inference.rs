@@ -8,6 +8,9 @@
 //! J. With the covariance C of e, a quantity whose gradient is g has the variance (g J⁺) C (g J⁺)ᵀ,
 //! as far as g lies in the rows of J; the rest of g is what the data cannot say of it.
 //!
+//! What the search has left between data and model, r, would move it by (g J⁺) r, which intervals
+//! have on top.
+//!
 //! C is the sum of two parts. That of the data, known where the velocities are, is that of the
 //! influence of each velocity on both logarithms (the delta method, without the assumption of a
 //! normal law). That of the model has the squares of the reported standard errors, relative, on its
@@ -22,7 +25,7 @@ mod solutions;
 mod tests;
 
 use crate::bulk_velocity::bulk_velocity;
-use crate::job::{JobSpecification, Objective, Range};
+use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, Moments};
 
@@ -100,9 +103,17 @@ pub fn inference(
     let noise = noise(data, set, &estimate);
     let linear = Linear::of(&jacobian);
     let quantile = noise.quantile();
-    let matched = is_matched(specification, data.moments(set), best, &noise);
-    let context =
-        Context { specification, best, linear: &linear, noise: &noise, quantile, matched };
+    let residual = residual(data.moments(set), estimate.moments);
+    let matched = is_matched(residual, &noise);
+    let context = Context {
+        specification,
+        best,
+        linear: &linear,
+        noise: &noise,
+        quantile,
+        residual,
+        matched,
+    };
     Some(Inference {
         matched,
         free: jacobian.free.clone(),
@@ -116,23 +127,26 @@ pub fn inference(
     })
 }
 
-/// Whether the moments differ by no more than three standard errors of all noise, or the cost is
-/// within the tolerance of the search.
-fn is_matched(
-    specification: &JobSpecification,
-    data: Moments,
-    best: &BestPoint,
-    noise: &Noise,
-) -> bool {
-    let Some(model) = best.velocity.map(|estimate| estimate.moments) else { return false };
-    let within = |model: f64, data: f64, axis: usize| {
-        let difference = libm::log(model / data);
-        difference * difference <= 9.0 * noise.covariance()[axis][axis]
+/// Both moments to 1e-4: nobody measures better.
+const EXACT: f64 = 1e-4;
+
+/// Whether the moments differ by no more than three standard errors of all noise, or by hardly
+/// anything.
+fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
+    let covariance = noise.covariance();
+    let within = |axis: usize| {
+        let square = residual[axis] * residual[axis];
+        square <= (9.0 * covariance[axis][axis]).max(EXACT * EXACT)
     };
-    let by_moments = specification.objective == Objective::Moments;
-    best.cost.is_some_and(|cost| by_moments && cost <= specification.search.cost_tolerance)
-        || (within(model.mean, data.mean, 0)
-            && within(model.coefficient_of_variation, data.coefficient_of_variation, 1))
+    within(0) && within(1)
+}
+
+/// What the logarithms of the data's moments are above the model's.
+fn residual(data: Moments, model: Moments) -> [f64; 2] {
+    [
+        libm::log(data.mean / model.mean),
+        libm::log(data.coefficient_of_variation / model.coefficient_of_variation),
+    ]
 }
 
 struct Context<'a> {
@@ -141,6 +155,8 @@ struct Context<'a> {
     linear: &'a Linear,
     noise: &'a Noise,
     quantile: f64,
+    /// What the search has left between data and model.
+    residual: [f64; 2],
     matched: bool,
 }
 
@@ -171,9 +187,11 @@ impl Context<'_> {
             let axis = (0..free.len()).map(|other| if other == place { 1.0 } else { 0.0 });
             let gradient: Vec<f64> = axis.collect();
             let response = self.response(&gradient).filter(|_| self.linear.undetermined.is_empty());
-            let known = response.map(|Response { deviation, free_share }| {
-                let standard_error = deviation * edge(self.specification.range(parameter));
-                let reach = self.quantile * standard_error;
+            let known = response.map(|response| {
+                let Response { deviation, free_share, .. } = response;
+                let edge = edge(self.specification.range(parameter));
+                let standard_error = deviation * edge;
+                let reach = self.reach(&response) * edge;
                 Known { standard_error, interval: [value - reach, value + reach], free_share }
             });
             (parameter, Quantity { value, known })
@@ -183,12 +201,21 @@ impl Context<'_> {
 
     /// A quantity, given the gradient of its logarithm in units of the box.
     fn of_logarithm(&self, value: f64, gradient: &[f64]) -> Quantity {
-        let known = self.response(gradient).map(|Response { deviation, free_share }| {
-            let factor = libm::exp(self.quantile * deviation);
+        let known = self.response(gradient).map(|response| {
+            let Response { deviation, free_share, .. } = response;
+            let factor = libm::exp(self.reach(&response));
             let interval = [value / factor, value * factor];
             Known { standard_error: value * deviation, interval, free_share }
         });
         Quantity { value, known }
+    }
+
+    /// Half the length of an interval: what noise does, and how far the answer would move for what
+    /// the search has left.
+    fn reach(&self, response: &Response) -> f64 {
+        let [mean, variation] = response.transfer;
+        let left = mean * self.residual[0] + variation * self.residual[1];
+        self.quantile * response.deviation + left.abs()
     }
 
     /// What noise does to a quantity with this gradient; nothing is known of one where the model

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::job::JobSpecification;
+use crate::job::{Data, JobSpecification};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EstimatedError, Evaluation, JobResult, Moments};
@@ -54,7 +54,8 @@ pub fn identification(
     put("digest", json!(result.digest));
     put("objective", json!(specification.objective.name()));
     found::point(&mut put, specification, best);
-    if result.groups.is_empty() {
+    let grouped = matches!(specification.data, Some(Data::Groups(_)));
+    if !grouped {
         let velocities = specification.data.as_ref().and_then(|data| data.velocities(0));
         put("data", measured::data(result.data, velocities, best));
     }
@@ -64,7 +65,7 @@ pub fn identification(
     put("seed", json!(result.seed));
     sampling(&mut put, result);
     put("search", found::search(&asked, best));
-    if result.groups.is_empty() {
+    if !grouped {
         found::inference(&mut put, &asked, 0, best);
     } else {
         let groups = result.groups.iter().enumerate();

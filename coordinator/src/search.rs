@@ -161,7 +161,7 @@ impl Search {
             return;
         };
         let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
-        self.digest.add_evaluation(&point, &outcomes);
+        let told = Arc::clone(&outcomes);
         let mut row = Evaluation { estimated_error, ..self.row(point, &verdict, &outcomes) };
         match &mut self.plan {
             Plan::Identification(identification) => {
@@ -171,6 +171,10 @@ impl Search {
                 *told = Some(verdict);
                 self.outcomes = Some(outcomes);
             }
+        }
+        // What measures a derivative is beside the path.
+        if row.role.varied.is_none() {
+            self.digest.add_evaluation(&point, &told);
         }
         self.history.push(row);
     }
@@ -236,7 +240,8 @@ impl Search {
         summary.result(&self.specification, ending, version, best, Vec::new())
     }
 
-    fn is_grouped(&self) -> bool {
+    /// Whether the data are groups.
+    pub(crate) fn is_grouped(&self) -> bool {
         matches!(self.specification.data, Some(Data::Groups(_)))
     }
 

@@ -240,7 +240,8 @@ fn search_to_message(search: &Search) -> v1::Search {
 }
 
 fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations) -> Search {
-    let Some(message) = message else { return Search::default() };
+    let nothing = v1::Search::default();
+    let message = message.unwrap_or(&nothing);
     let method = setup::named(
         message.method.as_deref(),
         &SearchMethod::ALL.map(|method| (method.name(), method)),
@@ -255,7 +256,8 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
         initial_step: message.initial_step.unwrap_or(default.initial_step),
         starts: message.starts.unwrap_or(default.starts),
-        sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
+        // An older client knows none, and would take their evaluations for the search's.
+        sensitivities: message.sensitivities.unwrap_or(false),
         speculation: message.speculation.unwrap_or(default.speculation),
         priors: priors_from_message(&message.priors, violations),
     }

@@ -23,6 +23,8 @@ pub(super) struct Linear {
 pub(super) struct Response {
     /// Standard deviation.
     pub(super) deviation: f64,
+    /// By how much it moves with each of the two logarithms.
+    pub(super) transfer: [f64; 2],
     /// Share of its gradient in the null space.
     pub(super) free_share: f64,
 }
@@ -70,7 +72,7 @@ impl Linear {
             + 2.0 * transfer[0] * transfer[1] * covariance[0][1]
             + transfer[1] * transfer[1] * covariance[1][1];
         let known = inside > 0.0 && variance.is_finite();
-        known.then(|| Response { deviation: variance.max(0.0).sqrt(), free_share })
+        known.then(|| Response { deviation: variance.max(0.0).sqrt(), transfer, free_share })
     }
 }
 

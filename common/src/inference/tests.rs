@@ -170,6 +170,32 @@ fn noise_of_the_data_counts() {
     );
 }
 
+/// A search that was stopped a standard error before the end, in both moments: its intervals reach as
+/// far beyond the usual as the answer would have moved.
+#[test]
+fn what_the_search_has_left_lengthens_the_intervals() {
+    let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
+    let mut specification = specification(&free, None);
+    let full = found(&specification, [1e-3, 2e-2]);
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    specification.data = Some(Data::Moments {
+        mean: mean * libm::exp(1e-3),
+        coefficient_of_variation: coefficient_of_variation * libm::exp(-2e-2),
+    });
+    let stopped = found(&specification, [1e-3, 2e-2]);
+    for (full, stopped, left) in [
+        (full.bulk_velocity, stopped.bulk_velocity, 1e-3),
+        (full.dispersion, stopped.dispersion, 2e-2),
+    ] {
+        let half = |quantity: Quantity| {
+            let [lower, upper] = quantity.known.unwrap().interval;
+            libm::log(upper / lower) / 2.0
+        };
+        close(half(stopped) - half(full), left, 1e-3);
+        assert_eq!(full.known.unwrap().standard_error, stopped.known.unwrap().standard_error);
+    }
+}
+
 #[test]
 fn nothing_is_known_where_the_model_does_not_match() {
     let mut specification = specification(&Parameter::ALL, None);

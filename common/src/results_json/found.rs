@@ -105,10 +105,11 @@ pub(super) fn inference(
     let found = best.and_then(|best| inference::inference(specification, set, best, asked.history));
     put("sensitivities", found.as_ref().map_or(Value::Null, sensitivities));
     put("identified", found.as_ref().map_or(Value::Null, identified));
-    // Those of a likelihood would be another matter.
+    // Those of a likelihood, or with priors, would be another matter.
     if let (Some(best), Some(data), Objective::Moments) =
         (best, &specification.data, specification.objective)
         && let Some(velocity) = best.velocity
+        && !specification.has_priors()
     {
         let data = data.moments(set);
         let profiles = inference::profiles(specification, &best.point, velocity.moments, data);

@@ -286,7 +286,9 @@ pub(super) fn finish(
     let Some(job) = state.jobs.get_mut(&id) else {
         return;
     };
-    let (search, best) = (&job.search, job.search.best());
+    let search = &job.search;
+    // Of groups none is the job's.
+    let best = search.best().filter(|_| !search.is_grouped());
     let record = EndRecord::new(id, ending, now, search.evaluations(), best);
     let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));

@@ -195,8 +195,11 @@ fn a_replay_of_another_path_is_refused() {
 fn the_digest_follows_the_order_of_the_path() {
     let (search, told) = run(&specification(20));
     let mut digest = PathDigest::new();
-    for (point, outcomes) in &told {
-        digest.add_evaluation(point, outcomes);
+    // What measures derivatives is not on it.
+    for ((point, outcomes), row) in told.iter().zip(search.history()) {
+        if row.role.varied.is_none() {
+            digest.add_evaluation(point, outcomes);
+        }
     }
     assert_eq!(search.result(&ending(&search), "1").digest, digest.finish());
 }

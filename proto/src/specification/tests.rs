@@ -136,9 +136,22 @@ fn message() -> v1::JobSpecification {
         parameters: std::array::from_fn(free),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
-        search: Search::default(),
+        search: AS_BEFORE,
     })
 }
+
+/// What a message says that knows of no derivatives.
+const AS_BEFORE: Search = Search {
+    method: SearchMethod::Simplex,
+    max_evaluations: 400,
+    cost_tolerance: 1e-10,
+    size_tolerance: 1e-5,
+    initial_step: 0.15,
+    starts: 1,
+    sensitivities: false,
+    speculation: true,
+    priors: [None; 7],
+};
 
 #[test]
 fn absent_messages_take_the_defaults() {
@@ -168,7 +181,8 @@ fn the_default_tolerance_is_that_of_the_method() {
     let method = Some("newton".to_owned());
     message.search = Some(v1::Search { method, ..Default::default() });
     let specification = from_message(&message).unwrap();
-    assert_eq!(specification.search, Search::by(SearchMethod::Newton));
+    let expected = Search { sensitivities: false, ..Search::by(SearchMethod::Newton) };
+    assert_eq!(specification.search, expected);
     assert_eq!(specification.search.cost_tolerance, 1e-12);
 }
 
