@@ -248,21 +248,21 @@ mod tests {
 
     #[test]
     fn what_made_the_data_is_found_within_three_standard_errors() {
-        let twins = Twins { repetitions: 5, seed: 3, isa: Isa::fastest() };
+        let twins = Twins { repetitions: 3, seed: 3, isa: Isa::fastest() };
         let rows = RefCell::new(0);
         let table = table(&twins, &|_| *rows.borrow_mut() += 1).unwrap();
-        assert_eq!(*rows.borrow(), 5);
+        assert_eq!(*rows.borrow(), 3);
         for column in [4, 7] {
             let within = cells(&table, column).iter().filter(|errors| errors.abs() < 3.0).count();
-            assert!(within >= 4, "{table}");
+            assert!(within >= 2, "{table}");
         }
     }
 
     #[test]
     fn intervals_hold_the_truth_about_as_often_as_they_say() {
-        let twins = Twins { repetitions: 20, seed: 5, isa: Isa::fastest() };
+        let twins = Twins { repetitions: 12, seed: 5, isa: Isa::fastest() };
         let table = coverage(&twins, &|_| {}).unwrap();
-        assert!(cells(&table, 2).iter().all(|share| *share >= 80.0), "{table}");
+        assert!(cells(&table, 2).iter().all(|share| *share >= 75.0), "{table}");
         assert!(cells(&table, 3).iter().all(|sd| (0.5..1.6).contains(sd)), "{table}");
     }
 }
