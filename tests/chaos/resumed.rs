@@ -75,7 +75,8 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
 
     let points: Vec<Vec<f64>> = api.parts(&id).into_iter().flat_map(points).collect();
     // Two more measure derivatives.
-    assert_eq!(points.len(), EVALUATIONS as usize + 2);
+    let evaluations = EVALUATIONS + 2;
+    assert_eq!(points.len(), evaluations as usize);
     let computed = computed.lock().unwrap();
     for (life, work) in computed.iter().filter(|(life, _)| *life > 0) {
         let number = points.iter().position(|point| *point == work.point.0).unwrap();
@@ -83,7 +84,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
         assert!(number >= known, "seed {SEED}: {number} of {known} stored again in life {life}");
     }
     let total: u32 = computed.iter().map(|(_, work)| work.count).sum();
-    let once = REALIZATIONS * EVALUATIONS;
+    let once = REALIZATIONS * evaluations;
     println!("{KILLS} kills: {total} realizations for {once}");
     assert!(total >= once && total <= once + REALIZATIONS * KILLS as u32, "{total}");
 }
