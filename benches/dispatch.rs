@@ -235,5 +235,7 @@ fn identification(propagation: &JobSpecification) -> JobSpecification {
         *range = Range::Free { start: range.start(), lower, upper };
     }
     job.search.max_evaluations = EVALUATIONS;
+    // They would be beside the path that the digest is of.
+    job.search.sensitivities = false;
     job
 }
