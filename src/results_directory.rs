@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::document::Format;
+use osteon_common::inference::inference;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
@@ -169,9 +170,14 @@ impl ResultsDirectory {
             }
             if matches!(fetched.specification.data, Some(Data::Groups(_))) {
                 let Fetched { specification, result, history } = fetched;
-                let groups = results_csv::groups(specification, result, history);
+                let groups = result.groups.iter().enumerate();
+                let found = groups.map(|(set, group)| {
+                    inference(specification, set, group.best.as_ref()?, history)
+                });
+                let found: Vec<_> = found.collect();
+                let groups = results_csv::groups(specification, result, &found);
                 write(&self.path.join(GROUPS), &groups)?;
-                let comparison = results_csv::comparison(specification, result, history);
+                let comparison = results_csv::comparison(result, &found);
                 write(&self.path.join(COMPARISON), &comparison)?;
             }
             let outcomes = fetched.result.best.as_ref().map(|best| best.outcomes.as_slice());

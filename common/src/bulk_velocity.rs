@@ -50,12 +50,13 @@ pub fn bulk_velocity(point: &Point) -> Result<BulkVelocity, Inadmissible> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::ensemble::Germs;
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
-    const BOUNDS: [(f64, f64); 7] = [
+    pub(crate) const OPTIMUM: Point =
+        Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    pub(crate) const BOUNDS: [(f64, f64); 7] = [
         (1500.0, 2000.0),
         (12e9, 25e9),
         (0.2, 0.45),

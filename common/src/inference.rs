@@ -25,16 +25,18 @@ mod solutions;
 mod tests;
 
 use crate::bulk_velocity::bulk_velocity;
-use crate::job::{JobSpecification, Range};
-use crate::parameters::{Parameter, Point};
-use crate::results::{BestPoint, Evaluation, Moments};
+use crate::job::JobSpecification;
+use crate::parameters::Parameter;
+use crate::results::{BestPoint, Evaluation};
 
+use self::jacobian::log_ratios;
 use self::linear::{Linear, Response};
 
 pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
-pub use self::noise::{LEVEL, Noise, noise};
+pub use self::noise::{Noise, noise};
 pub use self::profile::{PROFILE_POINTS, Profile, profiles};
 pub use self::solutions::{Solution, Spread, Spreads, solutions, spread};
+pub use crate::data_statistics::CONFIDENCE;
 
 /// A direction of the box that the data fix.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +61,7 @@ pub struct Quantity {
 pub struct Known {
     /// Standard error.
     pub standard_error: f64,
-    /// Ends of its confidence interval of level [`LEVEL`].
+    /// Ends of its confidence interval of level [`CONFIDENCE`].
     pub interval: [f64; 2],
     /// Share of its gradient, in units of the box, that lies in directions which the data leave
     /// free: sine of the angle between it and those that they fix.
@@ -103,7 +105,7 @@ pub fn inference(
     let noise = noise(data, set, &estimate);
     let linear = Linear::of(&jacobian);
     let quantile = noise.quantile();
-    let residual = residual(data.moments(set), estimate.moments);
+    let residual = log_ratios(data.moments(set), estimate.moments);
     let matched = is_matched(residual, &noise);
     let context = Context {
         specification,
@@ -141,14 +143,6 @@ fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
     within(0) && within(1)
 }
 
-/// What the logarithms of the data's moments are above the model's.
-fn residual(data: Moments, model: Moments) -> [f64; 2] {
-    [
-        libm::log(data.mean / model.mean),
-        libm::log(data.coefficient_of_variation / model.coefficient_of_variation),
-    ]
-}
-
 struct Context<'a> {
     specification: &'a JobSpecification,
     best: &'a BestPoint,
@@ -165,7 +159,7 @@ impl Context<'_> {
     fn bulk_velocity(&self, free: &[Parameter]) -> Option<Quantity> {
         let bulk = bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
-            bulk.gradient[parameter as usize] * edge(self.specification.range(parameter))
+            bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
         };
         let gradient: Vec<f64> = free.iter().map(slope).collect();
         Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
@@ -174,7 +168,7 @@ impl Context<'_> {
     fn dispersion(&self, free: &[Parameter]) -> Quantity {
         let dispersion = self.best.point.dispersion();
         let slope = |&parameter: &Parameter| match parameter {
-            Parameter::Dispersion => edge(self.specification.range(parameter)) / dispersion,
+            Parameter::Dispersion => self.specification.range(parameter).edge() / dispersion,
             _ => 0.0,
         };
         let gradient: Vec<f64> = free.iter().map(slope).collect();
@@ -189,7 +183,7 @@ impl Context<'_> {
             let response = self.response(&gradient).filter(|_| self.linear.undetermined.is_empty());
             let known = response.map(|response| {
                 let Response { deviation, free_share, .. } = response;
-                let edge = edge(self.specification.range(parameter));
+                let edge = self.specification.range(parameter).edge();
                 let standard_error = deviation * edge;
                 let reach = self.reach(&response) * edge;
                 Known { standard_error, interval: [value - reach, value + reach], free_share }
@@ -228,23 +222,10 @@ impl Context<'_> {
     }
 }
 
-/// Edge of the box along a range; 0 where it is fixed.
-pub(crate) fn edge(range: Range) -> f64 {
-    match range {
-        Range::Fixed(_) => 0.0,
-        Range::Free { lower, upper, .. } => upper - lower,
-    }
-}
-
 /// Number of the first evaluation of a search from which on its lowest cost was below that of
 /// sampling noise alone: what it still gained is noise, another seed would lead elsewhere.
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
-    let estimate = best.velocity?;
-    let (moments, error) = (estimate.moments, estimate.standard_error);
-    let relative = [
-        error.mean / moments.mean,
-        error.coefficient_of_variation / moments.coefficient_of_variation,
-    ];
+    let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
     let searched = history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
@@ -254,12 +235,4 @@ pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -
 /// Whether an evaluation is for this set of data.
 fn is_of(row: &Evaluation, set: usize) -> bool {
     row.role.group as usize == set
-}
-
-/// A parameter of a point in units of the box.
-fn coordinate(point: &Point, parameter: Parameter, range: Range) -> f64 {
-    match range {
-        Range::Fixed(_) => 0.0,
-        Range::Free { lower, upper, .. } => (point.get(parameter) - lower) / (upper - lower),
-    }
 }

@@ -72,8 +72,7 @@ impl Data {
         if let Self::Moments { mean, coefficient_of_variation } = *self {
             return Moments { mean, coefficient_of_variation };
         }
-        let moments = self.velocities(set).and_then(statistics::moments);
-        moments.unwrap_or(Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN })
+        self.velocities(set).and_then(statistics::moments).unwrap_or(Moments::UNKNOWN)
     }
 }
 
@@ -94,6 +93,23 @@ pub enum Range {
 }
 
 impl Range {
+    /// Distance of the bounds, in the parameter's unit; 0 where it is fixed.
+    pub fn edge(&self) -> f64 {
+        match *self {
+            Self::Fixed(_) => 0.0,
+            Self::Free { lower, upper, .. } => upper - lower,
+        }
+    }
+
+    /// Where a value lies between the bounds, 0 at the lower and 1 at the upper; `None` where the
+    /// parameter is fixed.
+    pub fn coordinate(&self, value: f64) -> Option<f64> {
+        match *self {
+            Self::Fixed(_) => None,
+            Self::Free { lower, upper, .. } => Some((value - lower) / (upper - lower)),
+        }
+    }
+
     /// The fixed value, or the start.
     pub fn start(&self) -> f64 {
         match *self {
@@ -313,8 +329,8 @@ impl JobSpecification {
     pub fn penalty(&self, point: &Point) -> f64 {
         let of = |parameter: Parameter| {
             let prior = self.search.priors[parameter as usize]?;
-            let Range::Free { lower, upper, .. } = self.range(parameter) else { return None };
-            let off = (point.get(parameter) - prior.value) / (upper - lower);
+            let edge = self.range(parameter).edge();
+            let off = (point.get(parameter) - prior.value) / edge;
             Some(prior.weight * (off * off))
         };
         Parameter::ALL.into_iter().filter_map(of).sum()

@@ -44,6 +44,11 @@ pub struct Moments {
     pub coefficient_of_variation: f64,
 }
 
+impl Moments {
+    /// Of nothing.
+    pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
+}
+
 /// Moments of a Monte Carlo sample with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -53,6 +58,17 @@ pub struct Estimate {
     pub standard_error: Moments,
     /// Whether they are those that the control variate gives.
     pub controlled: bool,
+}
+
+impl Estimate {
+    /// Standard errors over the moments themselves: of the mean, of the coefficient of variation.
+    pub fn relative_errors(&self) -> [f64; 2] {
+        let (moments, error) = (self.moments, self.standard_error);
+        [
+            error.mean / moments.mean,
+            error.coefficient_of_variation / moments.coefficient_of_variation,
+        ]
+    }
 }
 
 /// Estimated relative errors, by discretisation, of the velocities of a set of realizations.

@@ -2,11 +2,11 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::inference::{Inference, Known, Quantity, inference};
+use crate::inference::{Inference, Known, Quantity};
 use crate::job::{Data, JobSpecification};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
-use crate::results::{Evaluation, GroupResult, JobResult};
+use crate::results::{Evaluation, JobResult};
 
 /// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
 /// number and its moments; with groups or several starts, also which of them it was for.
@@ -65,19 +65,18 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
 const COMPARED_MAX: usize = 200;
 
 /// The text of `groups.csv`: one row per group, with what is identified of it (m/s; dimensionless) and
-/// the ends of its confidence intervals, empty where they are unknown.
+/// the ends of its confidence intervals, empty where they are unknown; given what the data say of each.
 pub fn groups(
     specification: &JobSpecification,
     result: &JobResult,
-    history: &[Evaluation],
+    found: &[Option<Inference>],
 ) -> String {
     let quantities = ["bulk_velocity", "dispersion"];
     let columns = quantities.map(|name| format!("{name},{name}_lower,{name}_upper"));
     let parameters = Parameter::ALL.map(|parameter| format!("best_{}", parameter.name()));
     let columns = [columns.join(","), parameters.join(",")].join(",");
     let mut out = format!("group,velocities,status,cost,{columns}\n");
-    for (set, group) in result.groups.iter().enumerate() {
-        let found = found(specification, set, group, history);
+    for (set, (group, found)) in result.groups.iter().zip(found).enumerate() {
         let data = specification.data.as_ref();
         let count = data.and_then(|data| data.velocities(set)).map_or(0, <[f64]>::len);
         let cost = group.best.as_ref().and_then(|best| best.cost);
@@ -102,14 +101,10 @@ pub fn groups(
 
 /// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
 /// identified, the first less the second, and the ends of their confidence intervals, each of level
-/// [`crate::inference::LEVEL`] by itself; empty where they are unknown.
+/// [`crate::inference::CONFIDENCE`] by itself; empty where they are unknown.
 ///
 /// The noise of sampling, which all groups share, is counted in both: intervals are rather too wide.
-pub fn comparison(
-    specification: &JobSpecification,
-    result: &JobResult,
-    history: &[Evaluation],
-) -> String {
+pub fn comparison(result: &JobResult, found: &[Option<Inference>]) -> String {
     let mut out = "first,second".to_owned();
     for name in ["bulk_velocity", "dispersion"] {
         out.push_str(&format!(
@@ -117,21 +112,13 @@ pub fn comparison(
         ));
     }
     out.push('\n');
-    let groups = &result.groups;
-    let found: Vec<_> = groups
-        .iter()
-        .enumerate()
-        .map(|(set, group)| found(specification, set, group, history))
-        .collect();
-    for first in 0..groups.len() {
-        if first > 0 && groups.len() > COMPARED_MAX {
-            break;
-        }
-        for second in first + 1..groups.len() {
-            let mut fields = vec![field(&groups[first].name), field(&groups[second].name)];
-            let pairs = quantities_of(found[first].as_ref())
-                .into_iter()
-                .zip(quantities_of(found[second].as_ref()));
+    let groups: Vec<_> = result.groups.iter().zip(found).collect();
+    let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
+    for (first, (one, of_one)) in groups.iter().enumerate().take(firsts) {
+        for (other, of_other) in &groups[first + 1..] {
+            let mut fields = vec![field(&one.name), field(&other.name)];
+            let pairs =
+                quantities_of(of_one.as_ref()).into_iter().zip(quantities_of(of_other.as_ref()));
             for pair in pairs {
                 fields.extend(difference(pair).map(number));
             }
@@ -153,15 +140,6 @@ fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<
     let half = |known: Known| 0.5 * (known.interval[1] - known.interval[0]);
     let reach = libm::hypot(half(one), half(other));
     [Some(difference), Some(difference - reach), Some(difference + reach)]
-}
-
-fn found(
-    specification: &JobSpecification,
-    set: usize,
-    group: &GroupResult,
-    history: &[Evaluation],
-) -> Option<Inference> {
-    group.best.as_ref().and_then(|best| inference(specification, set, best, history))
 }
 
 fn quantities_of(found: Option<&Inference>) -> [Option<Quantity>; 2] {

@@ -92,6 +92,17 @@ pub struct Search {
     history: Vec<Evaluation>,
     /// Of the evaluation that a result needs the outcomes of.
     outcomes: Option<Arc<[Outcome]>>,
+    /// Of the point asked for, if it was looked at before it is told.
+    judged: Option<Judged>,
+}
+
+/// What the outcomes of a point say.
+#[derive(Debug, Clone)]
+struct Judged {
+    outcomes: Arc<[Outcome]>,
+    verdict: Verdict,
+    /// `None` for a propagation.
+    cost: Option<f64>,
 }
 
 impl Search {
@@ -104,7 +115,14 @@ impl Search {
             // An identification without data has not passed the check.
             (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
         };
-        Self { specification, plan, digest: PathDigest::new(), history: Vec::new(), outcomes: None }
+        Self {
+            specification,
+            plan,
+            digest: PathDigest::new(),
+            history: Vec::new(),
+            outcomes: None,
+            judged: None,
+        }
     }
 
     /// Takes the outcomes of a stored evaluation.
@@ -160,9 +178,12 @@ impl Search {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
-        let verdict = Verdict::of(&self.specification.monte_carlo, &point, &outcomes);
-        let told = Arc::clone(&outcomes);
-        let mut row = Evaluation { estimated_error, ..self.row(point, &verdict, &outcomes) };
+        let judged = match self.judged.take() {
+            Some(judged) if Arc::ptr_eq(&judged.outcomes, &outcomes) => judged,
+            _ => self.judge(&point, &outcomes),
+        };
+        let mut row = Evaluation { estimated_error, ..self.row(point, &judged) };
+        let Judged { verdict, outcomes: told, .. } = judged;
         match &mut self.plan {
             Plan::Identification(identification) => {
                 row = identification.tell(&self.specification, row, verdict, outcomes);
@@ -179,15 +200,27 @@ impl Search {
         self.history.push(row);
     }
 
-    /// What is known of the point asked for before its cost is.
-    fn row(&self, point: Point, verdict: &Verdict, outcomes: &[Outcome]) -> Evaluation {
+    /// What the outcomes of the point asked for say.
+    fn judge(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Judged {
+        let verdict = Verdict::of(&self.specification.monte_carlo, point, outcomes);
+        let cost = match &self.plan {
+            Plan::Identification(identification) => {
+                Some(identification.cost(&self.specification, &verdict, point, outcomes))
+            }
+            Plan::Propagation { .. } => None,
+        };
+        Judged { outcomes: Arc::clone(outcomes), verdict, cost }
+    }
+
+    /// What is known of the point asked for before its role is.
+    fn row(&self, point: Point, judged: &Judged) -> Evaluation {
         Evaluation {
             number: self.evaluations(),
             role: Role::default(),
             point,
-            moments: verdict.moments,
-            cost: None,
-            failures: FailureCounts::of(outcomes),
+            moments: judged.verdict.moments,
+            cost: judged.cost,
+            failures: FailureCounts::of(&judged.outcomes),
             estimated_error: None,
         }
     }
@@ -312,7 +345,7 @@ impl Summary {
             status: ending.status,
             reason: ending.reason.clone(),
             best,
-            data: data.map_or(NOWHERE, |data| data.moments(set)),
+            data: data.map_or(Moments::UNKNOWN, |data| data.moments(set)),
         });
         let searched = self.history.iter().filter(|row| row.role.varied.is_none());
         JobResult {
@@ -334,6 +367,3 @@ impl Summary {
         }
     }
 }
-
-/// Moments of no data.
-const NOWHERE: Moments = Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN };

@@ -69,24 +69,21 @@ impl SearchBox {
     /// Derivatives with respect to the coordinates, of derivatives with respect to
     /// [`Parameter::ALL`].
     pub fn per_edge(&self, gradient: &[f64; 7]) -> Vec<f64> {
-        let slopes = self.ranges.iter().zip(gradient).filter_map(|(range, slope)| match *range {
+        let of = |(range, slope): (&Range, &f64)| match range {
             Range::Fixed(_) => None,
-            Range::Free { lower, upper, .. } => Some(slope * (upper - lower)),
-        });
-        slopes.collect()
+            Range::Free { .. } => Some(slope * range.edge()),
+        };
+        self.ranges.iter().zip(gradient).filter_map(of).collect()
     }
 
     /// The free parameters that lie on a bound at `point`.
     pub fn on_bounds(&self, point: &Point) -> Vec<(Parameter, Side)> {
-        let side = |parameter: Parameter| match self.ranges[parameter as usize] {
-            Range::Fixed(_) => None,
-            Range::Free { lower, upper, .. } => {
-                let at = (point.get(parameter) - lower) / (upper - lower);
-                match at {
-                    _ if at < ON_BOUND => Some((parameter, Side::Lower)),
-                    _ if at > 1.0 - ON_BOUND => Some((parameter, Side::Upper)),
-                    _ => None,
-                }
+        let side = |parameter: Parameter| {
+            let at = self.ranges[parameter as usize].coordinate(point.get(parameter))?;
+            match at {
+                _ if at < ON_BOUND => Some((parameter, Side::Lower)),
+                _ if at > 1.0 - ON_BOUND => Some((parameter, Side::Upper)),
+                _ => None,
             }
         };
         Parameter::ALL.into_iter().filter_map(side).collect()
@@ -104,12 +101,7 @@ pub fn admissible(point: &Point) -> bool {
 }
 
 fn unit_start(range: &Range) -> Option<f64> {
-    match *range {
-        Range::Fixed(_) => None,
-        Range::Free { start, lower, upper } => {
-            Some(((start - lower) / (upper - lower)).clamp(0.0, 1.0))
-        }
-    }
+    range.coordinate(range.start()).map(|at| at.clamp(0.0, 1.0))
 }
 
 #[cfg(test)]

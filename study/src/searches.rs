@@ -1,7 +1,5 @@
 //! How many evaluations the methods of search need, and where they end.
 
-use std::sync::Arc;
-
 use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
@@ -11,11 +9,10 @@ use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
 use osteon_coordinator::newton;
-use osteon_coordinator::search::{Search as Driven, Step};
 
 use crate::Progress;
 use crate::draws::{Draws, OPTIMUM};
-use crate::identify::outcomes;
+use crate::identify::{Known, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
 
@@ -79,9 +76,8 @@ fn starts(seed: u64) -> Vec<(String, Point)> {
 fn data(draws: &Draws) -> Result<Moments, PointError> {
     let other = MonteCarlo { seed: draws.seed + 1, ..monte_carlo(draws) };
     let outcomes = outcomes(&OPTIMUM, &other, draws.isa)?;
-    let nothing = Moments { mean: f64::NAN, coefficient_of_variation: f64::NAN };
     let estimate = statistics::estimate(&other, &OPTIMUM, &outcomes);
-    Ok(estimate.map_or(nothing, |estimate| estimate.moments))
+    Ok(estimate.map_or(Moments::UNKNOWN, |estimate| estimate.moments))
 }
 
 fn monte_carlo(draws: &Draws) -> MonteCarlo {
@@ -132,21 +128,12 @@ fn found(
         objective: Objective::default(),
         search,
     };
-    let mut driven = Driven::new(Arc::new(specification.clone()));
-    let ending = loop {
-        match driven.ask() {
-            Step::Evaluate(point) => {
-                let outcomes = outcomes(&point, &specification.monte_carlo, draws.isa)?;
-                driven.tell(outcomes.into(), None);
-            }
-            Step::Done(ending) => break ending,
-        }
-    };
-    let costs = driven.history().iter().map(|row| row.cost.unwrap_or(f64::INFINITY));
+    let (result, history) = identify(&specification, &mut Known::new(), draws.isa)?;
+    let costs = history.iter().map(|row| row.cost.unwrap_or(f64::INFINITY));
     Ok(Found {
-        status: ending.status,
+        status: result.status,
         costs: costs.collect(),
-        best: driven.best().map(|row| row.point),
+        best: result.best.map(|best| best.point),
         specification,
     })
 }

@@ -1,6 +1,6 @@
 //! Derivatives of the logarithms of both moments, from differences on common germs.
 
-use super::{coordinate, edge, is_of};
+use super::is_of;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, Moments};
@@ -41,9 +41,9 @@ pub fn jacobian(
         }
         let varied = |row: &&Evaluation| is_of(row, set) && row.role.varied == Some(parameter);
         let row = history.iter().find(varied)?;
-        let step =
-            coordinate(&row.point, parameter, range) - coordinate(&best.point, parameter, range);
-        let column = logarithms(row.moments?, base).map(|change| change / step);
+        let at = |point: &Point| range.coordinate(point.get(parameter));
+        let step = at(&row.point)? - at(&best.point)?;
+        let column = log_ratios(row.moments?, base).map(|change| change / step);
         if !column.iter().all(|slope| slope.is_finite()) {
             return None;
         }
@@ -57,7 +57,7 @@ impl Jacobian {
     /// The derivatives for relative changes of the parameters.
     pub fn sensitivities(&self, at: &Point, specification: &JobSpecification) -> Vec<Sensitivity> {
         let of = |(&parameter, column): (&Parameter, &[f64; 2])| {
-            let relative = at.get(parameter) / edge(specification.range(parameter));
+            let relative = at.get(parameter) / specification.range(parameter).edge();
             let [mean, coefficient_of_variation] = column.map(|slope| slope * relative);
             Sensitivity { parameter, mean, coefficient_of_variation }
         };
@@ -66,7 +66,7 @@ impl Jacobian {
 }
 
 /// ln of both moments over others.
-fn logarithms(moments: Moments, base: Moments) -> [f64; 2] {
+pub(super) fn log_ratios(moments: Moments, base: Moments) -> [f64; 2] {
     [
         libm::log(moments.mean / base.mean),
         libm::log(moments.coefficient_of_variation / base.coefficient_of_variation),

@@ -1,12 +1,12 @@
 //! Errors of the logarithms of both moments, of the data's and of the model's.
 
+#[cfg(doc)]
+use crate::data_statistics::CONFIDENCE;
 use crate::job::Data;
 use crate::results::Estimate;
 use crate::statistics;
 
-/// Level of every confidence interval.
-pub const LEVEL: f64 = 0.95;
-/// Quantile of the standard normal law at (1 + [`LEVEL`]) / 2.
+/// Quantile of the standard normal law at (1 + [`CONFIDENCE`]) / 2.
 const NORMAL: f64 = 1.959_963_984_540_054;
 
 /// Covariances of (ln v, ln Δ).
@@ -21,16 +21,11 @@ pub struct Noise {
 
 /// The noise of set number `set` of the data, and of a model's estimate.
 pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
-    let (moments, error) = (model.moments, model.standard_error);
-    let relative = [
-        error.mean / moments.mean,
-        error.coefficient_of_variation / moments.coefficient_of_variation,
-    ];
     let velocities = data.velocities(set);
     let covariance = velocities.and_then(statistics::covariance_of_logarithms);
     Noise {
         data: covariance.zip(velocities.map(<[f64]>::len)),
-        model: relative.map(|error| error * error),
+        model: model.relative_errors().map(|error| error * error),
     }
 }
 
@@ -50,7 +45,7 @@ impl Noise {
     }
 }
 
-/// Quantile of Student's law at (1 + [`LEVEL`]) / 2 for a sample of `count`: the first terms of its
+/// Quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 for a sample of `count`: the first terms of its
 /// expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5), right to 1e-3 from six
 /// degrees of freedom on, too small below three.
 pub(super) fn quantile(count: usize) -> f64 {

@@ -2,21 +2,12 @@
 
 use super::noise::quantile;
 use super::*;
+use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
-use crate::job::{Data, JobKind, MonteCarlo, Objective, Search};
+use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
-use crate::results::{Estimate, Role};
-
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
-const BOUNDS: [(f64, f64); 7] = [
-    (1500.0, 2000.0),
-    (12e9, 25e9),
-    (0.2, 0.45),
-    (3e9, 6.5e9),
-    (8e9, 16e9),
-    (0.2, 0.5),
-    (0.02, 0.3),
-];
+use crate::parameters::Point;
+use crate::results::{Estimate, Moments, Role};
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
 fn model(point: &Point) -> Moments {
@@ -60,6 +51,21 @@ fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
     }
 }
 
+/// The optimum as the best point.
+fn best(cost: f64, standard_error: Moments) -> BestPoint {
+    BestPoint {
+        point: OPTIMUM,
+        cost: Some(cost),
+        velocity: Some(Estimate { moments: model(&OPTIMUM), standard_error, controlled: false }),
+        cost_error: None,
+        failure_bias: None,
+        kolmogorov: None,
+        failures: FailureCounts::default(),
+        estimated_error: None,
+        outcomes: Vec::new(),
+    }
+}
+
 /// What is found at the optimum, with relative standard errors of the model's moments.
 fn found(specification: &JobSpecification, errors: [f64; 2]) -> Inference {
     let moments = model(&OPTIMUM);
@@ -67,21 +73,11 @@ fn found(specification: &JobSpecification, errors: [f64; 2]) -> Inference {
         mean: errors[0] * moments.mean,
         coefficient_of_variation: errors[1] * moments.coefficient_of_variation,
     };
-    let best = BestPoint {
-        point: OPTIMUM,
-        cost: Some(0.0),
-        velocity: Some(Estimate { moments, standard_error, controlled: false }),
-        cost_error: None,
-        failure_bias: None,
-        kolmogorov: None,
-        failures: FailureCounts::default(),
-        estimated_error: None,
-        outcomes: Vec::new(),
-    };
+    let best = best(0.0, standard_error);
     let mut rows = vec![row(OPTIMUM, None)];
     for parameter in Parameter::ALL {
         let mut point = OPTIMUM;
-        point.0[parameter as usize] += 1e-5 * edge(specification.range(parameter));
+        point.0[parameter as usize] += 1e-5 * specification.range(parameter).edge();
         rows.push(row(point, Some(parameter)));
     }
     inference(specification, 0, &best, &rows).unwrap()
@@ -206,19 +202,8 @@ fn nothing_is_known_where_the_model_does_not_match() {
         point.0[parameter as usize] *= 1.0 + 1e-5;
         rows.push(row(point, Some(parameter)));
     }
-    let moments = model(&OPTIMUM);
     let standard_error = Moments { mean: 1.0, coefficient_of_variation: 1e-4 };
-    let best = BestPoint {
-        point: OPTIMUM,
-        cost: Some(0.6),
-        velocity: Some(Estimate { moments, standard_error, controlled: false }),
-        cost_error: None,
-        failure_bias: None,
-        kolmogorov: None,
-        failures: FailureCounts::default(),
-        estimated_error: None,
-        outcomes: Vec::new(),
-    };
+    let best = best(0.6, standard_error);
     let found = inference(&specification, 0, &best, &rows).unwrap();
     assert!(!found.matched && found.bulk_velocity.known.is_none());
     // Without one of the differences nothing is said at all.

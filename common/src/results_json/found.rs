@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::{failures, measured, moments};
 use crate::inference::{
-    self, Direction, Inference, LEVEL, Noise, Profile, Quantity, Sensitivity, Solution, Spread,
-    Spreads,
+    self, CONFIDENCE, Direction, Inference, Noise, Profile, Quantity, Sensitivity, Solution,
+    Spread, Spreads,
 };
 use crate::job::{JobSpecification, Objective, Prior, Search, SearchMethod};
 use crate::parameters::{Parameter, Point};
@@ -166,7 +166,7 @@ fn identified(found: &Inference) -> Value {
     });
     json!({
         "matched": found.matched,
-        "level": LEVEL,
+        "level": CONFIDENCE,
         "noise": noise(&found.noise),
         "bulk_velocity": quantity(&found.bulk_velocity),
         "dispersion": quantity(&found.dispersion),

@@ -75,7 +75,7 @@ pub(super) fn prepare(
     now: Duration,
     effects: &mut Effects,
 ) {
-    if let Some(job) = state.jobs.get(&id).filter(|job| speculates(job)) {
+    if let Some(job) = state.jobs.get_mut(&id).filter(|job| speculates(job)) {
         let likely = job.search.likely_after(outcomes, LIKELY_MAX);
         keep(state, id, likely, now, effects);
     }

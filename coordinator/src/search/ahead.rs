@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
-use osteon_common::statistics::Verdict;
 
 use super::{Plan, Search, Step};
 
@@ -20,17 +19,19 @@ impl Search {
     }
 
     /// The point that will be asked for once these outcomes of the present one are told, and those
-    /// that may be asked for after it, at most `most`, the likeliest first.
-    pub fn likely_after(&self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
+    /// that may be asked for after it, at most `most`, the likeliest first. What they say is kept until
+    /// they are told.
+    pub fn likely_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
         let (Plan::Identification(identification), Step::Evaluate(point)) =
             (&self.plan, self.ask())
         else {
             return Vec::new();
         };
-        let verdict = Verdict::of(&self.specification.monte_carlo, &point, outcomes);
-        let row = self.row(point, &verdict, outcomes);
+        let judged = self.judge(&point, outcomes);
+        let row = self.row(point, &judged);
         let mut told = identification.clone();
-        told.tell(&self.specification, row, verdict, Arc::clone(outcomes));
+        told.tell(&self.specification, row, judged.verdict, Arc::clone(outcomes));
+        self.judged = Some(judged);
         let Some(next) = told.point() else {
             return Vec::new();
         };

@@ -40,7 +40,19 @@ impl Identification {
         self.present.likely(most)
     }
 
-    /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
+    /// The cost of the point asked for, given the verdict on it.
+    pub(super) fn cost(
+        &self,
+        specification: &JobSpecification,
+        verdict: &Verdict,
+        point: &Point,
+        outcomes: &[Outcome],
+    ) -> f64 {
+        self.present.cost(specification, verdict, point, outcomes)
+    }
+
+    /// Takes the verdict on the point asked for, with its cost in the row, and its outcomes; the
+    /// completed row.
     pub(super) fn tell(
         &mut self,
         specification: &JobSpecification,

@@ -3,7 +3,6 @@
 use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
 
-use super::NOWHERE;
 use crate::ask::Ask;
 use crate::newton::{self, Newton};
 use crate::search_box::SearchBox;
@@ -21,17 +20,21 @@ pub(super) enum Method {
 }
 
 impl Method {
-    /// The method that the specification names, at the start of the box, for set number `set` of the
-    /// data.
-    pub(super) fn new(specification: &JobSpecification, set: usize, space: SearchBox) -> Self {
-        let data = specification.data.as_ref();
+    /// The method that the specification names, at the start of the box, for a set of data that has
+    /// these moments and, where they are known, these velocities.
+    pub(super) fn new(
+        specification: &JobSpecification,
+        data: Moments,
+        measured: Option<&[f64]>,
+        space: SearchBox,
+    ) -> Self {
         let search = specification.search;
         let Search { max_evaluations, cost_tolerance, size_tolerance, initial_step, .. } = search;
         match search.method {
             SearchMethod::Simplex => {
                 let settings = simplex::Settings {
                     max_evaluations,
-                    costs: costs(specification, data.and_then(|data| data.velocities(set))),
+                    costs: costs(specification, measured),
                     size_tolerance,
                     initial_step,
                 };
@@ -39,8 +42,7 @@ impl Method {
             }
             SearchMethod::Newton => {
                 let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
-                let target = data.map_or(NOWHERE, |data| data.moments(set));
-                Self::Newton(Box::new(Newton::new(space, target, settings)))
+                Self::Newton(Box::new(Newton::new(space, data, settings)))
             }
         }
     }

@@ -10,7 +10,7 @@ use osteon_common::results::{Evaluation, GroupEnding, Moments, Role};
 use osteon_common::statistics::{Verdict, likelihood_cost};
 
 use super::method::Method;
-use super::{NOWHERE, reasons};
+use super::reasons;
 use crate::ask::{Ask, Stop};
 use crate::search_box::{SearchBox, admissible};
 
@@ -50,7 +50,8 @@ struct Best {
 impl OneSet {
     /// The search for set number `set` of the data, at its beginning.
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
-        let data = specification.data.as_ref().map_or(NOWHERE, |data| data.moments(set));
+        let given = specification.data.as_ref();
+        let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
         let space = SearchBox::new(specification.parameters);
         let mut search = Self {
             // A job has at most a thousand.
@@ -58,7 +59,7 @@ impl OneSet {
             data,
             start: 0,
             space,
-            method: Method::new(specification, set, space),
+            method: Method::new(specification, data, measured(specification, set), space),
             evaluations: 0,
             first: None,
             best: None,
@@ -91,7 +92,26 @@ impl OneSet {
         self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
     }
 
-    /// Takes the verdict on the point asked for, with its outcomes; the completed row of it.
+    /// The cost of the point asked for, given the verdict on it.
+    pub(super) fn cost(
+        &self,
+        specification: &JobSpecification,
+        verdict: &Verdict,
+        point: &Point,
+        outcomes: &[Outcome],
+    ) -> f64 {
+        let measured = measured(specification, self.set as usize);
+        let cost = match (specification.objective, measured) {
+            (Objective::Likelihood, Some(measured)) => {
+                likelihood_cost(verdict, &specification.monte_carlo, point, outcomes, measured)
+            }
+            _ => verdict.cost(self.data),
+        };
+        cost + specification.penalty(point)
+    }
+
+    /// Takes the verdict on the point asked for, with its cost in the row, and its outcomes; the
+    /// completed row.
     pub(super) fn tell(
         &mut self,
         specification: &JobSpecification,
@@ -99,24 +119,13 @@ impl OneSet {
         verdict: Verdict,
         outcomes: Arc<[Outcome]>,
     ) -> Evaluation {
-        let measured = specification.data.as_ref();
-        let measured = measured.and_then(|data| data.velocities(self.set as usize));
-        let cost = match (specification.objective, measured) {
-            (Objective::Likelihood, Some(measured)) => {
-                let monte_carlo = &specification.monte_carlo;
-                likelihood_cost(&verdict, monte_carlo, &row.point, &outcomes, measured)
-            }
-            _ => verdict.cost(self.data),
-        };
-        let cost = cost + specification.penalty(&row.point);
-        row.cost = Some(cost);
         row.role = Role { group: self.set, start: self.start, varied: None };
         if let Some((varied, _)) = self.differences.pop() {
             let start = self.best().map_or(0, |best| best.role.start);
             row.role = Role { start, varied: Some(varied), ..row.role };
             row.moments = verdict.moments.filter(|_| self.fails_alike(&outcomes));
         } else {
-            self.method.tell(cost, verdict.moments);
+            self.method.tell(row.cost.unwrap_or(f64::INFINITY), verdict.moments);
             self.evaluations += 1;
             self.first.get_or_insert(row);
             self.keep_if_better(specification, row, outcomes);
@@ -188,7 +197,8 @@ impl OneSet {
         self.start += 1;
         if u64::from(self.start) < specification.search.starts {
             self.space = random_start(specification, self.start.into());
-            self.method = Method::new(specification, self.set as usize, self.space);
+            let measured = measured(specification, self.set as usize);
+            self.method = Method::new(specification, self.data, measured, self.space);
             return;
         }
         if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {
@@ -213,6 +223,11 @@ impl OneSet {
     }
 }
 
+/// The velocities of a set of data, where they are known.
+fn measured(specification: &JobSpecification, set: usize) -> Option<&[f64]> {
+    specification.data.as_ref().and_then(|data| data.velocities(set))
+}
+
 /// The box with its start at a random point, the same for every set of data.
 fn random_start(specification: &JobSpecification, start: u64) -> SearchBox {
     let space = SearchBox::new(specification.parameters);
@@ -231,7 +246,7 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
         let Range::Free { lower, upper, .. } = specification.range(parameter) else {
             return None;
         };
-        let step = DIFFERENCE * (upper - lower);
+        let step = DIFFERENCE * specification.range(parameter).edge();
         let value = best.get(parameter);
         let moved = |value: f64| {
             let mut point = *best;
@@ -239,8 +254,8 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
             (parameter, point)
         };
         let steps = [value + step, value - step].into_iter();
-        let within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
-        within.into_iter().find(|(_, point)| admissible(point))
+        let mut within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
+        within.find(|(_, point)| admissible(point))
     };
     Parameter::ALL.into_iter().rev().filter_map(beside).collect()
 }

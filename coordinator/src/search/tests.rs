@@ -337,6 +337,20 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
 }
 
 #[test]
+fn only_what_is_told_counts_whatever_was_looked_at_before() {
+    let specification = Arc::new(specification(60));
+    let (mut looked, mut plain) = (Search::new(specification.clone()), Search::new(specification));
+    while let Step::Evaluate(point) = plain.ask() {
+        let right = outcomes(&point);
+        let wrong: Arc<[Outcome]> = right.iter().map(|v| v.map(|v| 1.1 * v)).collect();
+        looked.likely_after(&wrong, 3);
+        looked.tell(right.clone(), ERRORS);
+        plain.tell(right, ERRORS);
+    }
+    assert_eq!(looked.summary(), plain.summary());
+}
+
+#[test]
 fn where_a_search_goes_is_known_before_it_is_told() {
     for specification in [specification(60), by_newton(60)] {
         let mut search = Search::new(Arc::new(specification));

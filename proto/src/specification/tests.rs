@@ -136,22 +136,10 @@ fn message() -> v1::JobSpecification {
         parameters: std::array::from_fn(free),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
-        search: AS_BEFORE,
+        // An absent message knows of no derivatives.
+        search: Search { sensitivities: false, ..Search::default() },
     })
 }
-
-/// What a message says that knows of no derivatives.
-const AS_BEFORE: Search = Search {
-    method: SearchMethod::Simplex,
-    max_evaluations: 400,
-    cost_tolerance: 1e-10,
-    size_tolerance: 1e-5,
-    initial_step: 0.15,
-    starts: 1,
-    sensitivities: false,
-    speculation: true,
-    priors: [None; 7],
-};
 
 #[test]
 fn absent_messages_take_the_defaults() {
