@@ -39,7 +39,7 @@ use crate::ask::{Ask, Stop};
 use crate::search_box::SearchBox;
 
 use self::model::{Logarithms, Model, subtract};
-use self::nearest::dot;
+use self::nearest::norm;
 
 pub use self::nearest::{Rows, nearest};
 
@@ -107,6 +107,8 @@ pub struct Newton {
     target: Logarithms,
     /// From where the nearest point is looked for: the start, later where it nearly is.
     centre: Vec<f64>,
+    /// Whether it nearly is there.
+    near: bool,
     model: Model,
     /// The lowest cost of all steps, once one was feasible.
     base: Option<Evaluated>,
@@ -138,6 +140,7 @@ impl Newton {
             base: None,
             pending: start.clone(),
             centre: start,
+            near: false,
             purpose: Purpose::Step,
             whole: false,
             radius: RADIUS_MAX,
@@ -240,6 +243,7 @@ impl Newton {
             self.model.settle_on(&trial.at, trial.found);
             if self.whole && trial.cost < NEAR {
                 self.centre.clone_from(&trial.at);
+                self.near = true;
             }
             self.base = Some(trial);
             self.radius = (2.0 * self.radius).min(RADIUS_MAX);
@@ -262,7 +266,7 @@ impl Newton {
                 return;
             }
             let anchor = self.anchor();
-            let mut step = subtract(&self.model.nearest(&self.centre, self.target), anchor);
+            let mut step = subtract(&self.believed_answer(), anchor);
             let length = norm(&step);
             if length > self.radius {
                 step.iter_mut().for_each(|d| *d *= self.radius / length);
@@ -275,6 +279,15 @@ impl Newton {
                 return;
             }
             stalled = true;
+        }
+    }
+
+    /// Where the search would go if steps could be as long as they like.
+    fn believed_answer(&self) -> Vec<f64> {
+        if self.near {
+            self.model.nearest_from_here(&self.centre, self.target)
+        } else {
+            self.model.nearest(&self.centre, self.target)
         }
     }
 
@@ -351,8 +364,4 @@ impl Newton {
 
 fn logarithms(moments: Moments) -> Logarithms {
     [moments.mean, moments.coefficient_of_variation].map(libm::log)
-}
-
-fn norm(step: &[f64]) -> f64 {
-    dot(step, step).sqrt()
 }

@@ -12,6 +12,7 @@ use osteon_common::realization::Ensemble;
 use osteon_common::sampling::{Sampling, pair_count};
 use osteon_common::violations::Violations;
 use osteon_solver::{Isa, Solver, Workspace};
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 /// Setups with more pairs are left out: they are as right, and take too long here.
@@ -184,10 +185,9 @@ fn traces_next_to_the_source_end() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+properties! {
+    #![cases(100)]
 
-    #[test]
     fn a_velocity_or_a_typed_failure(setup in setup(), bone in bone()) {
         prop_assume!(is_admissible(&setup));
         let Some(bone) = bone.or_else(|| matched(&setup)) else {
