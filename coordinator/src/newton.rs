@@ -8,10 +8,13 @@
 //! Looked for is, of the points whose moments are the data's, the one nearest to the start in units
 //! of the box. What is believed of the moments (`model.rs`) is the closed form ln √(c1111/ρ), ln δ
 //! with a correction that every evaluation improves; the next point is the believed answer
-//! (`nearest.rs`). It is looked for from the start and not from where the search is, so that steps
-//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there: what is left to
-//! do is then so little that it does not matter, and corrections that also slid along the points
-//! that match would be longer than what they correct. The start itself is evaluated first.
+//! (`nearest.rs`): the nearest one that a fixed number of descents over the whole box find, since the
+//! points that match are curved and one descent may end at a point that is nearer only than those
+//! around it. It is looked for from the start and not from where the search is, so that steps
+//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there, and by one
+//! descent: what is left to do is then so little that it does not matter, and corrections that also
+//! slid along the points that match would be longer than what they correct. The start itself is
+//! evaluated first.
 //!
 //! # Safeguards
 //!

@@ -70,11 +70,7 @@ macro_rules! properties {
 #[macro_export]
 macro_rules! here {
     () => {
-        $crate::Place {
-            package: env!("CARGO_PKG_NAME"),
-            module: module_path!(),
-            source: file!(),
-        }
+        $crate::Place { package: env!("CARGO_PKG_NAME"), module: module_path!(), source: file!() }
     };
 }
 
@@ -168,7 +164,10 @@ impl FailurePersistence for Kept {
     ) {
         let file = Path::new(source.unwrap_or_default()).with_extension(KEPT);
         let line = format!("{seed} # shrinks to {shrunken:?}").replace(['\n', '\r'], " ");
-        eprintln!("To try this case before all others, add this line to {}:\n{line}", file.display());
+        eprintln!(
+            "To try this case before all others, add this line to {}:\n{line}",
+            file.display()
+        );
     }
 
     fn box_clone(&self) -> Box<dyn FailurePersistence> {

@@ -11,8 +11,8 @@ use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::realization::Ensemble;
 use osteon_common::sampling::{Sampling, pair_count};
 use osteon_common::violations::Violations;
-use osteon_solver::{Isa, Solver, Workspace};
 use osteon_fuzz::properties;
+use osteon_solver::{Isa, Solver, Workspace};
 use proptest::prelude::*;
 
 /// Setups with more pairs are left out: they are as right, and take too long here.

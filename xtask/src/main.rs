@@ -77,11 +77,7 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(chaos::storm),
     ),
     ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
-    (
-        "docs",
-        "the documentation of all crates",
-        Action::Cargo(&[DOCS]),
-    ),
+    ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
 ];
 
 fn main() -> ExitCode {

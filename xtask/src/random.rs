@@ -78,7 +78,8 @@ mod tests {
 
     #[test]
     fn minutes_and_seed_are_taken() {
-        let request = |minutes: u64, seed| Request { duration: Duration::from_secs(60 * minutes), seed };
+        let request =
+            |minutes: u64, seed| Request { duration: Duration::from_secs(60 * minutes), seed };
         assert_eq!(request_of("").unwrap(), request(MINUTES, None));
         assert_eq!(request_of("--seed 7 --minutes 3").unwrap(), request(3, Some(7)));
         for wrong in ["--seed", "--seed x", "--hours 1", "5"] {

@@ -30,6 +30,8 @@ const DESCENTS: u64 = 32;
 const DESCENTS_SEED: u64 = 1;
 /// Most linearisations of each of them. With 300 they found no more.
 const DESCENT_LINEARISATIONS_MAX: usize = 60;
+/// A descent that comes this near to an end, in edges of the box, goes there too.
+const SAME_END: f64 = 1e-3;
 /// The end of another descent is taken when it is nearer to the start by this, in edges of the box.
 const NEARER_MIN: f64 = 1e-6;
 /// Steps that turn back, and are longer than this share of the one before, are too long.
@@ -64,6 +66,17 @@ enum Goal {
     Logarithms,
     /// The cost itself, where there is no zero.
     Cost,
+}
+
+/// What a descent is for, and how far it goes.
+#[derive(Debug, Clone, Copy)]
+struct Descent<'a> {
+    goal: Goal,
+    start: &'a [f64],
+    target: Logarithms,
+    linearisations_max: usize,
+    /// It stops beside this end of another descent.
+    other: Option<&'a [f64]>,
 }
 
 impl Model {
@@ -129,7 +142,14 @@ impl Model {
         for index in 0..DESCENTS {
             let way = subtract(Germs::draw(DESCENTS_SEED, index).values(), start);
             let mut at = self.admissible_step(start, &way, 1.0);
-            self.approach(&mut at, Goal::Logarithms, start, target, DESCENT_LINEARISATIONS_MAX);
+            let descent = Descent {
+                goal: Goal::Logarithms,
+                start,
+                target,
+                linearisations_max: DESCENT_LINEARISATIONS_MAX,
+                other: Some(&nearest),
+            };
+            self.approach(&mut at, &descent);
             let found = norm(&subtract(&at, start));
             if found < distance - NEARER_MIN && self.solves(&at, target) {
                 (nearest, distance) = (at, found);
@@ -149,7 +169,9 @@ impl Model {
     pub(super) fn nearest_from_here(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
         let mut at = self.at.clone();
         for goal in [Goal::Logarithms, Goal::Cost] {
-            self.approach(&mut at, goal, start, target, LINEARISATIONS_MAX);
+            let linearisations_max = LINEARISATIONS_MAX;
+            let descent = Descent { goal, start, target, linearisations_max, other: None };
+            self.approach(&mut at, &descent);
             if self.solves(&at, target) {
                 break;
             }
@@ -163,18 +185,15 @@ impl Model {
         missed.is_some_and(|missed| missed.iter().all(|d| d.abs() < SOLVED))
     }
 
-    /// Linearises until that comes to rest, `most` times at most.
-    fn approach(
-        &self,
-        at: &mut Vec<f64>,
-        goal: Goal,
-        start: &[f64],
-        target: Logarithms,
-        most: usize,
-    ) {
+    /// Linearises until that comes to rest.
+    fn approach(&self, at: &mut Vec<f64>, descent: &Descent<'_>) {
+        let Descent { goal, start, target, linearisations_max, other } = *descent;
         let mut share = 1.0;
         let mut before: Vec<f64> = Vec::new();
-        for _ in 0..most {
+        for _ in 0..linearisations_max {
+            if other.is_some_and(|other| norm(&subtract(at, other)) < SAME_END) {
+                return;
+            }
             let Some((rows, right)) = self.linear(goal, at, target) else { return };
             let wanted = subtract(&nearest(start, &rows, right), at);
             if dot(&wanted, &before) < -TURNED_BACK * dot(&before, &before) && share > SHARE_MIN {
