@@ -1,5 +1,6 @@
 use osteon_common::case::Setup;
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -116,8 +117,7 @@ prop_compose! {
     }
 }
 
-proptest! {
-    #[test]
+properties! {
     fn specifications_survive_the_wire(specification in specification()) {
         let message = to_message(&specification);
         prop_assert_eq!(from_message(&message), Ok(specification));
