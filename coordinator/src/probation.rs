@@ -41,11 +41,6 @@ impl Probation {
         !self.0.is_empty() && self.0.contains_key(name)
     }
 
-    /// Whether nobody is.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Whether nothing is to be tried with a worker yet.
     pub(crate) fn rests(&self, name: &WorkerName, now: Duration) -> bool {
         self.0.get(name).is_some_and(|trial| now < trial.rests_until)
@@ -136,7 +131,7 @@ mod tests {
         // One that answers says nothing of the other.
         assert!(probation.end(&same) && probation.has(&bad));
         probation.forget(s(600));
-        assert!(probation.is_empty());
+        assert!(probation.0.is_empty());
     }
 
     #[test]

@@ -29,8 +29,9 @@ mod liars;
 pub(crate) use counts::Counts;
 
 const TICK: Duration = Duration::from_millis(100);
-/// No schedule takes longer than this, in its own time.
-const HOUR: Duration = Duration::from_secs(3600);
+/// No schedule takes longer than this, in its own time: the longest outage of the store, and a few
+/// minutes. It is less than the time after which a worker that does not answer has lost its lease.
+const LONGEST: Duration = Duration::from_secs(300);
 /// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
 const LOST_ALONE_MAX: u32 = 2;
 
@@ -49,6 +50,8 @@ enum Happening {
     GiveUp(WorkerId),
     /// A worker attaches that dies over whatever it gets.
     ArriveBad,
+    /// A process attaches that gives signs of life, and never answers one in so many batches.
+    ArriveSilent(u32, u64),
     /// A worker's message arrives.
     Message(WorkerId, Event),
     /// A worker answers a batch that is settled again, and differently.
@@ -92,6 +95,8 @@ struct Worker {
     stalled: bool,
     /// It dies over whatever it gets.
     bad: bool,
+    /// It never answers one in so many of its batches; 0: it answers all.
+    swallows: u64,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
 }
@@ -143,11 +148,12 @@ impl World {
             let Some(((at, _), happening)) = world.agenda.pop_first() else {
                 panic!("nothing will ever happen again");
             };
-            assert!(at < HOUR, "still not done: {:?}", world.state);
+            assert!(at < LONGEST, "still not done: {:?}", world.state);
             world.now = at;
             world.happen(happening);
         }
         world.check_results();
+        world.counts.longest = world.now;
         world.counts
     }
 
@@ -259,6 +265,7 @@ impl World {
             Happening::Submit(client) => self.submit(client),
             Happening::Arrive => self.arrive(),
             Happening::ArriveBad => self.arrive_bad(),
+            Happening::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
             Happening::Return(process) => self.attach(process),
             Happening::Pause => self.pause(),
             Happening::GiveUp(worker) => self.give_up(worker),
@@ -394,7 +401,12 @@ impl World {
 
     /// Another worker comes in the place of one that is gone.
     fn replace(&mut self, gone: &Worker) {
-        let other = if gone.bad { Happening::ArriveBad } else { Happening::Arrive };
+        let other = match gone.swallows {
+            0 if gone.bad => Happening::ArriveBad,
+            0 => Happening::Arrive,
+            // It comes back, or another process of its host.
+            swallows => Happening::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
+        };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
@@ -514,6 +526,9 @@ impl World {
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
         if bad {
             self.within(50, Happening::Break(worker));
+            return;
+        }
+        if self.swallows(worker, batch) {
             return;
         }
         let right = self.answer(worker, batch, &work);
