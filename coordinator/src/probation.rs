@@ -46,9 +46,13 @@ impl Probation {
         self.0.get(name).is_some_and(|trial| now < trial.rests_until)
     }
 
-    /// A worker has not answered once more; whether its probation begins with that.
-    pub(crate) fn miss(&mut self, name: &WorkerName, now: Duration) -> bool {
+    /// A worker has not answered what it was sent at `sent`; whether its probation begins with that.
+    /// What it had been sent before it gave the last reason is no further reason.
+    pub(crate) fn miss(&mut self, name: &WorkerName, sent: Duration, now: Duration) -> bool {
         let begins = !self.has(name);
+        if self.0.get(name).is_some_and(|trial| sent < trial.last) {
+            return false;
+        }
         if begins && self.0.len() >= WORKERS_MAX {
             self.0.pop_first();
         }
@@ -104,16 +108,17 @@ mod tests {
         let name = WorkerName::new("a", 1, 1);
         let mut probation = Probation::default();
         for (missed, rest) in [3, 6, 12, 24, 48, 60, 60].into_iter().enumerate() {
-            assert_eq!(probation.miss(&name, s(0)), missed == 0);
+            assert_eq!(probation.miss(&name, s(0), s(0)), missed == 0);
             assert!(probation.rests(&name, s(rest) - Duration::from_nanos(1)), "{rest}");
             assert!(!probation.rests(&name, s(rest)), "{rest}");
         }
         for _ in 0..100 {
-            probation.miss(&name, s(0));
+            probation.miss(&name, s(0), s(0));
         }
         assert!(!probation.rests(&name, s(60)));
         assert!(probation.end(&name) && !probation.end(&name));
-        assert!(probation.miss(&name, s(0)) && !probation.rests(&name, s(3)));
+        assert!(probation.miss(&name, s(0), s(2)) && !probation.rests(&name, s(5)));
+        assert!(!probation.miss(&name, s(1), s(2)) && !probation.rests(&name, s(5)));
     }
 
     #[test]
@@ -121,7 +126,7 @@ mod tests {
         let mut probation = Probation::default();
         let [bad, same, other] = [("b", 7, 7), ("b", 1, 2), ("a", 9, 9)]
             .map(|(host, process, instance)| WorkerName::new(host, process, instance));
-        probation.miss(&bad, s(0));
+        probation.miss(&bad, s(0), s(0));
         probation.attach(&same, s(1));
         probation.attach(&other, s(1));
         assert_eq!([&bad, &same, &other].map(|name| probation.has(name)), [true, true, false]);
@@ -138,7 +143,7 @@ mod tests {
     fn not_more_are_remembered_than_there_may_be() {
         let mut probation = Probation::default();
         for process in 0..WORKERS_MAX as u32 + 10 {
-            probation.miss(&WorkerName::new("a", process, 1), s(0));
+            probation.miss(&WorkerName::new("a", process, 1), s(0), s(0));
         }
         probation.attach(&WorkerName::new("a", 0, 0), s(0));
         assert_eq!(probation.0.len(), WORKERS_MAX);

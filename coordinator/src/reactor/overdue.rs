@@ -104,7 +104,7 @@ fn accuse(state: &mut State, id: BatchId, now: Duration) {
         state.workers.get(&batch.worker).filter(|worker| long && state.is_sound(worker))
     {
         let name = worker.name.clone();
-        begin_probation(state, &name, now);
+        begin_probation(state, &name, now, now);
     }
 }
 
@@ -295,7 +295,7 @@ pub(super) fn missed(state: &mut State, id: BatchId, now: Duration) {
     if waited < (state.config.batch_target / 2).max(expected * OVERDUE_FACTOR) {
         return;
     }
-    let begun = batch.begun;
+    let (sent, begun) = (batch.sent, batch.begun);
     let Some(worker) = state.workers.get_mut(&batch.worker) else {
         return;
     };
@@ -307,13 +307,14 @@ pub(super) fn missed(state: &mut State, id: BatchId, now: Duration) {
     let many = missed.count >= MISSED_MAX && now.saturating_sub(missed.since) >= OVERDUE_MIN;
     let name = worker.name.clone();
     if many || state.probation.has(&name) {
-        begin_probation(state, &name, now);
+        begin_probation(state, &name, sent, now);
     }
 }
 
-/// Puts a worker on probation that does not answer, or notes one more reason for it.
-pub(super) fn begin_probation(state: &mut State, name: &WorkerName, now: Duration) {
-    if state.probation.miss(name, now) {
+/// Puts a worker on probation that does not answer what it was sent at `sent`, or notes one more
+/// reason for it.
+pub(super) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
+    if state.probation.miss(name, sent, now) {
         tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
             holds; until it does it gets one realization at a time");
     }

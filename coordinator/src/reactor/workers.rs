@@ -95,7 +95,7 @@ pub(super) fn close(
     if matches!(reason, CloseReason::Unanswering { .. })
         && let Some(name) = state.workers.get(&worker).map(|worker| worker.name.clone())
     {
-        overdue::begin_probation(state, &name, now);
+        overdue::begin_probation(state, &name, now, now);
     }
     effects.push(Effect::Close { worker, reason });
     lost(state, worker, cause, now);
