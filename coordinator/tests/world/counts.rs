@@ -47,7 +47,7 @@ pub(crate) struct Counts {
     pub(crate) bad_deaths: u64,
     /// Batches that a worker with signs of life never answered.
     pub(crate) swallowed: u64,
-    /// How long a schedule took, in its own time.
+    /// How long a schedule without a bad node took, in its own time.
     pub(crate) longest: Duration,
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use osteon_coordinator::event::{Event, Hello};
 use osteon_coordinator::ids::{BatchId, WorkerId};
 
-use super::{Happening, Worker, World};
+use super::{HOUR, Happening, Worker, World};
 use crate::fake;
 
 /// Numbers of processes of the bad node are above this one.
@@ -18,6 +18,7 @@ impl World {
     pub(super) fn plan_faults(&mut self) {
         if self.draw(4) == 0 {
             self.within(500, Happening::ArriveBad);
+            self.most = HOUR;
         }
         if self.draw(3) == 0 {
             // Half of them never answer anything.
