@@ -132,7 +132,11 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::Computing(evaluation) if !evaluation.disputes.is_empty() => {
             let begun = evaluation.disputes.iter().map(|dispute| dispute.since).min();
             let what = "a third worker, which decides between two whose answers differ";
-            format!("{what} {}", since(begun.unwrap_or(now)))
+            let judges = evaluation.disputes.iter().flat_map(|dispute| &dispute.judges);
+            let asked =
+                judges.filter_map(|judge| state.batches.get(judge)?.worker_in(state)).next();
+            let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
+            format!("{what} {}{asked}", since(begun.unwrap_or(now)))
         }
         Stage::Computing(_) if now.saturating_sub(job.progressed) >= PATIENCE => {
             oldest_answer(state, job, since)
@@ -158,9 +162,10 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
             "; it is overdue, and no other worker has taken it over".to_owned()
         }
         0 => String::new(),
-        _ => format!("; {others} other workers compute the same"),
+        1 => "; another worker computes the same".to_owned(),
+        _ => format!("; {others} others compute the same"),
     };
-    let (name, count) = (&state.workers.get(&batch.worker)?.name, batch.assignment.indices.count);
+    let (name, count) = (&batch.worker_in(state)?.name, batch.assignment.indices.count);
     Some(format!("the answer of {name} to {count} realizations {}{instead}", since(batch.sent)))
 }
 

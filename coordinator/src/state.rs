@@ -510,6 +510,11 @@ impl Job {
 }
 
 impl Batch {
+    /// The worker that holds it.
+    pub(crate) fn worker_in<'a>(&self, state: &'a State) -> Option<&'a Worker> {
+        state.workers.get(&self.worker)
+    }
+
     /// Whether an idle worker may have a copy of it before it is overdue.
     pub(crate) fn is_copyable(&self) -> bool {
         self.purpose == Purpose::Fill && self.twins.is_empty() && !self.exclusive && !self.ahead

@@ -121,10 +121,8 @@ fn what_a_worker_never_answers_is_computed_by_another() {
         seen.waiting_for.contains("the answer of peer (process ")
             && seen.waiting_for.ends_with(said)
     };
-    // Both hold what there is, or copies of it: nobody is there to take it over.
-    story.api.until("the job says whom it waits for", &story.job, |seen| {
-        says(seen) || seen.waiting_for.contains("other workers compute the same")
-    });
+    // Both have as much as a worker may hold: nobody is there to take it over.
+    story.api.until("the job says whom it waits for", &story.job, says);
     let before = batches.load(Ordering::Relaxed);
     assert!(before > 0, "they hold nothing");
     let _honest = story.service.worker(&story.scratch);

@@ -5,8 +5,10 @@
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
-//! or more than the quarter. A worker that has nothing to do gets a copy of a batch that is late,
-//! then what may be done ahead (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to be computed alone is not refilled.
+//! or more than the quarter. What is overdue goes to another worker before anything else (`overdue.rs`).
+//! A worker that has nothing to do gets a copy of a batch that is late, then what may be done ahead
+//! (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to
+//! be computed alone is not refilled. A worker on probation gets one realization at a time.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;

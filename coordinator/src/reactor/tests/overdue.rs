@@ -68,6 +68,9 @@ fn a_first_answer_that_is_overdue_twice_is_computed_by_a_third_worker() {
     rig.event(on_its_own(4));
     assert_eq!(rig.live(2 * OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 4: batch 4 = 0+1"]);
+    let waits = "the answer of host 1 (process 1) to 1 realizations (since 9 s); 3 others compute the \
+                 same";
+    assert_eq!(rig.waits_for(), waits);
     let expected =
         ["revoke 1: batch 1", "revoke 2: batch 2", "revoke 3: batch 3", "store job 1 evaluation 0"];
     rig.check(answer(4, 4, 0, 1), &expected);
@@ -101,6 +104,9 @@ fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     // Workers 1 and 2 are idle, and have said what they have to say.
     assert_eq!(rig.live(OVERDUE), [""; 0]);
+    let waits = "a third worker, which decides between two whose answers differ (since 3 s); host 3 \
+                 (process 3) is asked";
+    assert_eq!(rig.waits_for(), waits);
     rig.check(on_its_own(4), &["welcome 4, lease 4", "send 4: batch 4 = 0+1"]);
     assert_eq!(rig.batch(4).purpose, Purpose::Judge);
     let effects = rig.event(answer(4, 4, 0, 1));
