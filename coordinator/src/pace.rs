@@ -20,6 +20,11 @@ impl Pace {
         self.0 = Some(self.0.map_or(one, |known| one.max(KEPT * known)));
     }
 
+    /// Whether anybody has answered anything.
+    pub(crate) fn is_known(self) -> bool {
+        self.0.is_some()
+    }
+
     /// Time that `count` realizations should take a worker of `threads` threads; `None` while
     /// nobody has answered anything.
     pub(crate) fn expected(self, count: u64, threads: u32) -> Option<Duration> {
@@ -39,7 +44,7 @@ mod tests {
     #[test]
     fn slow_answers_count_at_once_and_fast_ones_by_and_by() {
         let mut pace = Pace::default();
-        assert_eq!(pace.expected(8, 2), None);
+        assert_eq!((pace.expected(8, 2), pace.is_known()), (None, false));
         let expected =
             |pace: Pace, count, threads| pace.expected(count, threads).unwrap().as_secs_f64();
         // 8 on 2 threads in 2 s: 0.5 s each.

@@ -158,10 +158,12 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
     let (id, batch) = of_job.min_by_key(|(_, batch)| batch.sent)?;
     let others = batch.twins.len();
     let instead = match others {
-        0 if state.overdue.contains(id) => {
+        0 if !state.overdue.contains(id) => String::new(),
+        0 if job.pace.is_known() => {
             "; it is overdue, and no other worker has taken it over".to_owned()
         }
-        0 => String::new(),
+        // It may take so long.
+        0 => "; nothing of this job is answered yet".to_owned(),
         1 => "; another worker computes the same".to_owned(),
         _ => format!("; {others} others compute the same"),
     };

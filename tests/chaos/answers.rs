@@ -116,10 +116,9 @@ fn what_a_worker_never_answers_is_computed_by_another() {
         let (url, batches) = (url.clone(), Arc::clone(&batches));
         on_thread(move || silent(url, hello(process), batches))
     });
-    let said = "it is overdue, and no other worker has taken it over";
     let says = |seen: &osteon_proto::v1::JobSnapshot| {
         seen.waiting_for.contains("the answer of peer (process ")
-            && seen.waiting_for.ends_with(said)
+            && seen.waiting_for.ends_with("; nothing of this job is answered yet")
     };
     // Both have as much as a worker may hold: nobody is there to take it over.
     story.api.until("the job says whom it waits for", &story.job, says);
