@@ -119,10 +119,10 @@ impl Solved {
         let ranges = &specification.parameters;
         let count = count.map_or(f64::INFINITY, |count| count as f64);
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
-        // The mean of a convex law lies below the velocity of the mean model.
-        let largest = self.variation.1.max(variation);
+        // A velocity goes with the root of a stiffness, so its mean lies below that of the mean model.
+        let most = self.variation.1;
         let error = ERRORS * variation / count.sqrt();
-        let margins = (MEAN_MARGIN + error + 0.5 * largest * largest, MEAN_MARGIN + error);
+        let margins = (MEAN_MARGIN + error + 0.5 * most * most, MEAN_MARGIN + error);
         let mut missed = Vec::new();
         let velocities = self.velocities();
         if let Some((point, slowest)) = &self.slowest

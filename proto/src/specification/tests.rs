@@ -249,13 +249,16 @@ fn refusal(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     violations.iter().map(ToString::to_string).collect()
 }
 
-/// The data, and the range of e_L, of a message.
+/// Gives other data.
 fn moments(message: &mut v1::JobSpecification, mean: f64, variation: f64) {
-    let moments = (Some(mean), Some(variation));
-    let (mean, coefficient_of_variation) = moments;
-    message.data = Some(v1::Data { mean, coefficient_of_variation, ..v1::Data::default() });
+    message.data = Some(v1::Data {
+        mean: Some(mean),
+        coefficient_of_variation: Some(variation),
+        ..v1::Data::default()
+    });
 }
 
+/// Gives another range of e_L.
 fn modulus(message: &mut v1::JobSpecification, start: f64, lower: f64, upper: f64) {
     let range = v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper });
     let range = Some(v1::ParameterRange { range: Some(range) });
