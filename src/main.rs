@@ -21,6 +21,7 @@ mod resolved;
 mod results_directory;
 mod signals;
 mod verdict;
+mod warnings;
 
 use std::io::Write as _;
 use std::process::ExitCode;

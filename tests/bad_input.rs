@@ -103,6 +103,90 @@ fn numbers_out_of_range_name_their_field() {
 }
 
 #[test]
+fn numbers_in_other_units_are_asked_about() {
+    let changed = |from: &str, to: &str| {
+        let text = job(10, 1);
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text.replace(from, to)
+    };
+    let velocity = ["data.mean", "3.9", "did you mean 3.9 km/s (3.9e3)?"];
+    check_job(&changed("mean = 3906.0", "mean = 3.9"), &velocity);
+    let variation = ["data.coefficient_of_variation", "did you mean 2.7 % (0.027)?"];
+    check_job(&changed("variation = 0.0271", "variation = 2.7"), &variation);
+    let thickness = ["layers.bone.thickness: is 4.0", "did you mean 4 mm (4e-3)?"];
+    check_job(&(job(10, 1) + "[layers]\nbone = { thickness = 4 }\n"), &thickness);
+    let frequency = ["probe.center_frequency: is 1.0", "did you mean 1 MHz (1e6)?"];
+    check_job(&(job(10, 1) + "[probe]\ncenter_frequency = 1\n"), &frequency);
+    let gigapascal = changed("19488700000.0", "20")
+        .replace("[12000000000.0, 25000000000.0]", "[12, 25]")
+        .replace("4795000000.0", "4.795")
+        .replace("9825400000.0", "9.8254");
+    let moduli = [
+        "4 things are wrong",
+        "parameters.longitudinal_young_modulus.start: is 20.0; values are in Pa: did you mean 20 GPa (20e9)?",
+        "parameters.longitudinal_young_modulus.bounds: are 12.0 and 25.0",
+        "parameters.longitudinal_shear_modulus.fixed: is 4.795",
+        "parameters.transverse_young_modulus.fixed: is 9.8254",
+    ];
+    check_job(&gigapascal, &moduli);
+    check_case(
+        &constants("longitudinal_young_modulus", "17.717"),
+        &[
+            "one thing is wrong",
+            "bone.longitudinal_young_modulus",
+            "did you mean 17.717 GPa (17.717e9)?",
+        ],
+    );
+    check_case(&constants("density", "1.6"), &["bone.density", "did you mean 1.6 g/cm³ (1.6e3)?"]);
+}
+
+#[test]
+fn data_that_no_point_can_reach_are_refused() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(10, 1).replace("mean = 3906.0", "mean = 12000.0"));
+    let expected = "data.mean: is 12000.0; the bounds of [parameters] allow mean velocities of about 2700 \
+                    to 4700 m/s";
+    refused(&scratch, "identify", &file, &[expected]);
+}
+
+/// What is only unusual is computed, after a word on stderr.
+#[test]
+fn unusual_numbers_are_warned_of_and_computed_with() {
+    let warned = |command: &str, name: &str, text: &str, expected: &[&str]| {
+        let scratch = Scratch::new();
+        let finished = run(&[command, scratch.write(name, text).to_str().unwrap()]);
+        assert_eq!(finished.code, Some(0), "{finished:?}");
+        let warnings: Vec<&str> =
+            finished.stderr.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert_eq!(warnings.len(), expected.len(), "{warnings:?}");
+        for (warning, expected) in warnings.iter().zip(expected) {
+            assert!(warning.contains(expected), "{expected} is not in: {warning}");
+        }
+    };
+    warned("identify", "job.toml", &job(8, 2), &[]);
+    warned("propagate", "job.toml", &job(8, 1), &[]);
+    let deep = "[layers]\nmarrow = { thickness = 11 }\n";
+    let unusual =
+        "layers.marrow.thickness: is 11 m; usual is up to 0.3 m; did you mean 11 mm (11e-3)?";
+    warned("simulate", "case.toml", &(constants("", "") + deep), &[unusual]);
+    warned("propagate", "job.toml", &(job(8, 1) + deep), &[unusual]);
+    let wide = job(8, 2).replace("variation = 0.0271", "variation = 0.12");
+    warned(
+        "identify",
+        "job.toml",
+        &wide,
+        &["the coefficient of variation is 1.200e-1, above what points"],
+    );
+    let fast = job(8, 2).replace("mean = 3906.0", "mean = 5500");
+    warned(
+        "identify",
+        "job.toml",
+        &fast,
+        &["the mean is 5500, above what points within the bounds reach"],
+    );
+}
+
+#[test]
 fn a_matrix_must_be_an_elasticity() {
     check_case(&mandel(0, 3, 1e9), &["bone.mandel", "symmetric"]);
     check_case(&mandel(4, 4, -1e10), &["bone.mandel", "positive definite"]);
@@ -141,6 +225,14 @@ fn bad_velocities_are_shown_by_file_and_line() {
     check(Some("velocity\n3900.0\n-3900.0\n"), &["v.csv", "line 3", "-3900"]);
     check(Some("velocity\n3900.0\nNaN\n"), &["v.csv", "line 3"]);
     check(Some("speed\n3900.0\n3901.0\n"), &["v.csv", "velocity"]);
+    check(
+        Some("velocity\n3.9\n3.95\n3.8\n"),
+        &["their median is 3.9", "did you mean 3.9 km/s (3.9e3)?"],
+    );
+    check(
+        Some("velocity\n3900.0\n3950.0\n39000\n"),
+        &["v.csv, line 4", "39000", "no velocity of sound in bone is outside 100 to 20000"],
+    );
 }
 
 #[test]

@@ -19,6 +19,44 @@ const COLUMN: &str = "velocity";
 /// Most bad lines that are reported one by one.
 const REPORTED_MAX: usize = 10;
 
+/// Measured velocities of a file, one set or a set for each group.
+#[derive(Debug)]
+pub(crate) struct Measured<T> {
+    /// The velocities, m/s.
+    pub(crate) data: T,
+    /// Where they stand.
+    pub(crate) origin: Origin,
+}
+
+/// Where the velocities of a job stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Origin {
+    path: PathBuf,
+    /// Line of each velocity of each set, from 1.
+    lines: Vec<Vec<usize>>,
+}
+
+impl Origin {
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The line of a velocity of a set.
+    pub(crate) fn line(&self, set: usize, index: usize) -> Option<usize> {
+        self.lines.get(set)?.get(index).copied()
+    }
+
+    /// File and line of a velocity as the beginning of a message; nothing where there is no file.
+    pub(crate) fn place(origin: Option<&Self>, set: usize, index: usize) -> String {
+        let place = origin.and_then(|origin| {
+            let line = origin.line(set, index)?;
+            Some(format!("{}, line {line}: velocity ", origin.path.display()))
+        });
+        place.unwrap_or_default()
+    }
+}
+
 /// One thing wrong with a CSV file of velocities.
 #[derive(Debug, Error)]
 #[error("{}{}: {problem}", .path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
@@ -72,9 +110,11 @@ enum Problem {
 ///
 /// # Errors
 /// Everything that is wrong with it, up to [`REPORTED_MAX`] lines.
-pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
+pub(crate) fn read(path: &Path) -> Result<Measured<Vec<f64>>, Vec<CsvError>> {
     let rows = rows_of(path, None)?;
-    Ok(rows.into_iter().map(|(_, velocity)| velocity).collect())
+    let lines = vec![rows.iter().map(|row| row.line).collect()];
+    let data = rows.into_iter().map(|row| row.velocity).collect();
+    Ok(Measured { data, origin: Origin { path: path.to_owned(), lines } })
 }
 
 /// The velocities of the CSV file at `path`, m/s, by the names in its column `column`: groups in the
@@ -82,26 +122,41 @@ pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_groups(path: &Path, column: &str) -> Result<Vec<Group>, Vec<CsvError>> {
+pub(crate) fn read_groups(
+    path: &Path,
+    column: &str,
+) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
     let mut groups: Vec<Group> = Vec::new();
+    let mut lines: Vec<Vec<usize>> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for (name, velocity) in rows_of(path, Some(column))? {
+    for Row { line, name, velocity } in rows_of(path, Some(column))? {
         let place = places.get(&name).copied().unwrap_or_else(|| {
             groups.push(Group { name: name.clone(), velocities: Vec::new() });
+            lines.push(Vec::new());
             places.insert(name, groups.len() - 1);
             groups.len() - 1
         });
         groups[place].velocities.push(velocity);
+        lines[place].push(line);
         if groups.len() > limits::GROUPS_MAX {
             let (line, problem) = (None, Problem::TooManyGroups);
             return Err(vec![CsvError { path: path.to_owned(), line, problem }]);
         }
     }
-    Ok(groups)
+    Ok(Measured { data: groups, origin: Origin { path: path.to_owned(), lines } })
 }
 
-/// Name of the group (empty without a `column` of them) and velocity of each row.
-fn rows_of(path: &Path, column: Option<&str>) -> Result<Vec<(String, f64)>, Vec<CsvError>> {
+/// One velocity of the file.
+struct Row {
+    /// From 1.
+    line: usize,
+    /// Of its group; empty without a column of them.
+    name: String,
+    /// m/s.
+    velocity: f64,
+}
+
+fn rows_of(path: &Path, column: Option<&str>) -> Result<Vec<Row>, Vec<CsvError>> {
     let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
     text_of(path)
         .map_err(|located| vec![located])
@@ -121,7 +176,7 @@ fn text_of(path: &Path) -> Result<String, Located> {
 
 type Located = (Option<usize>, Problem);
 
-fn parse(text: &str, group: Option<&str>) -> Result<Vec<(String, f64)>, Vec<Located>> {
+fn parse(text: &str, group: Option<&str>) -> Result<Vec<Row>, Vec<Located>> {
     let mut lines = without_byte_order_mark(text)
         .lines()
         .enumerate()
@@ -135,7 +190,7 @@ fn parse(text: &str, group: Option<&str>) -> Result<Vec<(String, f64)>, Vec<Loca
     let mut problems = Vec::new();
     for (number, line) in lines {
         match columns.row(line) {
-            Ok(row) => velocities.push(row),
+            Ok((name, velocity)) => velocities.push(Row { line: number, name, velocity }),
             Err(problem) => problems.push((Some(number), problem)),
         }
         if problems.len() > REPORTED_MAX {

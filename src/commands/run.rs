@@ -20,17 +20,19 @@ use crate::request::Request;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
-use crate::verdict;
+use crate::{verdict, warnings};
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
-    let specification = job_file::read(&run.job, run.kind).map_err(Failure::bad_input)?;
+    let (specification, warnings) =
+        job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
     }
     if let Some(reason) = failed_before(&run, &specification)? {
         say(&format!("the last run there failed and is run again: {reason}"));
     }
+    warnings::say_of_job(&specification, &warnings).await;
     let interruption = signals::interruption()?;
     // An address that does not answer leaves no directory behind.
     let computers = Computers::find(&run.place).await?;

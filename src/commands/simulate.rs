@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use osteon_common::case::Case;
 use osteon_common::case_file;
+use osteon_common::plausible::case_warnings;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
 use osteon_study::check::Check;
 
@@ -14,11 +15,13 @@ use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownSimulation};
 use crate::resolved;
 use crate::results_directory;
+use crate::warnings;
 
 /// Solves the case, writes the traces if they are wanted, prints.
 pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
     let format = resolved::format(arguments.json);
     let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
+    warnings::say_all(&case_warnings(&case));
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = solved.await.map_err(Failure::failed)??;
     let shown = ShownSimulation {
