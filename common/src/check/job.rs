@@ -12,6 +12,7 @@ use crate::limits;
 use crate::parameters::Parameter;
 use crate::statistics;
 use crate::violations::Violations;
+use crate::visible;
 
 use super::{known_wrong, number, setup, whole};
 
@@ -107,12 +108,17 @@ fn groups(groups: &[Group], violations: &mut Violations) {
     let mut names = BTreeSet::new();
     for Group { name, velocities: measured } in groups {
         let field = entry_path(FIELD, name);
-        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX || name.contains(char::is_control)
-        {
+        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
+            violations.add(&field, format!("is no name of a group: it must have 1 to {most} bytes"));
+        } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
+            let code = u32::from(c);
             violations.add(
                 &field,
-                format!("is no name of a group: it must have 1 to {most} bytes, none of them a control character"),
+                format!(
+                    "has the character U+{code:04X}, which is not seen or changes how others are: two \
+                     names could look the same; leave it out"
+                ),
             );
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");
