@@ -289,7 +289,7 @@ fn remove_if_there(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
     let path = directory.join(RESULT);
     let text = read_if_there(&path)?;
-    text.with_context(|| format!("cannot read {}: there is no such file", visible::path(path)))
+    text.with_context(|| format!("cannot read {}: there is no such file", visible::path(&path)))
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
