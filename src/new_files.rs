@@ -69,7 +69,9 @@ pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
-    write().with_context(|| format!("cannot add to {}", visible::path(path))).map_err(Failure::Failed)
+    write()
+        .with_context(|| format!("cannot add to {}", visible::path(path)))
+        .map_err(Failure::Failed)
 }
 
 fn write(file: &NewFile) -> anyhow::Result<()> {

@@ -273,4 +273,14 @@ mod tests {
             assert_eq!(span(seconds), expected);
         }
     }
+
+    #[test]
+    fn an_event_of_the_log_is_one_line() {
+        assert_eq!(
+            shown(b"WARN lost host=a\x1b[2J\n INFO b\n"),
+            "WARN lost host=a\\u{1b}[2J\\n INFO b\n"
+        );
+        assert_eq!(shown("Größe \u{202e}\n".as_bytes()), "Größe \\u{202e}\n");
+        assert_eq!(shown(b"\xff\n"), "\u{fffd}\n");
+    }
 }

@@ -25,8 +25,7 @@ const CONSTANTS: [Parameter; 5] = [
 ];
 
 /// A case file with a matrix and all keys has some kilobytes.
-const BOUND: Bound =
-    Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
+const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
 
 /// Reads and validates the case file at `path`; its extension tells the format.
 ///

@@ -36,7 +36,10 @@ enum Problem {
     Unreadable(io::Error),
     #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
     TooLarge,
-    #[error("is longer than {} bytes; a line has the fields of one velocity", limits::LINE_BYTES_MAX)]
+    #[error(
+        "is longer than {} bytes; a line has the fields of one velocity",
+        limits::LINE_BYTES_MAX
+    )]
     LongLine,
     #[error("is not UTF-8 text")]
     NotUtf8,

@@ -107,10 +107,13 @@ fn reading_takes_no_more_memory_than_a_job_needs() {
         assert!(message.contains(expected), "{name}: {message:.300}");
         assert!(taken < most, "{name}: {} MiB of memory", taken / MIB);
     }
-    let list = format!("[{}]", million().fold(String::new(), |mut text, velocity| {
-        write!(text, "{velocity:?}, ").unwrap();
-        text
-    }));
+    let list = format!(
+        "[{}]",
+        million().fold(String::new(), |mut text, velocity| {
+            write!(text, "{velocity:?}, ").unwrap();
+            text
+        })
+    );
     // A million velocities in a job file: the parser's words and marks, then two trees.
     let (accepted, taken) = read(directory.path(), "job.toml", &job(&list));
     assert_eq!(accepted, Ok(()));

@@ -38,7 +38,10 @@ pub enum CredentialError {
         source: io::Error,
     },
     /// It is no such file at all.
-    #[error("{} has more than {max} bytes, and is no file of certificates, keys or tokens", visible::path(path))]
+    #[error(
+        "{} has more than {max} bytes, and is no file of certificates, keys or tokens",
+        visible::path(path)
+    )]
     TooLong {
         /// The file.
         path: PathBuf,
@@ -64,7 +67,10 @@ pub enum CredentialError {
         mode: u32,
     },
     /// Others can change what is trusted.
-    #[error("{0} can be changed by other users (mode {mode:04o}): chmod 644 {0}", visible::path(path))]
+    #[error(
+        "{0} can be changed by other users (mode {mode:04o}): chmod 644 {0}",
+        visible::path(path)
+    )]
     Changeable {
         /// The file.
         path: PathBuf,
@@ -82,7 +88,8 @@ pub enum CredentialError {
     /// It holds no certificate.
     #[error(
         "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` makes \
-         them", visible::path(path)
+         them",
+        visible::path(path)
     )]
     NoCertificate {
         /// The file.
@@ -91,7 +98,8 @@ pub enum CredentialError {
     /// It holds no private key.
     #[error(
         "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` makes \
-         them", visible::path(path)
+         them",
+        visible::path(path)
     )]
     NoKey {
         /// The file.
@@ -108,7 +116,8 @@ pub enum CredentialError {
     /// Certificate and key do not belong together.
     #[error(
         "the key in {} is not the one of the certificate in {}; give the two that were made together",
-        visible::path(key), visible::path(certificate)
+        visible::path(key),
+        visible::path(certificate)
     )]
     Mismatch {
         /// The file of the certificate.
@@ -123,7 +132,10 @@ pub enum CredentialError {
         path: PathBuf,
     },
     /// The certificate's time has not come.
-    #[error("the certificate in {} is not valid yet; is this machine's clock right?", visible::path(path))]
+    #[error(
+        "the certificate in {} is not valid yet; is this machine's clock right?",
+        visible::path(path)
+    )]
     NotYetValid {
         /// The file.
         path: PathBuf,

@@ -36,7 +36,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
-        self.verbatim(&format!("{job}\n"))
+        self.verbatim(&format!("{}\n", visible::line(job)))
     }
 
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()> {
@@ -61,7 +61,8 @@ impl Output for TextOutput<'_> {
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
-        self.verbatim(&jobs.iter().map(|job| format!("{job}\n")).collect::<String>())
+        let line = |job: &String| format!("{}\n", visible::line(job));
+        self.verbatim(&jobs.iter().map(line).collect::<String>())
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
@@ -156,7 +157,8 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
 /// Columns of equal width, two spaces between.
 pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
     // Names and reasons of others are among them.
-    let cells = |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
+    let cells =
+        |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
     let rows: Vec<[String; COLUMNS]> = rows.iter().map(cells).collect();
     let width =
         |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);

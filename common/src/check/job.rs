@@ -110,7 +110,8 @@ fn groups(groups: &[Group], violations: &mut Violations) {
         let field = entry_path(FIELD, name);
         if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
-            violations.add(&field, format!("is no name of a group: it must have 1 to {most} bytes"));
+            violations
+                .add(&field, format!("is no name of a group: it must have 1 to {most} bytes"));
         } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
             let code = u32::from(c);
             violations.add(

@@ -77,7 +77,8 @@ impl SqliteStore {
         let known = last_known(&connection).map_err(|source| opening::refusal(&path, source))?;
         let found = Mark::find(directory)?;
         let last = acknowledged::checked(&found, known, &path, lost)?;
-        opening::checkpoint_at_end(&connection).map_err(|source| opening::refusal(&path, source))?;
+        opening::checkpoint_at_end(&connection)
+            .map_err(|source| opening::refusal(&path, source))?;
         if last > known {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
@@ -425,8 +426,7 @@ impl Store for SqliteStore {
 fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
     let stored: Option<u64> =
         connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?;
-    let forgotten: i32 =
-        connection.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
+    let forgotten: i32 = connection.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
     Ok(stored.unwrap_or(0).max(u64::try_from(forgotten).unwrap_or(0)))
 }
 
