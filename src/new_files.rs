@@ -6,6 +6,7 @@ use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
+use osteon_common::{user_file, visible};
 
 use crate::ending::Failure;
 
@@ -28,7 +29,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
         if path.symlink_metadata().is_ok() {
             return Err(Failure::bad_input(anyhow!(
                 "{} exists already and is not replaced; remove it, or choose another place",
-                path.display()
+                visible::path(path)
             )));
         }
     }
@@ -50,7 +51,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 /// When it cannot be made.
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
-    made.with_context(|| format!("cannot create the directory {}", path.display()))
+    made.with_context(|| format!("cannot create the directory {}", visible::path(path)))
         .map_err(Failure::Failed)
 }
 
@@ -60,14 +61,17 @@ pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
 /// When it cannot be written.
 pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
-        let mut file =
-            OpenOptions::new().read(true).append(true).create(true).mode(0o600).open(path)?;
+        let mut options = OpenOptions::new();
+        let options = options.read(true).append(true).create(true).mode(0o600);
+        let mut file = user_file::open_with(options, path)?;
         let whole = ends_with_newline(&file)?;
         // In one piece: others may add lines at the same time.
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
-    write().with_context(|| format!("cannot add to {}", path.display())).map_err(Failure::Failed)
+    write()
+        .with_context(|| format!("cannot add to {}", visible::path(path)))
+        .map_err(Failure::Failed)
 }
 
 fn write(file: &NewFile) -> anyhow::Result<()> {
@@ -82,7 +86,7 @@ fn write(file: &NewFile) -> anyhow::Result<()> {
         }
         written
     };
-    write().with_context(|| format!("cannot write {}", file.path.display()))
+    write().with_context(|| format!("cannot write {}", visible::path(&file.path)))
 }
 
 /// Whether a line can be added behind the last byte.

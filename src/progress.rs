@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use osteon_common::visible;
 use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 use tracing_subscriber::fmt::MakeWriter;
 
@@ -45,7 +46,7 @@ impl Progress {
         if let Some(bar) = &self.bar {
             bar.set_length(snapshot.realizations.max(1));
             bar.set_position(snapshot.realizations_done.min(snapshot.realizations));
-            bar.set_message(describe(snapshot));
+            bar.set_message(visible::line(&describe(snapshot)).into_owned());
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_INTERVAL_S) {
             self.last_line = Instant::now();
             say(&describe(snapshot));
@@ -73,6 +74,7 @@ impl Drop for Progress {
 
 /// One line on stderr, above a bar if there is one.
 pub(crate) fn say(line: &str) {
+    let line = visible::lines(line);
     // Nothing is left to be done when stderr is closed.
     let write = || drop(writeln!(std::io::stderr(), "{line}"));
     match BARS.get() {
@@ -95,8 +97,9 @@ impl<'a> MakeWriter<'a> for LogWriter {
 
 impl Write for LogWriter {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let text = shown(bytes);
         // A closed stderr must not end a computation.
-        let write = || drop(std::io::stderr().write_all(bytes));
+        let write = || drop(std::io::stderr().write_all(text.as_bytes()));
         match BARS.get() {
             Some(bars) => bars.suspend(write),
             None => write(),
@@ -106,6 +109,15 @@ impl Write for LogWriter {
 
     fn flush(&mut self) -> std::io::Result<()> {
         Ok(())
+    }
+}
+
+/// An event of the log as one line: what others have said in it begins no line of its own.
+fn shown(event: &[u8]) -> String {
+    let text = String::from_utf8_lossy(event);
+    match text.strip_suffix('\n') {
+        Some(line) => format!("{}\n", visible::line(line)),
+        None => visible::line(&text).into_owned(),
     }
 }
 
@@ -260,5 +272,15 @@ mod tests {
         for (seconds, expected) in cases {
             assert_eq!(span(seconds), expected);
         }
+    }
+
+    #[test]
+    fn an_event_of_the_log_is_one_line() {
+        assert_eq!(
+            shown(b"WARN lost host=a\x1b[2J\n INFO b\n"),
+            "WARN lost host=a\\u{1b}[2J\\n INFO b\n"
+        );
+        assert_eq!(shown("Größe \u{202e}\n".as_bytes()), "Größe \\u{202e}\n");
+        assert_eq!(shown(b"\xff\n"), "\u{fffd}\n");
     }
 }

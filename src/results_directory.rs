@@ -6,7 +6,7 @@
 //! cancelled job.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{BufWriter, IntoInnerError, Read as _, Write};
+use std::io::{BufWriter, IntoInnerError, Write};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use osteon_common::inference::inference;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
-use osteon_common::{job_file, results_csv, results_json};
+use osteon_common::{job_file, results_csv, results_json, user_file, visible};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
@@ -70,7 +70,7 @@ impl ResultsDirectory {
                 return Err(Failure::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: whose result it is cannot be told; \
                      choose another --out directory",
-                    path.display()
+                    visible::path(path)
                 )));
             }
             None => {}
@@ -101,11 +101,11 @@ impl ResultsDirectory {
 
     fn lock(path: &Path) -> anyhow::Result<Self> {
         fs::create_dir_all(path)
-            .with_context(|| format!("cannot create the directory {}", path.display()))?;
+            .with_context(|| format!("cannot create the directory {}", visible::path(path)))?;
         let lock_path = path.join(LOCK);
         for _ in 0..LOCK_ATTEMPTS_MAX {
-            let lock = File::create(&lock_path)
-                .with_context(|| format!("cannot write {}", lock_path.display()))?;
+            let lock = user_file::create(&lock_path)
+                .with_context(|| format!("cannot write {}", visible::path(&lock_path)))?;
             match lock.try_lock() {
                 // A run that ended meanwhile has removed the file: its lock locks nothing.
                 Ok(()) if !is_at(&lock, &lock_path) => {}
@@ -113,11 +113,11 @@ impl ResultsDirectory {
                 Err(TryLockError::WouldBlock) => break,
                 Err(TryLockError::Error(error)) => {
                     return Err(anyhow::Error::new(error)
-                        .context(format!("cannot lock {}", lock_path.display())));
+                        .context(format!("cannot lock {}", visible::path(&lock_path))));
                 }
             }
         }
-        bail!("another osteon is running in {}", path.display())
+        bail!("another osteon is running in {}", visible::path(path))
     }
 
     /// Where a store of this run is kept until it has ended.
@@ -232,7 +232,7 @@ fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Resu
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \
              choose another --out directory",
-            path.display()
+            visible::path(path)
         ))),
     }
 }
@@ -265,18 +265,18 @@ pub(crate) fn write_by(
     name.push(".part");
     let part = path.with_file_name(name);
     let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(&part)?);
+        let mut file = BufWriter::new(user_file::create(&part)?);
         print(&mut file)?;
         file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
         fs::rename(&part, path)
     };
-    write().with_context(|| format!("cannot write {}", path.display()))
+    write().with_context(|| format!("cannot write {}", visible::path(path)))
 }
 
 fn remove_if_there(path: &Path) -> anyhow::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| format!("cannot replace {}", path.display()))
+            Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))
         }
         _ => Ok(()),
     }
@@ -289,28 +289,23 @@ fn remove_if_there(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
     let path = directory.join(RESULT);
     let text = read_if_there(&path)?;
-    text.with_context(|| format!("cannot read {}: there is no such file", path.display()))
+    text.with_context(|| format!("cannot read {}: there is no such file", visible::path(&path)))
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
 fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
+    let cannot = || format!("cannot read {}", visible::path(path));
+    let read = match user_file::read(path, FILE_BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => {
-            return Err(error).with_context(|| format!("cannot read {}", path.display()));
-        }
+        read => read.with_context(cannot)?,
     };
-    let cannot = || format!("cannot read {}", path.display());
-    let mut bytes = Vec::new();
-    let length = file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).with_context(cannot)?;
-    if length as u64 > FILE_BYTES_MAX {
+    let Some(bytes) = read else {
         bail!(
             "{} is longer than {FILE_BYTES_MAX} bytes, and osteon writes no such file; remove it, \
              or choose another directory",
-            path.display()
+            visible::path(path)
         );
-    }
+    };
     Ok(Some(String::from_utf8(bytes).with_context(cannot)?))
 }
 

@@ -5,9 +5,12 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
+use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Command;
 
-use support::{OPTIMUM, Scratch, job, run, text};
+use osteon_common::visible::is_hidden;
+use support::{Finished, OPTIMUM, Scratch, job, osteon, run, text};
 
 /// A case file with `bone` as its section.
 fn case(bone: &str) -> String {
@@ -260,6 +263,126 @@ fn a_realization_that_does_not_exist_is_refused() {
     let drawn = run(&at);
     assert_eq!(drawn.code, Some(2), "{drawn:?}");
     assert!(drawn.stderr.contains("result.json"), "{drawn:?}");
+}
+
+/// Runs the program to its end, for which it has a minute.
+fn run_within_a_minute(arguments: &[&str]) -> Finished {
+    let mut command = Command::new("timeout");
+    command.arg("60").arg(osteon().get_program()).args(arguments).env("RUST_LOG", "warn");
+    Finished::of(command.output().unwrap())
+}
+
+/// A pipe that nobody writes would be waited for without end.
+#[test]
+fn what_is_no_regular_file_is_refused_at_once() {
+    let scratch = Scratch::new();
+    let pipe = |name: &str| {
+        let path = scratch.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
+        path.to_str().unwrap().to_owned()
+    };
+    let check = |path: &str, kind: &str, arguments: &[&str]| {
+        let refused = run_within_a_minute(arguments);
+        assert!(matches!(refused.code, Some(1 | 2)), "{arguments:?}: {refused:?}");
+        let expected = format!("it is {kind}, and must be a regular file");
+        for part in [path, &expected] {
+            assert!(refused.stderr.contains(part), "{part} in {refused:?}");
+        }
+        assert_eq!(refused.stdout, "", "{arguments:?}");
+    };
+    let good = scratch.write("good.toml", &job(10, 1));
+    let (good, case) = (text(&good), scratch.write("case.toml", &constants("", "")));
+    let piped = pipe("pipe.toml");
+    for command in ["identify", "propagate", "simulate"] {
+        check(&piped, "a pipe", &[command, &piped]);
+    }
+    check(&piped, "a pipe", &["draw", &piped, "--index", "1"]);
+    let device = scratch.path("device.json");
+    symlink("/dev/zero", &device).unwrap();
+    check(text(&device), "a device", &["identify", text(&device)]);
+    std::fs::create_dir(scratch.path("directory.toml")).unwrap();
+    let directory = scratch.path("directory.toml");
+    check(text(&directory), "a directory", &["identify", text(&directory)]);
+
+    let data = pipe("data.csv");
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+    let with_data = job(10, 1).replace(moments, "velocities = \"data.csv\"\n");
+    let with_data = scratch.write("with_data.toml", &with_data);
+    check(&data, "a pipe", &["identify", text(&with_data)]);
+
+    let result = pipe("at/result.json");
+    let at = scratch.path("at");
+    check(&result, "a pipe", &["draw", good, "--index", "1", "--at", text(&at)]);
+    check(&result, "a pipe", &["identify", good, "--out", text(&at)]);
+    let lock = pipe("out/.lock");
+    check(&lock, "a pipe", &["identify", good, "--out", text(&scratch.path("out"))]);
+    pipe("traces/traces.csv.part");
+    let traces = scratch.path("traces");
+    check(text(&traces), "a pipe", &["simulate", text(&case), "--out", text(&traces)]);
+
+    let secret = pipe("secret");
+    let jobs = ["jobs", "--coordinator", "https://127.0.0.1:1"];
+    check(&secret, "a pipe", &[&jobs[..], &["--token-file", &secret]].concat());
+    check(&secret, "a pipe", &[&jobs[..], &["--tls-ca", &secret]].concat());
+    let store = scratch.path("store");
+    let serve = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(&store)];
+    check(&secret, "a pipe", &[&serve[..], &["--tokens", &secret]].concat());
+    let pem = pipe("authority/ca.pem");
+    let made = scratch.path("made");
+    let authority = scratch.path("authority");
+    check(&pem, "a pipe", &["certs", text(&made), "--ca", text(&authority)]);
+    let out = scratch.path("ann.token");
+    let token = ["token", "ann", "--role", "read", "--out", text(&out), "--tokens", &secret];
+    check(&secret, "a pipe", &token);
+    pipe("locked/osteon.lock");
+    let locked = scratch.path("locked");
+    let serve = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(&locked)];
+    check(text(&locked), "a pipe", &serve);
+}
+
+/// Escape sequences and marks that turn the direction of writing are written out.
+#[test]
+fn what_a_user_does_not_see_is_shown() {
+    let scratch = Scratch::new();
+    let check = |arguments: &[&str], expected: &[&str]| {
+        let refused = run_within_a_minute(arguments);
+        assert!(matches!(refused.code, Some(1 | 2)), "{refused:?}");
+        for part in expected {
+            assert!(refused.stderr.contains(part), "{part} is not in: {refused:?}");
+        }
+        let raw = refused.stderr.contains(|c| c != '\n' && is_hidden(c));
+        assert!(!raw, "{refused:?}");
+    };
+    // In names of files.
+    let name = "job\u{202e}\u{1b}[31m\n.toml";
+    let shown = r"job\u{202e}\u{1b}[31m\n.toml";
+    let absent = scratch.path(name);
+    check(&["identify", text(&absent)], &[shown, "No such file"]);
+    let file = scratch.write(name, "[bone]\n\"a\\u001bb\\u202e\" = 1\nb = \"\\u009b2J\"\n");
+    check(&["simulate", text(&file)], &[shown, r"a\u{1b}b\u{202e}"]);
+    // In keys and values of a job file, and in what a parser says of them.
+    let with = |section: &str| scratch.write("job.toml", &(job(10, 1) + section));
+    let file = with("[solver]\nmethod = \"exa\\u001b[2Jct\"\n");
+    check(&["identify", text(&file)], &[r"exa\u{1b}[2Jct"]);
+    for line in ["a\u{1b}[2J = 1\n", "a = \u{202e}\n", "\u{200b}\n", "a = 1\na = \u{9b}\n"] {
+        let file = with(line);
+        check(&["identify", text(&file)], &["job.toml, line"]);
+    }
+    let file = scratch.write("job.json", "{\"a\u{202e}\": 1, \"a\u{202e}\": 1}");
+    check(&["identify", text(&file)], &[r"a\u{202e}"]);
+    // In the header and the groups of a file of velocities.
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+    let data = "velocities = \"v.csv\"\ngroup = \"bone\"\n";
+    let file = scratch.write("groups.toml", &job(10, 1).replace(moments, data));
+    scratch.write("v.csv", "velocity,b\u{1b}[2J\u{2066}one\n3900,a\n");
+    check(&["identify", text(&file)], &[r"b\u{1b}[2J\u{2066}one"]);
+    scratch.write("v.csv", "velocity,bone\n3900,a\n3901,a\n3900,a\u{200b}\n3901,a\u{200b}\n");
+    check(&["identify", text(&file)], &[r"a\u{200b}", "has the character U+200B", "leave it out"]);
+    // In the log, where it would begin a line of its own, too.
+    let url = format!("unix:{}", text(&scratch.path("a\u{1b}[2J\n\u{202e}ERROR")));
+    let worker = ["worker", "--coordinator", &url, "--give-up-after", "0.1"];
+    check(&worker, &["WARN", r"a\u{1b}[2J\n\u{202e}ERROR"]);
 }
 
 #[test]

@@ -7,7 +7,8 @@ use crate::case::{Bone, Case};
 use crate::check;
 use crate::document::{self, Format, Node, Value, element_path};
 use crate::elasticity::{Elasticity, EngineeringConstants};
-use crate::file_error::{self, ContentError, FileError};
+use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::limits;
 use crate::parameters::Parameter;
 use crate::plausible::Quantity;
 use crate::reader::{Reader, Table};
@@ -24,12 +25,15 @@ const CONSTANTS: [Parameter; 5] = [
     Parameter::TransversePoissonRatio,
 ];
 
+/// A case file with a matrix and all keys has some kilobytes.
+const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
+
 /// Reads and validates the case file at `path`; its extension tells the format.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
 pub fn read(path: &Path) -> Result<Case, FileError> {
-    let (text, format) = file_error::read(path)?;
+    let (text, format) = file_error::read(path, BOUND)?;
     parse(&text, format).map_err(|content| FileError::Content { path: path.to_owned(), content })
 }
 

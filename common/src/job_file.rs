@@ -8,14 +8,21 @@ use std::slice;
 
 use crate::check;
 use crate::document::{self, Format};
-use crate::file_error::{self, ContentError, FileError};
+use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::job::{JobKind, JobSpecification, Range};
+use crate::limits;
 use crate::parameters::Parameter;
 use crate::plausible::{self, Warning};
 use crate::reader::{Reader, Table};
 use crate::setup_section;
 
 pub use crate::toml_text::job as to_toml;
+
+/// Measured velocities may be in it.
+const BOUND: Bound = Bound {
+    bytes: limits::JOB_FILE_BYTES_MAX,
+    purpose: "a job with a million velocities needs; data.velocities may also name a CSV file",
+};
 
 /// Reads and validates the job file at `path`; its extension tells the format. The file of
 /// measured velocities that it names is read too, relative to the job file, and inlined.
@@ -36,7 +43,7 @@ pub fn read_with_warnings(
     path: &Path,
     kind: JobKind,
 ) -> Result<(JobSpecification, Vec<Warning>), FileError> {
-    let (text, format) = file_error::read(path)?;
+    let (text, format) = file_error::read(path, BOUND)?;
     let directory = path.parent().unwrap_or(Path::new(""));
     parse_with_warnings(&text, format, directory, kind)
         .map_err(|content| FileError::Content { path: path.to_owned(), content })

@@ -158,9 +158,10 @@ fn files_that_cannot_be_read() {
 fn a_file_longer_than_the_bound_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.toml");
-    let bytes_max = osteon_common::limits::FILE_BYTES_MAX;
+    let bytes_max = osteon_common::limits::CASE_FILE_BYTES_MAX;
     let file = std::fs::File::create(&path).unwrap();
     file.set_len(bytes_max + 1).unwrap();
     let message = case_file::read(Path::new(&path)).unwrap_err().to_string();
-    assert!(message.ends_with("long.toml is longer than 67108864 bytes"), "{message}");
+    let expected = "long.toml is longer than 1048576 bytes, more than any case file needs";
+    assert!(message.ends_with(expected), "{message}");
 }

@@ -8,6 +8,7 @@ mod solver;
 
 use std::io::{self, Write};
 
+use osteon_common::visible;
 use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};
@@ -35,7 +36,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
-        self.verbatim(&format!("{job}\n"))
+        self.verbatim(&format!("{}\n", visible::line(job)))
     }
 
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()> {
@@ -60,7 +61,8 @@ impl Output for TextOutput<'_> {
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
-        self.verbatim(&jobs.iter().map(|job| format!("{job}\n")).collect::<String>())
+        let line = |job: &String| format!("{}\n", visible::line(job));
+        self.verbatim(&jobs.iter().map(line).collect::<String>())
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
@@ -68,7 +70,7 @@ impl Output for TextOutput<'_> {
         let time = span(snapshot.elapsed_s);
         let line = match progress(snapshot).as_str() {
             "" => format!("{time:>7}  {state}\n"),
-            progress => format!("{time:>7}  {state}: {progress}\n"),
+            progress => format!("{time:>7}  {state}: {}\n", visible::line(progress)),
         };
         self.verbatim(&line)
     }
@@ -83,7 +85,8 @@ impl Output for TextOutput<'_> {
 fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     let line = |worker: &ExpelledWorker| {
         let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
-        format!("expelled {} ago: {host} (process {process}) {reason}\n", span(*elapsed_s))
+        let (ago, host, reason) = (span(*elapsed_s), visible::line(host), visible::line(reason));
+        format!("expelled {ago} ago: {host} (process {process}) {reason}\n")
     };
     expelled.iter().map(line).collect()
 }
@@ -146,18 +149,22 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         text.push_str(&format!("\n{}", check::table(check)));
     }
     if let Some(path) = simulation.traces {
-        text.push_str(&format!("\ntraces in {}\n", path.display()));
+        text.push_str(&format!("\ntraces in {}\n", visible::path(path)));
     }
     text
 }
 
 /// Columns of equal width, two spaces between.
 pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
+    // Names and reasons of others are among them.
+    let cells =
+        |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
+    let rows: Vec<[String; COLUMNS]> = rows.iter().map(cells).collect();
     let width =
         |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; COLUMNS] = std::array::from_fn(width);
     let mut text = String::new();
-    for row in rows {
+    for row in &rows {
         let mut line = String::new();
         for (cell, width) in row.iter().zip(widths) {
             line.push_str(&format!("{cell:<width$}  "));

@@ -16,6 +16,7 @@ use crate::reach;
 use crate::statistics;
 use crate::velocities::Origin;
 use crate::violations::Violations;
+use crate::visible;
 
 use super::{known_wrong, number, quantity, setup, whole};
 
@@ -142,12 +143,18 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
     let mut names = BTreeSet::new();
     for (set, Group { name, velocities: measured }) in groups.iter().enumerate() {
         let field = entry_path(FIELD, name);
-        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX || name.contains(char::is_control)
-        {
+        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
+            violations
+                .add(&field, format!("is no name of a group: it must have 1 to {most} bytes"));
+        } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
+            let code = u32::from(c);
             violations.add(
                 &field,
-                format!("is no name of a group: it must have 1 to {most} bytes, none of them a control character"),
+                format!(
+                    "has the character U+{code:04X}, which is not seen or changes how others are: two \
+                     names could look the same; leave it out"
+                ),
             );
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");

@@ -3,7 +3,7 @@
 
 use osteon_common::job::{JobKind, JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results_json;
+use osteon_common::{results_json, visible};
 use serde_json::Value;
 
 use super::{aligned, groups, identified, significant, solver};
@@ -13,7 +13,7 @@ use crate::verdict;
 /// The table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
     let Ok(value) = serde_json::from_str::<Value>(shown.json) else {
-        return format!("the stored result is no JSON:\n{}\n", shown.json);
+        return format!("the stored result is no JSON:\n{}\n", visible::lines(shown.json));
     };
     let mut text = String::new();
     match shown.kind {
@@ -25,10 +25,10 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
         text.push_str(&format!("\n{solver}\n"));
     }
     if let Some(digest) = value["digest"].as_str() {
-        text.push_str(&format!("\ndigest {digest}\n"));
+        text.push_str(&format!("\ndigest {}\n", visible::line(digest)));
     }
     if let Some(directory) = shown.directory {
-        text.push_str(&format!("files in {}\n", directory.display()));
+        text.push_str(&format!("files in {}\n", visible::path(directory)));
     }
     text
 }
@@ -46,7 +46,7 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     };
     text.push_str(headline);
     if let Some(reason) = reason {
-        text.push_str(&format!(": {reason}"));
+        text.push_str(&format!(": {}", visible::lines(reason)));
     }
     let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
     text.push_str(&format!("\n{evaluations} evaluations of {realizations} realizations"));
@@ -78,7 +78,7 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
 
 fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     if let Some(reason) = verdict::propagation_failure(shown.specification, value) {
-        text.push_str(&format!("Failed: {reason}\n"));
+        text.push_str(&format!("Failed: {}\n", visible::lines(&reason)));
     }
     text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
     text.push_str(&moments(value, false));
