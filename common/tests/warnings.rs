@@ -1,7 +1,5 @@
 //! What is accepted with a warning, and what without.
 
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
-
 use std::path::Path;
 
 use osteon_common::document::Format;
