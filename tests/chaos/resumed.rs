@@ -73,7 +73,8 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     assert_eq!(api.end(&id).digest, digest);
     runtime.shutdown_background();
 
-    let points: Vec<Vec<f64>> = api.parts(&id).into_iter().flat_map(points).collect();
+    let points: Vec<Option<ParameterValues>> =
+        api.parts(&id).into_iter().flat_map(points).collect();
     // Two more measure derivatives.
     let evaluations = EVALUATIONS + 2;
     assert_eq!(points.len(), evaluations as usize);
