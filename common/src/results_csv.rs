@@ -2,11 +2,11 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::inference::{Inference, Known, Quantity};
+use crate::inference::{Known, Quantity};
 use crate::job::{Data, JobSpecification};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
-use crate::results::{Evaluation, JobResult};
+use crate::results::{Evaluation, GroupResult, JobResult};
 
 /// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
 /// number and its moments; with groups or several starts, also which of them it was for.
@@ -81,28 +81,22 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
 const COMPARED_MAX: usize = 200;
 
 /// The text of `groups.csv`: one row per group, with what is identified of it (m/s; dimensionless) and
-/// the ends of its confidence intervals, empty where they are unknown; given what the data say of each.
-pub fn groups(
-    specification: &JobSpecification,
-    result: &JobResult,
-    found: &[Option<Inference>],
-) -> String {
+/// the ends of its confidence intervals, empty where they are unknown.
+pub fn groups(result: &JobResult) -> String {
     let quantities = ["bulk_velocity", "dispersion"];
     let columns = quantities.map(|name| format!("{name},{name}_lower,{name}_upper"));
     let parameters = Parameter::ALL.map(|parameter| format!("best_{}", parameter.name()));
     let columns = [columns.join(","), parameters.join(",")].join(",");
     let mut out = format!("group,velocities,status,cost,{columns}\n");
-    for (set, (group, found)) in result.groups.iter().zip(found).enumerate() {
-        let data = specification.data.as_ref();
-        let count = data.and_then(|data| data.velocities(set)).map_or(0, <[f64]>::len);
+    for group in &result.groups {
         let cost = group.best.as_ref().and_then(|best| best.cost);
         let mut fields = vec![
             field(&group.name),
-            count.to_string(),
+            group.data.count.unwrap_or(0).to_string(),
             group.status.name().to_owned(),
             number(cost),
         ];
-        for quantity in quantities_of(found.as_ref()) {
+        for quantity in quantities_of(group) {
             let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
             fields.push(number(quantity.map(|quantity| quantity.value)));
             fields.extend([0, 1].map(|end| number(interval.map(|ends| ends[end]))));
@@ -116,11 +110,11 @@ pub fn groups(
 }
 
 /// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
-/// identified, the first less the second, and the ends of their confidence intervals, each of level
-/// [`crate::inference::CONFIDENCE`] by itself; empty where they are unknown.
+/// identified, the first less the second, and the ends of their confidence intervals, each by itself of
+/// the level of the groups' own; empty where they are unknown.
 ///
 /// The noise of sampling, which all groups share, is counted in both: intervals are rather too wide.
-pub fn comparison(result: &JobResult, found: &[Option<Inference>]) -> String {
+pub fn comparison(result: &JobResult) -> String {
     let mut out = "first,second".to_owned();
     for name in ["bulk_velocity", "dispersion"] {
         out.push_str(&format!(
@@ -128,14 +122,12 @@ pub fn comparison(result: &JobResult, found: &[Option<Inference>]) -> String {
         ));
     }
     out.push('\n');
-    let groups: Vec<_> = result.groups.iter().zip(found).collect();
+    let groups = &result.groups;
     let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
-    for (first, (one, of_one)) in groups.iter().enumerate().take(firsts) {
-        for (other, of_other) in &groups[first + 1..] {
+    for (first, one) in groups.iter().enumerate().take(firsts) {
+        for other in &groups[first + 1..] {
             let mut fields = vec![field(&one.name), field(&other.name)];
-            let pairs =
-                quantities_of(of_one.as_ref()).into_iter().zip(quantities_of(of_other.as_ref()));
-            for pair in pairs {
+            for pair in quantities_of(one).into_iter().zip(quantities_of(other)) {
                 fields.extend(difference(pair).map(number));
             }
             out.push_str(&fields.join(","));
@@ -158,7 +150,8 @@ fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<
     [Some(difference), Some(difference - reach), Some(difference + reach)]
 }
 
-fn quantities_of(found: Option<&Inference>) -> [Option<Quantity>; 2] {
+fn quantities_of(group: &GroupResult) -> [Option<Quantity>; 2] {
+    let found = group.conclusions.inference.as_ref();
     [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
 }
 

@@ -89,11 +89,9 @@ impl Identification {
                 let names = groups.iter().map(|group| group.name.as_str());
                 together(&names.zip(endings).collect::<Vec<_>>())
             }
-            (_, [GroupEnding { status, reason, .. }]) => {
-                Ending { status: *status, reason: reason.clone() }
-            }
+            (_, [GroupEnding { status, reason, .. }]) => Ending::of_search(*status, reason.clone()),
             // Only what has ended is asked how it did.
-            _ => Ending { status: Status::Cancelled, reason: None },
+            _ => Ending::of_search(Status::Cancelled, None),
         }
     }
 
@@ -126,8 +124,8 @@ fn together(groups: &[(&str, &GroupEnding)]) -> Ending {
             let reason = format!(
                 "the searches for {count} of {all} groups {what}; the first is {name:?}{why}"
             );
-            return Ending { status, reason: Some(reason) };
+            return Ending::of_search(status, Some(reason));
         }
     }
-    Ending { status: Status::Converged, reason: None }
+    Ending::of_search(Status::Converged, None)
 }

@@ -115,7 +115,7 @@ fn grouped(means: &[f64]) -> JobSpecification {
 fn each_group_is_identified_by_itself() {
     let means = [3800.0, 3900.0, 4000.0];
     let (search, told) = run(&grouped(&means));
-    assert_eq!(ending(&search), Ending { status: Status::Converged, reason: None });
+    assert_eq!(ending(&search), Ending::of_search(Status::Converged, None));
     let summary = search.summary();
     assert_eq!((summary.best, summary.groups.len()), (None, 3));
     for (k, (group, mean)) in summary.groups.iter().zip(means).enumerate() {
@@ -141,7 +141,7 @@ fn a_group_that_fails_leaves_the_others_what_they_have() {
     let mut few = grouped(&[3800.0, 3850.0]);
     few.search.max_evaluations = 2;
     let (search, _) = run(&few);
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::MaxEvaluations);
     let reason = reason.unwrap();
     assert!(reason.starts_with("the searches for 2 of 2 groups did not converge"), "{reason}");

@@ -11,13 +11,11 @@ use osteon_common::user_file;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, FROM_FORMAT_4, SCHEMA};
+use super::schema::SCHEMA;
 use crate::store::StoreError;
 
-/// Format that this program writes.
-pub(super) const FORMAT: i64 = 5;
-/// Oldest format that this program brings up to date.
-const FORMAT_OLDEST: i64 = 2;
+/// The one format that this program reads and writes.
+pub(super) const FORMAT: i64 = 6;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the file that says who has the store open.
@@ -107,7 +105,7 @@ fn mode(path: &Path) -> io::Result<u32> {
     Ok(fs::metadata(path)?.permissions().mode())
 }
 
-/// Opens the file, brings it up to date and sets its modes.
+/// Opens the file and sets its modes.
 pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, StoreError> {
     let refused = |source| refusal(path, source);
     let mut connection = Connection::open(path).map_err(refused)?;
@@ -127,7 +125,7 @@ pub(super) fn checkpoint_at_end(connection: &Connection) -> rusqlite::Result<()>
     connection.set_db_config(NO_CHECKPOINT_AT_END, false).map(drop)
 }
 
-/// Refuses what this program did not write, or cannot bring up to date.
+/// Refuses what this program did not write.
 fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     let refused = |source| refusal(path, source);
     let sql = "SELECT count(*), coalesce(sum(name = 'format'), 0) FROM sqlite_schema
@@ -144,13 +142,10 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
-    let path = path.to_owned();
-    if found < FORMAT_OLDEST {
-        Err(StoreError::Older { path, found, known: FORMAT })
-    } else if found > FORMAT {
-        Err(StoreError::Newer { path, found, known: FORMAT })
-    } else {
+    if found == FORMAT {
         Ok(())
+    } else {
+        Err(StoreError::Format { path: path.to_owned(), found, known: FORMAT })
     }
 }
 
@@ -168,7 +163,7 @@ fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     Err(StoreError::Inconsistent { path: path.to_owned(), found })
 }
 
-/// Sets the modes, makes the tables of a new file, and brings those of an old one up to date.
+/// Sets the modes, and makes the tables of a new file.
 fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()> {
     // Counts for a new file only: removed records give their room back.
     connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
@@ -189,13 +184,6 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute_batch("CREATE TABLE format (version INTEGER NOT NULL)")?;
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
-    }
-    for (format, change) in [(2, FROM_FORMAT_2), (3, FROM_FORMAT_3), (4, FROM_FORMAT_4)] {
-        let found: i64 =
-            transaction.query_row("SELECT version FROM format", [], |row| row.get(0))?;
-        if found == format {
-            transaction.execute_batch(change)?;
-        }
     }
     transaction.commit()
 }
