@@ -23,9 +23,7 @@ const KEPT: &str = "regressions";
 
 /// Declares tests, each of a property that holds for whatever its strategies make.
 ///
-/// ```
-/// # use osteon_fuzz::properties;
-/// # use proptest::prelude::*;
+/// ```text
 /// properties! {
 ///     #![cases(1000)]
 ///
