@@ -7,7 +7,6 @@
     clippy::panic,
     reason = "a test that cannot go on fails"
 )]
-#![expect(clippy::print_stdout, reason = "what is measured tells how near the bounds are")]
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod clockwork;
