@@ -7,7 +7,6 @@
     clippy::panic,
     reason = "a test that cannot go on fails"
 )]
-#![expect(clippy::print_stdout, reason = "what is measured tells how near the bounds are")]
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod clockwork;
@@ -30,24 +29,27 @@ const SOON: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 struct Run {
     time: Duration,
-    sent: u64,
     swallowed: u64,
 }
 
-/// Runs a job over `sound` workers of two threads; before each of them attaches one that does not
-/// answer one in `n` of its batches, if there is such an `n`.
-fn run(sound: usize, swallow: Option<u64>, audit_fraction: f64, job: &JobSpecification) -> Run {
+/// Runs a job over `sound` workers of two threads; before them attach so many that do not answer one
+/// in `n` of their batches.
+fn run(
+    sound: usize,
+    (faulty, n): (usize, u64),
+    audit_fraction: f64,
+    job: &JobSpecification,
+) -> Run {
     let config = Config { audit_fraction, ..Config::default() };
-    let faulty = if swallow.is_some() { sound } else { 0 };
     let mut clockwork =
         Clockwork::with(&vec![2; faulty + sound], Times::Equal, REALIZATION, config);
     for worker in 1..=faulty as u64 {
-        clockwork.swallow(worker, swallow.unwrap());
+        clockwork.swallow(worker, n);
     }
     let ended = clockwork.run(std::slice::from_ref(job));
     // As text: an unknown standard error is NaN, which equals nothing.
     assert_eq!(format!("{:?}", ended[0].result), format!("{:?}", fake::plain_run(job)));
-    Run { time: ended[0].at, sent: clockwork.sent, swallowed: clockwork.swallowed }
+    Run { time: ended[0].at, swallowed: clockwork.swallowed }
 }
 
 fn jobs() -> [JobSpecification; 3] {
@@ -63,13 +65,18 @@ fn workers_that_never_answer_cost_seconds() {
     for job in jobs() {
         for sound in [1, 2, 4] {
             for audit_fraction in [0.0, 0.01, 1.0] {
-                let undisturbed = run(sound, None, audit_fraction, &job);
-                let disturbed = run(sound, Some(1), audit_fraction, &job);
-                println!("{sound} sound, audits {audit_fraction}: {undisturbed:?}, {disturbed:?}");
-                assert!(disturbed.swallowed >= 2 * sound as u64, "{disturbed:?}");
-                // Each misses three, and then one now and then.
-                let delay = disturbed.time.saturating_sub(undisturbed.time);
-                assert!(delay < 8 * (OVERDUE + SOON), "{delay:?}");
+                let undisturbed = run(sound, (0, 1), audit_fraction, &job);
+                for faulty in [1, 4] {
+                    let disturbed = run(sound, (faulty, 1), audit_fraction, &job);
+                    println!(
+                        "{faulty} of {sound} more, audits {audit_fraction}: {undisturbed:?}, \
+                         {disturbed:?}"
+                    );
+                    assert!(disturbed.swallowed >= 2 * faulty as u64, "{disturbed:?}");
+                    // Each misses three, and then one now and then.
+                    let delay = disturbed.time.saturating_sub(undisturbed.time);
+                    assert!(delay < 8 * (OVERDUE + SOON), "{delay:?}");
+                }
             }
         }
     }
@@ -80,8 +87,8 @@ fn each_batch_that_is_not_answered_costs_seconds() {
     for job in jobs() {
         for sound in [1, 2, 4] {
             for audit_fraction in [0.0, 0.3] {
-                let undisturbed = run(sound, None, audit_fraction, &job);
-                let disturbed = run(sound, Some(7), audit_fraction, &job);
+                let undisturbed = run(sound, (0, 1), audit_fraction, &job);
+                let disturbed = run(sound, (sound, 7), audit_fraction, &job);
                 println!("{sound} sound, audits {audit_fraction}: {undisturbed:?}, {disturbed:?}");
                 assert!(disturbed.swallowed > 0, "{disturbed:?}");
                 let delay = disturbed.time.saturating_sub(undisturbed.time);

@@ -108,14 +108,15 @@ fn accuse(state: &mut State, id: BatchId, now: Duration) {
     }
 }
 
-/// Takes back an audit that is overdue when nobody else is there for it: an answer that nobody
-/// checks is believed.
+/// Takes back an audit that two workers did not answer in time, or one where nobody else is there for
+/// it who holds nothing overdue: an answer that nobody checks is believed.
 fn give_up_audit(state: &mut State, id: BatchId, now: Duration, effects: &mut Effects) {
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
     let audit = matches!(batch.purpose, Purpose::Audit { .. });
-    if !audit || state.answers_batches(|name| may_have(state, id, name)) {
+    let other = || state.workers.values().any(|worker| is_fit(state, id, worker, now));
+    if !audit || (batch.retries == 0 && other()) {
         return;
     }
     let mut given_up = batch.twins.clone();
@@ -153,7 +154,8 @@ pub(super) fn hand_out(
         {
             continue;
         }
-        let Some(taker) = (if alone { taker_alone(state, id) } else { taker(state, id, &free) })
+        let Some(taker) =
+            (if alone { taker_alone(state, id, now) } else { taker(state, id, &free, now) })
         else {
             continue;
         };
@@ -178,18 +180,18 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 }
 
 /// The one of these workers that is to have a copy of a batch.
-fn taker(state: &State, id: BatchId, free: &[WorkerId]) -> Option<WorkerId> {
+fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
     let rank = |(worker, taker): &(&Worker, WorkerId)| {
         let doubtful = worker.missed.count > 0 || !worker.proven;
         (doubtful, is_of_holder(state, id, worker), dispatch::held(state, worker), *taker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
-    let fit = free.filter(|(worker, _)| is_fit(state, id, worker));
+    let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
     fit.min_by_key(rank).map(|(_, taker)| taker)
 }
 
 /// The worker that is to have a copy of a suspect, be it busy or not.
-fn taker_alone(state: &State, id: BatchId) -> Option<WorkerId> {
+fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let batch = state.batches.get(&id)?;
     let losses = attempt(state, batch)?.suspects.get(&batch.assignment.indices.first);
     let nobody = Losses::default();
@@ -201,13 +203,16 @@ fn taker_alone(state: &State, id: BatchId) -> Option<WorkerId> {
         let standing = suspects::standing(state, worker, losses);
         (standing, is_of_holder(state, id, worker), dispatch::held(state, worker), **taker)
     };
-    let fit = |worker: &Worker| is_fit(state, id, worker) && !state.is_failing(worker.name.host());
+    let fit =
+        |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
     fit.min_by_key(rank).map(|(taker, _)| *taker)
 }
 
-fn is_fit(state: &State, id: BatchId, worker: &Worker) -> bool {
-    state.is_sound(worker) && may_have(state, id, &worker.name)
+/// Whether a worker is to have a copy of a batch: it may, and leaves nothing unanswered itself.
+fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
+    let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
+    state.is_sound(worker) && may_have(state, id, &worker.name) && !late()
 }
 
 /// The names of the workers that hold a batch and its copies.

@@ -98,6 +98,38 @@ fn an_overdue_audit_that_nobody_else_may_do_is_given_up() {
 }
 
 #[test]
+fn audits_do_not_wait_for_workers_that_do_not_answer_each_other() {
+    let mut rig = rig(100, 3, 1.0);
+    // Workers 2 and 3 hold as much as they may, and answer nothing; worker 1 answers all.
+    for _ in 0..100 {
+        let held = rig.state.workers[&WorkerId(1)].in_flight.clone();
+        for id in held {
+            let Indices { first, count } = rig.state.batches[&id].assignment.indices;
+            rig.event(answer_in(1e-3, 1, id.0, first, count));
+        }
+        let Stage::Computing(_) = rig.state.jobs[&JobId(1)].stage else {
+            assert!(rig.now < 10 * SECOND, "{:?}", rig.now);
+            return;
+        };
+        rig.live(SECOND / 10);
+    }
+    panic!("audits are waited for: {:?}", rig.state.batches);
+}
+
+#[test]
+fn an_audit_that_two_workers_do_not_answer_is_given_up() {
+    let mut rig = rig(1, 2, 1.0);
+    rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
+    for worker in 3..=4 {
+        rig.event(on_its_own(worker));
+    }
+    assert_eq!(rig.live(OVERDUE), ["send 3: batch 3 = 0+1"]);
+    assert_eq!(rig.live(2 * OVERDUE - SECOND / 10), [""; 0]);
+    let expected = ["revoke 2: batch 2", "revoke 3: batch 3", "store job 1 evaluation 0"];
+    assert_eq!(rig.live(SECOND / 10), expected);
+}
+
+#[test]
 fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
     let mut rig = rig(1, 3, 1.0);
     rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
