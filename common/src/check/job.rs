@@ -228,7 +228,8 @@ fn impossible(
     ascending.sort_unstable_by(f64::total_cmp);
     let median = quantile(&ascending, 0.5).unwrap_or(f64::NAN);
     if let Some(refusal) = no_velocity(median) {
-        let question = plausible::VELOCITY.question(&[median], VELOCITY);
+        let rounded = short(median).parse().unwrap_or(median);
+        let question = plausible::VELOCITY.question(&[rounded], VELOCITY);
         let asked_for = plausible::VELOCITY.asked_for();
         let refusal = question
             .map_or(refusal, |question| format!("is {}; {asked_for}: {question}", short(median)));
