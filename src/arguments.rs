@@ -148,7 +148,7 @@ pub(crate) struct CoordinatorArguments {
     /// Forget ended jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
-    /// Go on with a store that has lost jobs which it had accepted; without this it is refused
+    /// Go on with a store that has lost accepted jobs; else it is refused
     #[arg(long)]
     pub(crate) accept_lost_jobs: bool,
     /// Give what a worker holds to others when nothing was heard of it for so long, s, 1 to 3600;

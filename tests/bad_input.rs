@@ -1,6 +1,8 @@
 //! Bad input: exit code 2, a message that names the field or the file and line, nothing on
 //! stdout, nothing written.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;

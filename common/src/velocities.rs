@@ -225,7 +225,8 @@ impl<R: BufRead> Lines<R> {
             if self.bytes.len() > limits::LINE_BYTES_MAX {
                 return Err((Some(self.number), Problem::LongLine));
             }
-            // Looked at as bytes first: a line that is kept must not be borrowed in a loop.
+            // Checked here and borrowed after the loop: a borrow that is returned would last for
+            // all of its rounds.
             let text = str::from_utf8(&self.bytes);
             let text = text.map_err(|_| (Some(self.number), Problem::NotUtf8))?;
             let begin = without_byte_order_mark(text).trim_start();

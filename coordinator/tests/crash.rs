@@ -212,10 +212,10 @@ fn a_log_that_was_cut_anywhere_loses_no_job_in_silence() {
     let (_directory, _store, images) = lives_of_a_store();
     let (acknowledged, whole) = images.last().unwrap();
     let length = part(&mut whole.clone(), LOG).len();
-    assert!(length > 20_000, "{length}");
+    assert!(length > 10_000, "{length}");
     opened(whole, LostJobs::Refuse).1.unwrap();
     let mut refused = 0;
-    for at in (0..length).step_by(509) {
+    for at in (1..length).step_by(509) {
         for cut in [true, false] {
             let mut image = whole.clone();
             let log = part(&mut image, LOG);

@@ -73,12 +73,14 @@ impl SqliteStore {
     /// # Errors
     /// As [`open`](Self::open); missing jobs that are accepted are none.
     pub fn open_with(directory: &Path, lost: LostJobs) -> Result<Self, StoreError> {
-        let (connection, lock, path) = opening::open(directory)?;
-        let known = last_known(&connection).map_err(|source| opening::refusal(&path, source))?;
-        let found = Mark::find(directory)?;
-        let last = acknowledged::checked(&found, known, &path, lost)?;
-        opening::checkpoint_at_end(&connection)
-            .map_err(|source| opening::refusal(&path, source))?;
+        let acknowledged = |connection: &Connection, path: &Path| {
+            let known = last_known(connection).map_err(|source| opening::refusal(path, source))?;
+            let found = Mark::find(directory)?;
+            let last = acknowledged::checked(&found, known, path, lost)?;
+            Ok((found, known, last))
+        };
+        let (connection, lock, path, (found, known, last)) =
+            opening::open(directory, acknowledged)?;
         if last > known {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
@@ -430,8 +432,11 @@ impl Store for SqliteStore {
 
 /// The highest identifier that the database knows, be it of a job that was forgotten; 0: none.
 fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
-    let stored: Option<u64> =
-        connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?;
+    let stored: Option<u64> = if connection.table_exists(None, "job")? {
+        connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?
+    } else {
+        None
+    };
     let forgotten: i32 = connection.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
     Ok(stored.unwrap_or(0).max(u64::try_from(forgotten).unwrap_or(0)))
 }

@@ -25,9 +25,6 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest text of a lock that is shown, bytes.
 const HOLDER_BYTES_MAX: u64 = 256;
 
-/// While this is set a connection leaves the log as it is when it ends.
-const NO_CHECKPOINT_AT_END: DbConfig = DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE;
-
 /// Mode of a new directory, and of a new file: measurements are nobody else's business.
 const DIRECTORY_MODE: u32 = 0o700;
 pub(super) const FILE_MODE: u32 = 0o600;
@@ -43,8 +40,12 @@ pub(super) enum Journal {
     Rollback,
 }
 
-/// Opens the file in `directory`, making both if need be; the lock is held as long as the file.
-pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), StoreError> {
+/// Opens the file in `directory`, making both if need be; the lock is held as long as the file. What
+/// `accept` says of it, before anything in it is changed.
+pub(super) fn open<T>(
+    directory: &Path,
+    accept: impl FnOnce(&Connection, &Path) -> Result<T, StoreError>,
+) -> Result<(Connection, File, PathBuf, T), StoreError> {
     make_directory(directory)
         .map_err(|error| StoreError::Directory { path: directory.to_owned(), error })?;
     let path = directory.join(FILE);
@@ -59,8 +60,8 @@ pub(super) fn open(directory: &Path) -> Result<(Connection, File, PathBuf), Stor
              make sure that no coordinator of another machine uses it; a local disk is safer and \
              faster");
     }
-    let connection = open_file(&path, journal)?;
-    Ok((connection, lock, path))
+    let (connection, accepted) = open_file(&path, journal, accept)?;
+    Ok((connection, lock, path, accepted))
 }
 
 /// Makes a directory that only this user can enter, and those on the way to it; one that is there
@@ -106,23 +107,37 @@ fn mode(path: &Path) -> io::Result<u32> {
 }
 
 /// Opens the file and sets its modes.
-pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, StoreError> {
+pub(super) fn open_file<T>(
+    path: &Path,
+    journal: Journal,
+    accept: impl FnOnce(&Connection, &Path) -> Result<T, StoreError>,
+) -> Result<(Connection, T), StoreError> {
     let refused = |source| refusal(path, source);
     let mut connection = Connection::open(path).map_err(refused)?;
     connection.busy_timeout(BUSY_TIMEOUT).map_err(refused)?;
-    // What is refused stays as it is: of a log that is cut, too, somebody may want to see the rest.
-    connection.set_db_config(NO_CHECKPOINT_AT_END, true).map_err(refused)?;
     // Before all else: then the write-ahead log needs no memory shared with others.
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
     check_format(&connection, path)?;
     check_pages(&connection, path)?;
+    let accepted = match accept(&connection, path) {
+        Ok(accepted) => accepted,
+        Err(refusal) => {
+            leave_log(&connection, path).map_err(refused)?;
+            return Err(refusal);
+        }
+    };
     prepare(&mut connection, journal).map_err(refused)?;
-    Ok(connection)
+    Ok((connection, accepted))
 }
 
-/// From now on the file is complete, and the log gone, when the connection ends.
-pub(super) fn checkpoint_at_end(connection: &Connection) -> rusqlite::Result<()> {
-    connection.set_db_config(NO_CHECKPOINT_AT_END, false).map(drop)
+/// Leaves the log as it is when the connection ends: somebody may want to see the rest of one that is
+/// cut. Without a log there is none to be left.
+fn leave_log(connection: &Connection, path: &Path) -> rusqlite::Result<()> {
+    let log = path.with_extension("sqlite-wal");
+    if fs::metadata(log).is_ok_and(|log| log.len() > 0) {
+        connection.set_db_config(DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, true)?;
+    }
+    Ok(())
 }
 
 /// Refuses what this program did not write.

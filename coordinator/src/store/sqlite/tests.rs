@@ -321,7 +321,7 @@ fn with_a_rollback_journal_everything_is_the_same() {
     let path = store.path.clone();
     drop(store);
     // A file that was made with a write-ahead log, and moved.
-    let connection = open_file(&path, Journal::Rollback).unwrap();
+    let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
