@@ -178,7 +178,7 @@ async fn drive(
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }
-    let mut progress = Progress::start();
+    let mut progress = Progress::start(specification);
     client
         .watch(&job, |snapshot| {
             note(snapshot);
