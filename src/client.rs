@@ -18,10 +18,14 @@ use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::{Code, Response, Status};
 
+use crate::progress::say;
 use crate::request::Request;
+use crate::resolved::VARIABLE;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
+/// After this long without a coordinator the user is told that it is looked for, s.
+const SILENCE_S_MAX: u64 = 1;
 /// Wait between two attempts to find a coordinator again, ms.
 const RETRY_MS: u64 = 250;
 /// Most pages of jobs that a list may have: each holds up to 1000.
@@ -59,10 +63,10 @@ pub(crate) enum ClientError {
         reason: String,
     },
     /// It refuses the specification.
-    #[error("the coordinator refuses the job:{}", indented(.0))]
+    #[error("{}", counted(.0))]
     Violations(Violations),
     /// It refuses the request.
-    #[error("the coordinator at {endpoint} refuses: {reason}")]
+    #[error("{reason} (coordinator {endpoint})")]
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -83,7 +87,7 @@ pub(crate) enum ClientError {
         request_id: String,
     },
     /// It sent what cannot be read.
-    #[error("the coordinator at {endpoint} answers what cannot be read: {source}")]
+    #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -105,8 +109,11 @@ impl ClientError {
     }
 }
 
-fn indented(violations: &Violations) -> String {
-    violations.iter().map(|violation| format!("\n  {violation}")).collect()
+fn counted(violations: &Violations) -> String {
+    let lines: Vec<String> =
+        violations.iter().map(|violation| format!("\n  {violation}")).collect();
+    let errors = if lines.len() == 1 { "error" } else { "errors" };
+    format!("the coordinator rejected the job: {} {errors}{}", lines.len(), lines.concat())
 }
 
 /// Everything that an ended job left.
@@ -127,6 +134,17 @@ pub(crate) struct Remote {
     pub(crate) endpoint: Endpoint,
     /// Files of certificates and a token.
     pub(crate) files: CredentialFiles,
+    /// Whether the environment names it, and not the command line.
+    pub(crate) from_environment: bool,
+}
+
+impl Remote {
+    /// Says where the work is done, unless the command line says it.
+    pub(crate) fn tell(&self) {
+        if self.from_environment {
+            say(&format!("running on {} ({VARIABLE})", self.endpoint));
+        }
+    }
 }
 
 /// A connection to a coordinator.
@@ -140,12 +158,27 @@ impl Client {
     /// Reads the credentials and connects to the coordinator; one that is not there may be about to
     /// come.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
-        let Remote { endpoint, files } = remote;
+        let Remote { endpoint, files, .. } = remote;
         let credentials = Credentials::load(files, endpoint)?;
+        let found = Self::find(endpoint, &credentials);
+        let told = async {
+            sleep(Duration::from_secs(SILENCE_S_MAX)).await;
+            let left = ANSWER_S_MAX - SILENCE_S_MAX;
+            say(&format!("cannot reach {endpoint}; trying for {left} more seconds"));
+            std::future::pending().await
+        };
+        tokio::select! {
+            found = found => found,
+            never = told => never,
+        }
+    }
+
+    /// The connection, as soon as there is one.
+    async fn find(endpoint: &Endpoint, credentials: &Credentials) -> Result<Self, ClientError> {
         let begun = Instant::now();
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
-            let error = match endpoint::connect_with(endpoint, &credentials, left).await {
+            let error = match endpoint::connect_with(endpoint, credentials, left).await {
                 Ok(connection) => {
                     let jobs = endpoint::jobs_client(connection);
                     return Ok(Self { endpoint: endpoint.clone(), jobs });

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 
 use crate::ending::Failure;
 
@@ -38,7 +38,8 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
                 // The first error is the one to tell.
                 drop(fs::remove_file(&earlier.path));
             }
-            return Err(Failure::Failed(error));
+            let context = format!("cannot write {}", file.path.display());
+            return Err(Failure::unusable_path(error, context));
         }
     }
     Ok(())
@@ -50,8 +51,9 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 /// When it cannot be made.
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
-    made.with_context(|| format!("cannot create the directory {}", path.display()))
-        .map_err(Failure::Failed)
+    made.map_err(|error| {
+        Failure::unusable_path(error, format!("cannot create the directory {}", path.display()))
+    })
 }
 
 /// Adds a line to a secret file, which is made if need be.
@@ -67,22 +69,20 @@ pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
-    write().with_context(|| format!("cannot add to {}", path.display())).map_err(Failure::Failed)
+    write()
+        .map_err(|error| Failure::unusable_path(error, format!("cannot add to {}", path.display())))
 }
 
-fn write(file: &NewFile) -> anyhow::Result<()> {
+fn write(file: &NewFile) -> std::io::Result<()> {
     let mode = if file.secret { 0o600 } else { 0o644 };
-    let write = || -> std::io::Result<()> {
-        let mut options = OpenOptions::new();
-        let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
-        let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
-        if written.is_err() {
-            // Half a file is none.
-            drop(fs::remove_file(&file.path));
-        }
-        written
-    };
-    write().with_context(|| format!("cannot write {}", file.path.display()))
+    let mut options = OpenOptions::new();
+    let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
+    let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
+    if written.is_err() {
+        // Half a file is none.
+        drop(fs::remove_file(&file.path));
+    }
+    written
 }
 
 /// Whether a line can be added behind the last byte.

@@ -155,7 +155,7 @@ pub enum Answer {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Refusal {
     /// There is no such job.
-    #[error("there is no job {job}; `osteon jobs` lists those there are")]
+    #[error("no such job: {job} (`osteon jobs` lists all jobs)")]
     NoJob {
         /// The job asked for.
         job: JobId,

@@ -270,7 +270,7 @@ fn job(text: &str) -> Result<JobId, Status> {
         return Err(too_long("job", text));
     }
     JobId::parse(text).ok_or_else(|| {
-        let message = format!("there is no job `{text}`; `osteon jobs` lists those there are");
+        let message = format!("no such job: `{text}` (`osteon jobs` lists all jobs)");
         status::no_job(text, message)
     })
 }

@@ -38,15 +38,15 @@ pub enum CredentialError {
         source: io::Error,
     },
     /// It is no such file at all.
-    #[error("{} has more than {max} bytes, and is no file of certificates, keys or tokens", path.display())]
+    #[error("{} has more than {max} bytes, so it is not a file of certificates, keys or tokens", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
         /// Most bytes.
         max: u64,
     },
-    /// It holds bytes that are no text.
-    #[error("{} holds bytes that are no text", path.display())]
+    /// It is not a text file.
+    #[error("{} is not a text file", path.display())]
     NoText {
         /// The file.
         path: PathBuf,
@@ -72,7 +72,7 @@ pub enum CredentialError {
         mode: u32,
     },
     /// It is damaged.
-    #[error("{} is no PEM file: {fault}", path.display())]
+    #[error("{} is not a valid PEM file: {fault}", path.display())]
     Pem {
         /// The file.
         path: PathBuf,
@@ -137,7 +137,7 @@ pub enum CredentialError {
         source: webpki::Error,
     },
     /// The certificate cannot be an authority's.
-    #[error("the certificate in {} is no authority's: {source}", path.display())]
+    #[error("the certificate in {} is not a certificate authority's: {source}", path.display())]
     Root {
         /// The file.
         path: PathBuf,

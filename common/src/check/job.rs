@@ -112,7 +112,7 @@ fn groups(groups: &[Group], violations: &mut Violations) {
             let most = limits::NAME_BYTES_MAX;
             violations.add(
                 &field,
-                format!("is no name of a group: it must have 1 to {most} bytes, none of them a control character"),
+                format!("is not a valid group name: it must have 1 to {most} bytes, none of them a control character"),
             );
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");
@@ -135,7 +135,7 @@ fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
         measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
     for (refusals, (index, &velocity)) in refused.enumerate() {
         if refusals == REFUSED_MAX {
-            violations.add(field, "has more velocities to refuse, not listed here");
+            violations.add_more(field, "more velocities out of range are not listed");
             return;
         }
         violations.add(element_path(field, index), VELOCITY.refusal(velocity));
@@ -144,8 +144,9 @@ fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
         return;
     }
     if count < VELOCITIES_MIN {
+        let contains = if count == 0 { "no velocity" } else { "only one velocity" };
         violations
-            .add(field, format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"));
+            .add(field, format!("contains {contains}; {MOMENTS_NEED} at least two velocities"));
     } else if measured.iter().all(|velocity| velocity == &measured[0]) {
         let velocity = measured[0];
         violations.add(
