@@ -54,8 +54,8 @@ pub(crate) enum ClientError {
         /// What the transport says.
         reason: String,
     },
-    /// It says that it cannot do it now.
-    #[error("the coordinator at {endpoint} cannot do it now: {reason}")]
+    /// It cannot do it now.
+    #[error("the coordinator at {endpoint} is unavailable: {reason}")]
     Unavailable {
         /// Address of the coordinator.
         endpoint: Endpoint,

@@ -267,6 +267,7 @@ fn a_command_that_a_signal_ends_has_its_code() {
         (&["identify", job] as &[&str], "no results were saved"),
         (&["propagate", job], "no results were saved"),
         (&["simulate", case], "no results were saved"),
+        (&["identify", job, "--coordinator", &silent], "no job was submitted"),
         (&["watch", "1", "--coordinator", &silent], "goes on with the job"),
         (&["submit", job, "--coordinator", &silent], "may be accepted all the same"),
         (&["fetch", "1", "--out", text(&out), "--coordinator", &silent], "to fetch the results"),

@@ -17,7 +17,7 @@ fn an_answer_is_told_from_a_loss() {
     let endpoint: Endpoint = "unix:a".parse().unwrap();
     let shown = |status: &Status| refused(&endpoint, status).to_string();
     let answered = Status::unavailable("the store is full");
-    assert_eq!(shown(&answered), "the coordinator at unix:a cannot do it now: the store is full");
+    assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
     for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
         broken.set_source(Arc::new(std::io::Error::other("reset")));
         assert_eq!(shown(&broken), "lost the coordinator at unix:a: reset");

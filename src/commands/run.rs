@@ -1,5 +1,6 @@
 //! `identify` and `propagate`: a job from its file to its result.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -28,11 +29,17 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
         return show(&run, &specification, &json);
     }
     if let Some(reason) = failed_before(&run, &specification)? {
-        say(&format!("the last run there failed and is run again: {reason}"));
+        say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
-    let interruption = signals::interruption()?;
+    let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.
-    let computers = Computers::find(&run.place).await?;
+    let computers = tokio::select! {
+        biased;
+        found = Computers::find(&run.place) => found?,
+        interruption = interruption.as_mut() => {
+            return Err(Failure::Interrupted(interruption, "no job was submitted"));
+        }
+    };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
     // Another run may have ended between the look and the lock.
     if let Some(json) = finished(&run, &specification)? {

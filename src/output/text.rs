@@ -13,11 +13,14 @@ use std::io::{self, Write};
 
 use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
-use self::layout::{INDENT, WIDTH, aligned, wrapped};
+use self::layout::{INDENT, WIDTH, aligned, glued, wrapped};
 use self::number::{VELOCITY_DIGITS, digits, significant};
 use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::client;
 use crate::progress::{Observed, line, span};
+
+/// Columns of the time before a line of `watch`.
+const TIME_WIDTH: usize = 9;
 
 /// Output for people.
 pub(crate) struct TextOutput<'a> {
@@ -69,8 +72,8 @@ impl Output for TextOutput<'_> {
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
-        let time = format!("{:>7}  ", span(snapshot.elapsed_s));
-        let progress = progress(snapshot, WIDTH - time.len());
+        let time = glued(&format!("{:>7}  ", span(snapshot.elapsed_s)));
+        let progress = progress(snapshot, WIDTH - TIME_WIDTH);
         let text = match (snapshot.state(), progress.as_str()) {
             (JobState::Running, progress) if !progress.is_empty() => progress.to_owned(),
             (_, "") => state(snapshot).to_owned(),

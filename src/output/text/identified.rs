@@ -30,6 +30,7 @@ pub(super) fn text(value: &Value) -> String {
     }
     text.push_str(&solutions(value));
     if let Some(from) = value["search"]["below_noise_from"].as_u64() {
+        text.push('\n');
         text.push_str(&wrapped(&format!(
             "After evaluation {from} all further improvement was below the sampling noise."
         )));

@@ -50,10 +50,11 @@ fn a_search_shows_what_the_width_allows() {
     check(80, ["evaluation 42 of at most 400 + 7, 1000 realizations/s, up to 17 min left", best]);
     let all = "evaluation 42 of at most 400 + 7 for derivatives, 1000 realizations/s, up to 17 min left \
                if all evaluations are used";
+    check(120, [all, best]);
     check(200, [all, best]);
     let most = "evaluation 42 of at most 400 + 7, 1000 realizations/s, up to 17 min left \
                 if all evaluations are used";
-    check(120, [most, best]);
+    check(110, [most, best]);
 }
 
 /// The largest numbers that a job can have.
