@@ -1,5 +1,6 @@
 //! A client of the service of jobs: every wait has an end, every error names the coordinator.
 
+use std::pin::pin;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
@@ -160,17 +161,9 @@ impl Client {
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
         let Remote { endpoint, files, .. } = remote;
         let credentials = Credentials::load(files, endpoint)?;
-        let found = Self::find(endpoint, &credentials);
-        let told = async {
-            sleep(Duration::from_secs(SILENCE_S_MAX)).await;
-            let left = ANSWER_S_MAX - SILENCE_S_MAX;
-            say(&format!("cannot reach {endpoint}; trying for {left} more seconds"));
-            std::future::pending().await
-        };
-        tokio::select! {
-            found = found => found,
-            never = told => never,
-        }
+        let left = ANSWER_S_MAX - SILENCE_S_MAX;
+        let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
+        unless_silent(Self::find(endpoint, &credentials), notice).await
     }
 
     /// The connection, as soon as there is one.
@@ -370,6 +363,18 @@ pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     results::status_from_message(snapshot.status).ok().flatten()
 }
 
+/// What `call` gives; after a moment without it the user is told what is waited for.
+async fn unless_silent<T>(call: impl Future<Output = T>, notice: impl Fn() -> String) -> T {
+    let mut call = pin!(call);
+    match timeout(Duration::from_secs(SILENCE_S_MAX), call.as_mut()).await {
+        Ok(answer) => answer,
+        Err(_) => {
+            say(&notice());
+            call.await
+        }
+    }
+}
+
 fn answer_limit() -> Duration {
     Duration::from_secs(ANSWER_S_MAX)
 }
@@ -386,7 +391,11 @@ async fn answered_within<T>(
     limit: Duration,
     call: impl Future<Output = Result<Response<T>, Status>>,
 ) -> Result<T, ClientError> {
-    match timeout(limit, call).await {
+    let notice = || {
+        let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
+        format!("no answer from {endpoint} yet; waiting for {left:.0} more seconds")
+    };
+    match unless_silent(timeout(limit, call), notice).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(refused(endpoint, &status)),
         Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),

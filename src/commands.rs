@@ -50,7 +50,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
             unless_interrupted(jobs::list(&coordinator, format), NOTHING_LEFT).await
         }
         Resolved::Watch { job, coordinator } => {
-            let left = "the coordinator goes on with the job (see `osteon jobs`, `osteon cancel`)";
+            let left = "the job goes on (see `osteon jobs`, `osteon cancel`)";
             unless_interrupted(jobs::watch(&job, &coordinator), left).await
         }
         Resolved::Cancel { job, coordinator } => {

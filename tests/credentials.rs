@@ -118,7 +118,7 @@ fn token_writes_the_token_once_and_shows_only_its_hash() {
     let refused = make("a b", &scratch.path("d.token"), &[]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let refused = make("dan", &scratch.path("d.token"), &["--tokens", "/nonexistent/tokens"]);
-    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(!scratch.path("d.token").exists());
 }
 

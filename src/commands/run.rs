@@ -165,7 +165,7 @@ async fn there(
         driven = drive(client, specification, directory, |_| {}) => driven,
         interruption = interruption => Err(Failure::Interrupted(
             interruption,
-            "the coordinator goes on with the job (see `osteon jobs`, `osteon cancel`)",
+            "a job that was accepted goes on (see `osteon jobs`, `osteon cancel`)",
         )),
     }
 }

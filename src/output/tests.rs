@@ -312,6 +312,14 @@ fn every_text_fits_a_terminal_of_80_columns() {
         failed[1].reason = "the searches for 3 of 9 groups failed; ".repeat(5);
         output.jobs(&failed, &[]).unwrap();
         failed.iter().for_each(|job| output.snapshot(job).unwrap());
+        let used_up = JobSnapshot {
+            state: JobState::Ended.into(),
+            status: JobStatus::MaxEvaluations.into(),
+            best_mean: Some(4034.9),
+            best_coefficient_of_variation: Some(0.02583),
+            ..failed[0].clone()
+        };
+        output.snapshot(&used_up).unwrap();
     });
     fits(&shown_jobs);
 }

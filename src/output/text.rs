@@ -73,11 +73,14 @@ impl Output for TextOutput<'_> {
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
         let time = glued(&format!("{:>7}  ", span(snapshot.elapsed_s)));
-        let progress = progress(snapshot, WIDTH - TIME_WIDTH);
-        let text = match (snapshot.state(), progress.as_str()) {
-            (JobState::Running, progress) if !progress.is_empty() => progress.to_owned(),
-            (_, "") => state(snapshot).to_owned(),
-            (_, progress) => format!("{}: {progress}", state(snapshot)),
+        // Who runs has an evaluation to show for it.
+        let state = match snapshot.state() {
+            JobState::Running => String::new(),
+            _ => format!("{}: ", state(snapshot)),
+        };
+        let text = match progress(snapshot, WIDTH - TIME_WIDTH - state.len()) {
+            progress if progress.is_empty() => state.trim_end_matches(": ").to_owned(),
+            progress => format!("{state}{progress}"),
         };
         self.verbatim(&wrapped(&format!("{time}{text}")))
     }
