@@ -251,6 +251,7 @@ fn identified(matched: bool) -> String {
     value["solutions"] = serde_json::json!({
         "matching": 2, "spread": { "parameters": spread }, "points": points });
     value["search"] = serde_json::json!({ "cost_tolerance": 1e-10, "below_noise_from": 17 });
+    value["sensitivities"] = serde_json::json!({ "density": {}, "dispersion": {} });
     value.to_string()
 }
 
@@ -279,11 +280,11 @@ fn intervals_without_the_datas_noise_are_called_too_narrow() {
 fn a_model_that_misses_the_data_says_by_how_much_and_where() {
     let miss = |json: &str| {
         let json = json.replace("3905.9104", "3925.4").replace("1598.8", "2000.0");
-        let json = json.replace("3.21e-11", "2.5e-5");
+        let json = json.replace("3.21e-11", "2.5e-5").replace("0.02711004", "0.0678");
         let text = unwrapped(&shown(JobKind::Identification, &THREE, &json));
         let expected = "The model does not fit the data, so no intervals can be given. Its mean \
-                        velocity is 0.50 % above that of the data, its coefficient of variation \
-                        0.00015 % above. On their bounds: density (upper).";
+                        velocity is 0.50 % above the data's, its coefficient of variation 2.5 times \
+                        the data's. On their bounds: density (upper).";
         assert!(text.contains(expected), "{text}");
         for absent in ["determine", "constrained", "fit equally", "confidence", "starts"] {
             assert!(!text.contains(absent), "{absent}: {text}");

@@ -57,13 +57,18 @@ fn difference(value: &Value, key: &str) -> Option<f64> {
 pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecification) -> String {
     let off = |key: &str| {
         let difference = difference(value, key)?;
+        // Of other units than the model's, say.
+        if !(-0.5..=1.0).contains(&difference) {
+            return Some(format!("{} times the data's", digits(1.0 + difference, 2)));
+        }
         let side = if difference < 0.0 { "below" } else { "above" };
-        Some(format!("{} {side}", glued(&format!("{} %", digits(100.0 * difference.abs(), 2)))))
+        let percent = glued(&format!("{} %", digits(100.0 * difference.abs(), 2)));
+        Some(format!("{percent} {side} the data's"))
     };
     let mut text = "The model does not fit the data, so no intervals can be given.".to_owned();
     if let (Some(mean), Some(variation)) = (off("mean"), off("coefficient_of_variation")) {
         text.push_str(&format!(
-            " Its mean velocity is {mean} that of the data, its coefficient of variation {variation}."
+            " Its mean velocity is {mean}, its coefficient of variation {variation}."
         ));
     }
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(point);
@@ -73,7 +78,7 @@ pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecificat
     });
     let on_bounds: Vec<String> = on_bounds.collect();
     if on_bounds.is_empty() {
-        text.push_str(" No parameter lies on its bounds.");
+        text.push_str(" No parameter lies on a bound.");
     } else {
         text.push_str(&format!(" On their bounds: {}.", on_bounds.join(", ")));
     }

@@ -26,7 +26,7 @@ pub(super) fn text(value: &Value) -> String {
             wrapped(&heading(identified)),
             aligned(&rows(identified))
         ));
-        text.push_str(&condition(identified));
+        text.push_str(&condition(value));
     }
     text.push_str(&solutions(value));
     if let Some(from) = value["search"]["below_noise_from"].as_u64() {
@@ -104,13 +104,17 @@ fn leaves_free(identified: &Value) -> bool {
 }
 
 /// What the intervals do not say.
-fn condition(identified: &Value) -> String {
-    if !leaves_free(identified) {
+fn condition(value: &Value) -> String {
+    if !leaves_free(&value["identified"]) {
         return String::new();
     }
+    let how_far = match value["solutions"]["matching"].as_u64() {
+        Some(2..) => "the ranges below show how far",
+        _ => "`[search] starts` shows how far",
+    };
     wrapped(&format!(
         "These intervals hold the other parameters as found. In other parameter sets that fit, \
-         {SPEED} may lie outside its interval; `[search] starts` shows how far."
+         {SPEED} may lie outside its interval; {how_far}."
     ))
 }
 

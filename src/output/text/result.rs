@@ -39,7 +39,10 @@ fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     let specification = shown.specification;
     text.push_str(&headline(value, specification));
     let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
-    let count = format!("{evaluations} evaluations of {realizations} realizations");
+    let mut count = format!("{evaluations} evaluations of {realizations} realizations");
+    if let Some(measured) = value["sensitivities"].as_object() {
+        count.push_str(&format!(" and {} for derivatives", measured.len()));
+    }
     if let Some(groups) = value["groups"].as_array() {
         text.push_str(&count);
         text.push_str(&groups::table(groups));
