@@ -1,6 +1,8 @@
 //! The services as an operator and a user meet them: coordinator, worker, and every client
 //! command.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
