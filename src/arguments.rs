@@ -8,7 +8,7 @@ use osteon_proto::endpoint::Endpoint;
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
-#[command(name = "osteon", version, max_term_width = 100)]
+#[command(name = "osteon", version, max_term_width = 80)]
 pub(crate) struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -18,9 +18,9 @@ pub(crate) struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Search the mean elasticity and dispersion whose velocities match the data of a job file
+    /// Find the mean elasticity and dispersion that reproduce the measured velocities
     Identify(RunArguments),
-    /// Monte Carlo at the fixed/start point of a job file, without a search
+    /// Evaluate the model at the given parameter values (no search)
     Propagate(RunArguments),
     /// Solve one case: picked times, velocity, and with --out the pressure traces
     Simulate(SimulateArguments),
@@ -30,21 +30,24 @@ pub(crate) enum Command {
     Coordinator(CoordinatorArguments),
     /// Compute for a coordinator, until interrupted
     Worker(WorkerArguments),
-    /// Hand a job to a coordinator and print its id
+    /// Submit a job to a coordinator and print its id
     Submit(SubmitArguments),
     /// List the jobs of a coordinator
     Jobs(JobsArguments),
     /// Follow a job until it ends
+    ///
+    /// The limit of evaluations that is shown includes those that measure derivatives at the best
+    /// point, one for each free parameter.
     Watch(JobArguments),
-    /// End a job before its time
+    /// Cancel a job
     Cancel(JobArguments),
     /// Write the results of an ended job to a directory
     Fetch(FetchArguments),
     /// Measure the solvers against each other; prints a table in Markdown
     Study(StudyArguments),
-    /// Make a certificate authority and certificates for coordinator, workers and clients
+    /// Create a certificate authority and certificates for coordinator, workers and clients
     Certs(CertsArguments),
-    /// Make a token for a client and the line that admits it
+    /// Create an access token and its entry for the coordinator's token list
     Token(TokenArguments),
 }
 
@@ -63,14 +66,14 @@ pub(crate) struct RunArguments {
     pub(crate) threads: Option<u32>,
     /// Run on this coordinator instead: https://HOST:PORT, http://HOST:PORT or unix:PATH
     ///
-    /// Without it the environment's OSTEON_COORDINATOR counts, unless --workers or --threads ask
+    /// Without it OSTEON_COORDINATOR of the environment is used, unless --workers or --threads ask
     /// for a run on this machine.
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
     /// What is shown to the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
-    /// Keep the results here; the same command continues or shows what is there
+    /// Keep the results here; the same command resumes the run, or shows its results again
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
@@ -122,7 +125,7 @@ pub(crate) struct CoordinatorArguments {
     /// Directory of the store; the URL in use is written to DIR/address
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
-    /// Serve addresses other than loopback without TLS: whoever reaches them can use them
+    /// Serve addresses other than loopback without TLS: anyone who can reach them can use them
     #[arg(long, conflicts_with_all = ["tls_ca", "tls_cert", "tls_key", "tokens", "token_file"])]
     pub(crate) insecure: bool,
     /// Serve with TLS: certificates of the authorities that sign workers' certificates (PEM)
@@ -131,13 +134,13 @@ pub(crate) struct CoordinatorArguments {
     /// The coordinator's certificate (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_key"])]
     pub(crate) tls_cert: Option<PathBuf>,
-    /// The key of the certificate (PEM)
+    /// Its private key (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
     pub(crate) tls_key: Option<PathBuf>,
     /// Clients need a token from this list: lines of NAME ROLE HASH, made by `osteon token`
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
-    /// A client's token that is taken, too, with role admin
+    /// File with one more client token, of role admin
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
     /// Fraction of the batches that a second worker computes too, 0 to 1: different bits expose a
@@ -145,14 +148,14 @@ pub(crate) struct CoordinatorArguments {
     #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
           value_parser = fraction)]
     pub(crate) audit_fraction: f64,
-    /// Forget ended jobs after this long: a number with s, min, h or d [default: never]
+    /// Delete finished jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
-    /// Go on with a store that has lost accepted jobs; else it is refused
+    /// Start although the store has lost accepted jobs; otherwise it is refused
     #[arg(long)]
     pub(crate) accept_lost_jobs: bool,
-    /// Give what a worker holds to others when nothing was heard of it for so long, s, 1 to 3600;
-    /// both sides give five signs of life in that time
+    /// Seconds of silence after which a worker's batches are reassigned, 1 to 3600; heartbeats are
+    /// sent five times per lease
     #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
     pub(crate) lease: Duration,
 }
@@ -183,13 +186,13 @@ pub(crate) struct CredentialArguments {
     /// Certificates of the authorities that may have signed the coordinator's (PEM); for https
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_ca: Option<PathBuf>,
-    /// An own certificate to show to the coordinator (PEM)
+    /// Client certificate (PEM)
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_cert: Option<PathBuf>,
-    /// The key of the own certificate (PEM)
+    /// Its private key (PEM)
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_key: Option<PathBuf>,
-    /// A file with a token to show to the coordinator
+    /// File with an access token
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
 }
@@ -261,7 +264,7 @@ pub(crate) struct JobsArguments {
 /// What can be done with jobs.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
-    /// Forget ended jobs and print their ids; without options all of them
+    /// Delete finished jobs and print their ids; without options all of them
     Prune(PruneArguments),
 }
 
@@ -329,7 +332,7 @@ pub(crate) struct CertsArguments {
 /// Of `token`.
 #[derive(Debug, Args)]
 pub(crate) struct TokenArguments {
-    /// Whom it is for (letters, digits and . _ - @), for logs
+    /// Holder's name (letters, digits and . _ - @), for logs
     #[arg(value_name = "NAME")]
     pub(crate) name: String,
     /// What it allows: read (see jobs, fetch results), submit (also submit, cancel), admin (all)
@@ -417,7 +420,7 @@ pub(crate) struct TwinsArguments {
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=REPETITIONS_MAX))]
     pub(crate) repetitions: Option<u64>,
-    /// Seed of the parameter sets, the data and the germs
+    /// Seed of the parameter sets, the data and the random draws
     #[arg(long, value_name = "S", default_value_t = 1,
           value_parser = clap::value_parser!(u64)
               .range(0..=osteon_common::limits::SEED_MAX - 1_000_000_000))]

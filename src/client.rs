@@ -1,5 +1,6 @@
 //! A client of the service of jobs: every wait has an end, every error names the coordinator.
 
+use std::pin::pin;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
@@ -17,7 +18,9 @@ use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::{Code, Response, Status};
 
+use crate::progress::say;
 use crate::request::Request;
+use crate::resolved::VARIABLE;
 
 use self::parts::Parts;
 
@@ -25,6 +28,8 @@ mod parts;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
+/// After this long without a coordinator the user is told that it is looked for, s.
+const SILENCE_S_MAX: u64 = 1;
 /// Wait between two attempts to find a coordinator again, ms.
 const RETRY_MS: u64 = 250;
 /// Most pages of jobs that a list may have: each holds up to 1000.
@@ -53,8 +58,8 @@ pub(crate) enum ClientError {
         /// What the transport says.
         reason: String,
     },
-    /// It says that it cannot do it now.
-    #[error("the coordinator at {endpoint} cannot do it now: {reason}")]
+    /// It cannot do it now.
+    #[error("the coordinator at {endpoint} is unavailable: {reason}")]
     Unavailable {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -62,10 +67,10 @@ pub(crate) enum ClientError {
         reason: String,
     },
     /// It refuses the specification.
-    #[error("the coordinator refuses the job:{}", indented(.0))]
+    #[error("{}", counted(.0))]
     Violations(Violations),
     /// It refuses the request.
-    #[error("the coordinator at {endpoint} refuses: {reason}{}", hint(*code))]
+    #[error("{reason}{} (coordinator {endpoint})", hint(*code))]
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -86,7 +91,7 @@ pub(crate) enum ClientError {
         request_id: String,
     },
     /// It sent what cannot be read.
-    #[error("the coordinator at {endpoint} answers what cannot be read: {source}")]
+    #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -112,13 +117,16 @@ impl ClientError {
 /// programs, does not say it.
 fn hint(code: Code) -> &'static str {
     match code {
-        Code::NotFound => "; `osteon jobs` lists those there are",
+        Code::NotFound => "; `osteon jobs` lists all jobs",
         _ => "",
     }
 }
 
-fn indented(violations: &Violations) -> String {
-    violations.iter().map(|violation| format!("\n  {violation}")).collect()
+fn counted(violations: &Violations) -> String {
+    let lines: Vec<String> =
+        violations.iter().map(|violation| format!("\n  {violation}")).collect();
+    let errors = if lines.len() == 1 { "error" } else { "errors" };
+    format!("the coordinator rejected the job: {} {errors}{}", lines.len(), lines.concat())
 }
 
 /// Everything that an ended job left.
@@ -140,6 +148,17 @@ pub(crate) struct Remote {
     pub(crate) endpoint: Endpoint,
     /// Files of certificates and a token.
     pub(crate) files: CredentialFiles,
+    /// Whether the environment names it, and not the command line.
+    pub(crate) from_environment: bool,
+}
+
+impl Remote {
+    /// Says where the work is done, unless the command line says it.
+    pub(crate) fn tell(&self) {
+        if self.from_environment {
+            say(&format!("running on {} ({VARIABLE})", self.endpoint));
+        }
+    }
 }
 
 /// A connection to a coordinator.
@@ -153,12 +172,19 @@ impl Client {
     /// Reads the credentials and connects to the coordinator; one that is not there may be about to
     /// come.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
-        let Remote { endpoint, files } = remote;
+        let Remote { endpoint, files, .. } = remote;
         let credentials = Credentials::load(files, endpoint)?;
+        let left = ANSWER_S_MAX - SILENCE_S_MAX;
+        let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
+        unless_silent(Self::find(endpoint, &credentials), notice).await
+    }
+
+    /// The connection, as soon as there is one.
+    async fn find(endpoint: &Endpoint, credentials: &Credentials) -> Result<Self, ClientError> {
         let begun = Instant::now();
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
-            let error = match endpoint::connect_with(endpoint, &credentials, left).await {
+            let error = match endpoint::connect_with(endpoint, credentials, left).await {
                 Ok(connection) => {
                     let jobs = endpoint::jobs_client(connection);
                     return Ok(Self { endpoint: endpoint.clone(), jobs });
@@ -350,6 +376,18 @@ pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     JOB_STATUS.value(snapshot.status)
 }
 
+/// What `call` gives; after a moment without it the user is told what is waited for.
+async fn unless_silent<T>(call: impl Future<Output = T>, notice: impl Fn() -> String) -> T {
+    let mut call = pin!(call);
+    match timeout(Duration::from_secs(SILENCE_S_MAX), call.as_mut()).await {
+        Ok(answer) => answer,
+        Err(_) => {
+            say(&notice());
+            call.await
+        }
+    }
+}
+
 fn answer_limit() -> Duration {
     Duration::from_secs(ANSWER_S_MAX)
 }
@@ -366,7 +404,11 @@ async fn answered_within<T>(
     limit: Duration,
     call: impl Future<Output = Result<Response<T>, Status>>,
 ) -> Result<T, ClientError> {
-    match timeout(limit, call).await {
+    let notice = || {
+        let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
+        format!("no answer from {endpoint} yet; waiting for {left:.0} more seconds")
+    };
+    match unless_silent(timeout(limit, call), notice).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(refused(endpoint, &status)),
         Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),

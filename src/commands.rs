@@ -12,6 +12,10 @@ mod worker;
 
 use crate::ending::{Ending, Failure};
 use crate::resolved::Resolved;
+use crate::signals::unless_interrupted;
+
+/// Of commands that begin nothing which others could see.
+const NOTHING_LEFT: &str = "nothing was changed";
 
 /// Does what the command line says.
 ///
@@ -20,8 +24,13 @@ use crate::resolved::Resolved;
 pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
     match resolved {
         Resolved::Run(run) => run::run(run).await,
-        Resolved::Simulate { arguments, isa } => simulate::simulate(arguments, isa).await,
-        Resolved::Study { study, isa } => study::run(study, isa).await,
+        Resolved::Simulate { arguments, isa } => {
+            let left = "no results were saved";
+            unless_interrupted(simulate::simulate(arguments, isa), left).await
+        }
+        Resolved::Study { study, isa } => {
+            unless_interrupted(study::run(study, isa), "no results were saved").await
+        }
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
         Resolved::Worker { config, files } => worker::serve(config, &files).await,
@@ -29,14 +38,28 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Token(arguments) => token::make(&arguments),
         Resolved::Submit { job, kind, request, priority, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, priority };
-            jobs::submit(submission, &coordinator, format).await
+            let left = "the job may be accepted all the same (see `osteon jobs`)";
+            unless_interrupted(jobs::submit(submission, &coordinator, format), left).await
         }
         Resolved::Prune { older_than, keep_last, coordinator, format } => {
-            jobs::prune(older_than, keep_last, &coordinator, format).await
+            let left = "jobs may be deleted all the same (see `osteon jobs`)";
+            let pruned = jobs::prune(older_than, keep_last, &coordinator, format);
+            unless_interrupted(pruned, left).await
         }
-        Resolved::Jobs { coordinator, format } => jobs::list(&coordinator, format).await,
-        Resolved::Watch { job, coordinator } => jobs::watch(&job, &coordinator).await,
-        Resolved::Cancel { job, coordinator } => jobs::cancel(&job, &coordinator).await,
-        Resolved::Fetch { job, coordinator, out } => jobs::fetch(&job, &coordinator, &out).await,
+        Resolved::Jobs { coordinator, format } => {
+            unless_interrupted(jobs::list(&coordinator, format), NOTHING_LEFT).await
+        }
+        Resolved::Watch { job, coordinator } => {
+            let left = "the job goes on (see `osteon jobs`, `osteon cancel`)";
+            unless_interrupted(jobs::watch(&job, &coordinator), left).await
+        }
+        Resolved::Cancel { job, coordinator } => {
+            let left = "the job may be cancelled all the same (see `osteon jobs`)";
+            unless_interrupted(jobs::cancel(&job, &coordinator), left).await
+        }
+        Resolved::Fetch { job, coordinator, out } => {
+            let left = "run the same command again to fetch the results";
+            unless_interrupted(jobs::fetch(&job, &coordinator, &out), left).await
+        }
     }
 }

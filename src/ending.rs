@@ -20,8 +20,29 @@ pub(crate) enum Failure {
     BadInput(anyhow::Error),
     /// Everything else. Exit code 1.
     Failed(anyhow::Error),
+    /// A signal ended the command; what becomes of what was begun. Exit code 130 or 143.
+    Interrupted(Interruption, &'static str),
     /// Whoever reads stdout has seen enough. Exit code 0.
     ClosedPipe,
+}
+
+/// A signal that asks a command to end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Interruption {
+    /// SIGINT: Ctrl-C.
+    Interrupted,
+    /// SIGTERM.
+    Terminated,
+}
+
+impl Interruption {
+    /// As shells count it: 128 and the number of the signal.
+    pub(crate) fn exit_code(self) -> u8 {
+        match self {
+            Self::Interrupted => 130,
+            Self::Terminated => 143,
+        }
+    }
 }
 
 impl Failure {
@@ -35,9 +56,29 @@ impl Failure {
         Self::Failed(error.into())
     }
 
+    /// A path that was given cannot be used: bad input where another path would do, failed where
+    /// the machine is at fault, as with a full disk.
+    pub(crate) fn unusable_path(error: std::io::Error, context: String) -> Self {
+        use std::io::ErrorKind;
+        let of_the_path = matches!(
+            error.kind(),
+            ErrorKind::NotFound
+                | ErrorKind::PermissionDenied
+                | ErrorKind::AlreadyExists
+                | ErrorKind::NotADirectory
+                | ErrorKind::IsADirectory
+                | ErrorKind::ReadOnlyFilesystem
+                | ErrorKind::InvalidFilename
+                | ErrorKind::InvalidInput
+        );
+        let error = anyhow::Error::new(error).context(context);
+        if of_the_path { Self::BadInput(error) } else { Self::Failed(error) }
+    }
+
     /// Exit code of the process.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
+            Self::Interrupted(interruption, _) => interruption.exit_code(),
             Self::BadInput(_) => 2,
             Self::Failed(_) => 1,
             Self::ClosedPipe => 0,
@@ -61,6 +102,8 @@ impl fmt::Display for Failure {
                 }
                 Ok(())
             }
+            Self::Interrupted(Interruption::Interrupted, left) => write!(f, "interrupted; {left}"),
+            Self::Interrupted(Interruption::Terminated, left) => write!(f, "terminated; {left}"),
             Self::ClosedPipe => f.write_str("stdout is closed"),
         }
     }
@@ -94,6 +137,36 @@ mod tests {
         let failure = Failure::bad_input(anyhow::Error::new(cause).context("refused: disk full"));
         assert_eq!(failure.to_string(), "refused: disk full");
         assert_eq!(failure.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_path_is_bad_input_where_another_would_do() {
+        let code = |kind| {
+            let error = std::io::Error::from(kind);
+            let failure = Failure::unusable_path(error, "cannot write DIR".to_owned());
+            assert!(failure.to_string().starts_with("cannot write DIR: "), "{failure}");
+            failure.exit_code()
+        };
+        for kind in [
+            std::io::ErrorKind::PermissionDenied,
+            std::io::ErrorKind::NotADirectory,
+            std::io::ErrorKind::ReadOnlyFilesystem,
+        ] {
+            assert_eq!(code(kind), 2, "{kind}");
+        }
+        for kind in [std::io::ErrorKind::StorageFull, std::io::ErrorKind::QuotaExceeded] {
+            assert_eq!(code(kind), 1, "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_signal_has_the_code_that_shells_give_it() {
+        let failure = |interruption| Failure::Interrupted(interruption, "nothing was saved");
+        let (interrupted, terminated) =
+            (failure(Interruption::Interrupted), failure(Interruption::Terminated));
+        assert_eq!(interrupted.to_string(), "interrupted; nothing was saved");
+        assert_eq!(terminated.to_string(), "terminated; nothing was saved");
+        assert_eq!((interrupted.exit_code(), terminated.exit_code()), (130, 143));
     }
 
     #[test]

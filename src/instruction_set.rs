@@ -22,7 +22,7 @@ pub(crate) fn named(value: Option<OsString>) -> Result<Isa, Failure> {
     value.to_str().and_then(Isa::named).ok_or_else(|| {
         let offered: Vec<&str> = Isa::available().into_iter().map(Isa::name).collect();
         Failure::bad_input(anyhow!(
-            "in {VARIABLE}: {value:?} is no instruction set of this machine; it offers {} (unset, the \
+            "in {VARIABLE}: {value:?} is not an instruction set of this machine; it offers {} (unset, the \
              fastest is used)",
             offered.join(", ")
         ))

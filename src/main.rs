@@ -1,7 +1,7 @@
 //! The front door of osteon: reads the command line, calls the crates behind it, prints.
 //!
 //! Results go to stdout through [`output`], everything else to stderr. Exit codes: 0 done, 1 the
-//! run failed or was cancelled, 2 bad usage or bad input.
+//! run failed or was cancelled, 2 bad usage or bad input, 130 and 143 ended by SIGINT and SIGTERM.
 
 mod arguments;
 mod certificates;

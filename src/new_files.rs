@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use osteon_common::{user_file, visible};
 
 use crate::ending::Failure;
@@ -39,7 +39,8 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
                 // The first error is the one to tell.
                 drop(fs::remove_file(&earlier.path));
             }
-            return Err(Failure::Failed(error));
+            let context = format!("cannot write {}", file.path.display());
+            return Err(Failure::unusable_path(error, context));
         }
     }
     Ok(())
@@ -51,8 +52,10 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 /// When it cannot be made.
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
-    made.with_context(|| format!("cannot create the directory {}", visible::path(path)))
-        .map_err(Failure::Failed)
+    made.map_err(|error| {
+        let directory = visible::path(path);
+        Failure::unusable_path(error, format!("cannot create the directory {directory}"))
+    })
 }
 
 /// Adds a line to a secret file, which is made if need be.
@@ -70,23 +73,21 @@ pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
         file.sync_all()
     };
     write()
-        .with_context(|| format!("cannot add to {}", visible::path(path)))
-        .map_err(Failure::Failed)
+        .map_err(|error| {
+            Failure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
+        })
 }
 
-fn write(file: &NewFile) -> anyhow::Result<()> {
+fn write(file: &NewFile) -> std::io::Result<()> {
     let mode = if file.secret { 0o600 } else { 0o644 };
-    let write = || -> std::io::Result<()> {
-        let mut options = OpenOptions::new();
-        let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
-        let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
-        if written.is_err() {
-            // Half a file is none.
-            drop(fs::remove_file(&file.path));
-        }
-        written
-    };
-    write().with_context(|| format!("cannot write {}", visible::path(&file.path)))
+    let mut options = OpenOptions::new();
+    let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
+    let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
+    if written.is_err() {
+        // Half a file is none.
+        drop(fs::remove_file(&file.path));
+    }
+    written
 }
 
 /// Whether a line can be added behind the last byte.

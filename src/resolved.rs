@@ -25,7 +25,7 @@ use crate::request::Request;
 const WORKERS_DEFAULT: u32 = 2;
 
 /// Where the environment names the coordinator.
-const VARIABLE: &str = "OSTEON_COORDINATOR";
+pub(crate) const VARIABLE: &str = "OSTEON_COORDINATOR";
 
 /// Format of what goes to stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,8 +168,10 @@ impl Resolved {
         let environment = environment(std::env::var_os(VARIABLE))?;
         let coordinator = |flag| resolve_coordinator(flag, environment.as_deref());
         let remote = |client: ClientArguments| {
+            let from_environment = client.coordinator.is_none();
             let endpoint = coordinator(client.coordinator)?;
-            Ok::<_, Failure>(Remote { endpoint, files: client.credentials.into() })
+            let files = client.credentials.into();
+            Ok::<_, Failure>(Remote { endpoint, files, from_environment })
         };
         let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
         let run = |kind, run| {
@@ -242,8 +244,9 @@ pub(crate) fn format(json: bool) -> Format {
 /// The address in the environment; an empty one counts as none.
 fn environment(value: Option<OsString>) -> Result<Option<String>, Failure> {
     let text = value.map(OsString::into_string).transpose();
-    let text =
-        text.map_err(|value| Failure::bad_input(anyhow!("in {VARIABLE}: {value:?} is no text")))?;
+    let text = text.map_err(|value| {
+        Failure::bad_input(anyhow!("in {VARIABLE}: {value:?} is not valid text"))
+    })?;
     Ok(text.filter(|url| !url.is_empty()))
 }
 
@@ -276,13 +279,14 @@ fn resolve_run(
     let RunArguments { job, workers, threads, coordinator, credentials, out, json } = arguments;
     let files = CredentialFiles::from(credentials);
     let here = workers.is_some() || threads.is_some();
+    let from_environment = coordinator.is_none();
     let there = match (coordinator, environment) {
         (Some(endpoint), _) => Some(endpoint),
         (None, Some(url)) if !here => Some(parse_environment(url)?),
         _ => None,
     };
     let place = match (there, files.first_given()) {
-        (Some(endpoint), _) => Place::There(Remote { endpoint, files }),
+        (Some(endpoint), _) => Place::There(Remote { endpoint, files, from_environment }),
         (None, Some(option)) => {
             return Err(Failure::bad_input(anyhow!(
                 "{option} is for a coordinator, and none is given; add --coordinator URL"

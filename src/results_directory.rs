@@ -60,8 +60,14 @@ impl ResultsDirectory {
         specification: &JobSpecification,
     ) -> Result<Option<String>, Failure> {
         let job = path.join(JOB);
-        let result = read_if_there(&path.join(RESULT)).map_err(Failure::Failed)?;
-        match read_if_there(&job).map_err(Failure::Failed)? {
+        if path.exists() && !path.is_dir() {
+            return Err(Failure::bad_input(anyhow!(
+                "{} is not a directory; choose another --out directory",
+                visible::path(path)
+            )));
+        }
+        let result = given(&path.join(RESULT))?;
+        match given(&job)? {
             Some(stored) => same_job(&job, &stored, specification)?,
             None if result.is_some() => {
                 return Err(Failure::bad_input(anyhow!(
@@ -93,28 +99,24 @@ impl ResultsDirectory {
     /// # Errors
     /// When another process holds it, or it cannot be written.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
-        Self::lock(path).map_err(Failure::Failed)
-    }
-
-    fn lock(path: &Path) -> anyhow::Result<Self> {
-        fs::create_dir_all(path)
-            .with_context(|| format!("cannot create the directory {}", visible::path(path)))?;
+        make_directory(path)?;
         let lock_path = path.join(LOCK);
         for _ in 0..LOCK_ATTEMPTS_MAX {
-            let lock = user_file::create(&lock_path)
-                .with_context(|| format!("cannot write {}", visible::path(&lock_path)))?;
+            let lock = user_file::create(&lock_path).map_err(|error| {
+                Failure::unusable_path(error, format!("cannot write {}", visible::path(&lock_path)))
+            })?;
             match lock.try_lock() {
                 // A run that ended meanwhile has removed the file: its lock locks nothing.
                 Ok(()) if !is_at(&lock, &lock_path) => {}
                 Ok(()) => return Ok(Self { path: path.to_owned(), _lock: lock }),
                 Err(TryLockError::WouldBlock) => break,
                 Err(TryLockError::Error(error)) => {
-                    return Err(anyhow::Error::new(error)
-                        .context(format!("cannot lock {}", visible::path(&lock_path))));
+                    let context = format!("cannot lock {}", visible::path(&lock_path));
+                    return Err(Failure::failed(anyhow::Error::new(error).context(context)));
                 }
             }
         }
-        bail!("another osteon is running in {}", visible::path(path))
+        Err(Failure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
     }
 
     /// Where a store of this run is kept until it has ended.
@@ -189,6 +191,24 @@ impl Drop for ResultsDirectory {
         // Last of all, and still locked; a leftover does no harm.
         drop(fs::remove_file(self.path.join(LOCK)));
     }
+}
+
+/// Makes a directory that the user has named, if there is none.
+///
+/// # Errors
+/// Bad input when it cannot be one, failed when the machine has no room for it.
+pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(path).map_err(|error| {
+        Failure::unusable_path(error, format!("cannot create the directory {}", visible::path(path)))
+    })
+}
+
+/// The text of a file in a directory that the user has named; `None` if there is no such file.
+fn given(path: &Path) -> Result<Option<String>, Failure> {
+    read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
+        Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
+        Err(error) => Failure::Failed(error),
+    })
 }
 
 /// Whether `file` is what stands at `path`.
@@ -271,7 +291,7 @@ fn remove_if_there(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
     let path = directory.join(RESULT);
     let text = read_if_there(&path)?;
-    text.with_context(|| format!("cannot read {}: there is no such file", visible::path(&path)))
+    text.with_context(|| format!("cannot read {}: no such file", visible::path(&path)))
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.

@@ -3,23 +3,26 @@
 use std::time::Duration;
 
 use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::oneshot;
 
-use crate::ending::Failure;
+use crate::ending::{Failure, Interruption};
 use crate::progress::say;
 
 /// Signals that come so soon after the first are one with it: some programs send it to a process
 /// and to its group.
 const ONE_WISH: Duration = Duration::from_millis(300);
+/// A command that cannot stop, because nobody reads what it writes, is ended after this long.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Completes at the first SIGINT or SIGTERM after the call; these signals no longer end the process
 /// by themselves from then on. SIGHUP is left alone, so that `nohup` keeps its meaning.
 ///
 /// Who then presses Ctrl-C again does not want to wait for an orderly end: the process exits, with
-/// code 1.
+/// code 130.
 ///
 /// # Errors
 /// When the system does not let signals be handled.
-pub(crate) fn interruption() -> Result<impl Future<Output = ()>, Failure> {
+pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, Failure> {
     let listen = |kind| {
         signal(kind).map_err(|error| {
             Failure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
@@ -28,12 +31,38 @@ pub(crate) fn interruption() -> Result<impl Future<Output = ()>, Failure> {
     let mut interrupt = listen(SignalKind::interrupt())?;
     let mut terminate = listen(SignalKind::terminate())?;
     Ok(async move {
-        tokio::select! {
-            _ = interrupt.recv() => {}
-            _ = terminate.recv() => {}
-        }
+        let interruption = tokio::select! {
+            _ = interrupt.recv() => Interruption::Interrupted,
+            _ = terminate.recv() => Interruption::Terminated,
+        };
         tokio::spawn(exit_at_the_next());
+        interruption
     })
+}
+
+/// What `command` ends with, or the first SIGINT or SIGTERM: for commands that can be left at any
+/// moment. `left` says what becomes of what was begun.
+///
+/// # Errors
+/// That of the command, or the signal.
+pub(crate) async fn unless_interrupted<T>(
+    command: impl Future<Output = Result<T, Failure>>,
+    left: &'static str,
+) -> Result<T, Failure> {
+    let interruption = interruption()?;
+    let (sender, received) = oneshot::channel();
+    // In a task of its own, which runs even while the command is kept by what does not wait.
+    tokio::spawn(async move {
+        let interruption = interruption.await;
+        // Fails only when the command has ended.
+        let _ended = sender.send(interruption);
+        tokio::time::sleep(PATIENCE).await;
+        std::process::exit(interruption.exit_code().into());
+    });
+    tokio::select! {
+        result = command => result,
+        Ok(interruption) = received => Err(Failure::Interrupted(interruption, left)),
+    }
 }
 
 /// Ends the process at the next SIGINT.
@@ -44,6 +73,6 @@ async fn exit_at_the_next() {
         && interrupt.recv().await.is_some()
     {
         say("osteon: interrupted again, ends at once");
-        std::process::exit(1);
+        std::process::exit(Interruption::Interrupted.exit_code().into());
     }
 }

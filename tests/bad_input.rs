@@ -388,6 +388,25 @@ fn what_a_user_does_not_see_is_shown() {
 }
 
 #[test]
+fn a_directory_of_results_that_cannot_be_one_is_bad_input() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(10, 1));
+    let case = scratch.write("case.toml", &constants("density", "1598.8"));
+    let file = scratch.write("file", "a file");
+    let below = file.join("out");
+    // No file system lets anybody, root included, make directories there.
+    let forbidden = Path::new("/proc/osteon");
+    for out in [file.as_path(), &below, forbidden] {
+        for (command, input) in [("identify", &job), ("propagate", &job), ("simulate", &case)] {
+            let finished = run(&[command, text(input), "--out", text(out)]);
+            let context = format!("{command} --out {}: {finished:?}", out.display());
+            assert_eq!((finished.code, finished.stdout.as_str()), (Some(2), ""), "{context}");
+            assert!(finished.stderr.contains(text(out)), "{context}");
+        }
+    }
+}
+
+#[test]
 fn usage_errors_are_bad_input() {
     for arguments in [
         &["identify"] as &[&str],

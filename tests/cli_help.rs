@@ -38,6 +38,9 @@ fn help_of_every_command() {
         let words: Vec<_> = command.split(' ').chain(["--help"]).collect();
         text.push_str(run(&words).succeeded());
     }
+    for line in text.lines().filter(|line| !line.starts_with("Usage: ")) {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
     insta::assert_snapshot!(text);
 }
 

@@ -118,7 +118,7 @@ fn token_writes_the_token_once_and_shows_only_its_hash() {
     let refused = make("a b", &scratch.path("d.token"), &[]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let refused = make("dan", &scratch.path("d.token"), &["--tokens", "/nonexistent/tokens"]);
-    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert_eq!(refused.code, Some(2), "{refused:?}");
     assert!(!scratch.path("d.token").exists());
 }
 
@@ -230,7 +230,7 @@ fn a_clients_options_are_checked_before_anything_is_sent() {
     let mismatched = ["--tls-ca", &ca, "--tls-cert", &certificate, "--tls-key", &key];
     check(tls, &mismatched, "is not the one of the certificate");
     check(tls, &["--tls-ca", &ca, "--token-file", &ca], "is open to other users");
-    check(tls, &["--tls-ca", &ca, "--token-file", &key], "is no token of osteon");
+    check(tls, &["--tls-ca", &ca, "--token-file", &key], "is not a valid osteon token");
     check(far, &["--token-file", &token], "in the clear");
     check(near, &["--tls-ca", &ca], "--tls-ca is for TLS");
     check("unix:/nonexistent", &["--tls-ca", &ca], "--tls-ca is for TLS");

@@ -220,7 +220,7 @@ fn an_interrupted_run_ends_its_workers_and_can_be_continued() {
     let out = scratch.path("out");
     let (LongRun { mut process, workers, .. }, stored) = LongRun::under_way(&scratch, &out);
     process.signal("TERM");
-    assert_eq!(process.code(), Some(1));
+    assert_eq!(process.code(), Some(143));
     // They were reaped by their parent before it ended.
     assert!(workers.iter().all(|&worker| !is_alive(worker)), "{workers:?}");
     continues(&scratch, &out, stored);

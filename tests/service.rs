@@ -1,17 +1,21 @@
 //! The services as an operator and a user meet them: coordinator, worker, and every client
 //! command.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
 use std::fs;
 use std::io::Write as _;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use support::{Coordinator, Owned, Scratch, eventually, job, osteon, run};
+use support::{
+    Coordinator, Finished, Owned, Scratch, eventually, job, osteon, run, run_with, signal, text,
+};
 
 #[test]
 fn a_job_from_submission_to_its_results() {
@@ -88,7 +92,7 @@ fn a_store_that_cannot_be_used_is_named_and_left_as_it_is() {
     let garbage = scratch.path("garbage");
     fs::create_dir(&garbage).unwrap();
     fs::write(garbage.join("osteon.sqlite"), "no database at all").unwrap();
-    refused(&garbage, "is damaged or no database");
+    refused(&garbage, "is damaged or not a database");
     assert_eq!(fs::read(garbage.join("osteon.sqlite")).unwrap(), b"no database at all");
     refused(&garbage.join("osteon.sqlite"), "cannot create");
     refused(std::path::Path::new("/proc/self"), "cannot write and lock");
@@ -113,7 +117,7 @@ fn ended_jobs_are_pruned_and_their_ids_printed() {
     assert_eq!(left[0]["job"], *ids[3]);
     let gone = coordinator.client(&["watch", &ids[0]]);
     assert_eq!(gone.code, Some(2), "{gone:?}");
-    assert!(gone.stderr.contains(&format!("there is no job {}", ids[0])), "{gone:?}");
+    assert!(gone.stderr.contains(&format!("no such job: {}", ids[0])), "{gone:?}");
 }
 
 #[test]
@@ -218,12 +222,83 @@ fn an_unreachable_coordinator_is_named_in_time() {
                 let finished = run(&[arguments, &["--coordinator", url]].concat());
                 assert_eq!(finished.code, Some(1), "{finished:?}");
                 assert!(finished.stderr.contains(url), "{finished:?}");
+                // Connected or not, it does not wait in silence.
+                let told = ["cannot reach", "no answer from"].map(|what| format!("{what} {url}"));
+                assert!(told.iter().any(|told| finished.stderr.starts_with(told)), "{finished:?}");
+                assert!(finished.stderr.contains(" for 9 more seconds\n"), "{finished:?}");
                 assert_eq!(finished.stdout, "");
                 assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
             });
         }
     });
     assert!(!scratch.path("out").join("job.toml").exists());
+}
+
+/// Ends `command` by the signal once it handles signals, and asserts the exit code.
+fn ended_by(name: &str, code: i32, command: &mut Command, expected: &str) {
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    eventually("it handles SIGINT and SIGTERM", || {
+        let status = fs::read_to_string(&status).unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        // Signal n is bit n - 1: SIGINT is 2, SIGTERM 15.
+        let both = 1 << 1 | 1 << 14;
+        u64::from_str_radix(caught.trim(), 16).unwrap() & both == both
+    });
+    signal(child.id(), name);
+    let finished = Finished::of(child.wait_with_output().unwrap());
+    assert_eq!(finished.code, Some(code), "{name}: {finished:?}");
+    assert!(finished.stderr.contains(expected), "{expected}: {finished:?}");
+}
+
+#[test]
+fn a_command_that_a_signal_ends_has_its_code() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &job(1_000_000, 400));
+    let case = scratch.write(
+        "case.toml",
+        "[bone]\ndensity = 1598.8\nmandel = [[20e9, 0.0, 0.0, 0.0, 0.0, 0.0], \
+         [0.0, 20e9, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 20e9, 0.0, 0.0, 0.0], \
+         [0.0, 0.0, 0.0, 1e10, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1e10, 0.0], \
+         [0.0, 0.0, 0.0, 0.0, 0.0, 1e10]]\n[solver]\nmethod = \"hybrid\"\nrefinement = 16.0\n",
+    );
+    let (job, case) = (text(&job), text(&case));
+    // Accepts, and never speaks.
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let silent = format!("http://{}", listener.local_addr().unwrap());
+    let out = scratch.path("out");
+    let commands = [
+        (&["identify", job] as &[&str], "no results were saved"),
+        (&["propagate", job], "no results were saved"),
+        (&["simulate", case], "no results were saved"),
+        (&["identify", job, "--coordinator", &silent], "a job that was accepted goes on"),
+        (&["watch", "1", "--coordinator", &silent], "the job goes on"),
+        (&["submit", job, "--coordinator", &silent], "may be accepted all the same"),
+        (&["fetch", "1", "--out", text(&out), "--coordinator", &silent], "to fetch the results"),
+    ];
+    for (arguments, expected) in commands {
+        ended_by("INT", 130, osteon().args(arguments), expected);
+        ended_by("TERM", 143, osteon().args(arguments), expected);
+    }
+}
+
+#[test]
+fn a_coordinator_of_the_environment_is_named_first() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 4));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let _worker = coordinator.worker(1);
+    let line = format!("running on {} (OSTEON_COORDINATOR)\n", coordinator.url);
+    let variable = ("OSTEON_COORDINATOR", coordinator.url.as_str());
+    let id = coordinator.submit(&file);
+    for arguments in [&["identify", text(&file), "--json"], &["watch", &id] as &[&str]] {
+        let named = run_with(variable, arguments);
+        named.succeeded();
+        assert!(named.stderr.starts_with(&line), "{named:?}");
+        let given = coordinator.client(arguments);
+        given.succeeded();
+        assert!(!given.stderr.contains("running on"), "{given:?}");
+    }
 }
 
 #[test]
@@ -271,7 +346,7 @@ fn who_interrupts_twice_does_not_wait() {
         code = worker.ended();
         code.is_some()
     });
-    assert_eq!(code, Some(1));
+    assert_eq!(code, Some(130));
     assert_eq!(coordinator.job(&id)["realizations_done"], 0);
 }
 

@@ -46,7 +46,11 @@ fn an_unknown_instruction_set_is_refused_wherever_something_is_computed() {
     ] {
         let refused = run_with((VARIABLE, "sse9"), arguments);
         assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{arguments:?}");
-        assert!(refused.stderr.contains("\"sse9\" is no instruction set"), "{}", refused.stderr);
+        assert!(
+            refused.stderr.contains("\"sse9\" is not an instruction set"),
+            "{}",
+            refused.stderr
+        );
         for isa in Isa::available() {
             assert!(refused.stderr.contains(isa.name()), "{}", refused.stderr);
         }

@@ -48,10 +48,10 @@ pub enum FileError {
     },
 }
 
-/// Why a text is no job or case.
+/// Why a text is not a job or case.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ContentError {
-    /// It is no TOML or JSON.
+    /// It is not TOML or JSON.
     #[error(transparent)]
     Malformed(#[from] Malformed),
     /// It breaks rules.
@@ -84,9 +84,12 @@ impl Invalid {
 
 impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.found.len() {
-            1 => f.write_str("one thing is wrong")?,
-            count => write!(f, "{count} things are wrong")?,
+        let listed = self.found.iter().filter(|(_, violation)| !violation.more).count();
+        let errors = if listed == 1 { "error" } else { "errors" };
+        if listed < self.found.len() {
+            write!(f, "more than {listed} {errors} (the first {listed} of them shown)")?;
+        } else {
+            write!(f, "{listed} {errors}")?;
         }
         for (line, violation) in &self.found {
             match line {
@@ -133,7 +136,7 @@ fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> Malformed {
     let before = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
     let (line, column) = crate::document::position(&before, valid);
     let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
-    Malformed { format, line, column, message: format!("the byte 0x{byte:02x} is no UTF-8") }
+    Malformed { format, line, column, message: format!("the byte 0x{byte:02x} is not valid UTF-8") }
 }
 
 /// What an optional byte order mark leaves of a text.

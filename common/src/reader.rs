@@ -97,7 +97,7 @@ impl Reader {
             entries.iter().map(|(key, _)| key).filter(|key| !keys.contains(&key.as_str()));
         for (count, key) in unknown.enumerate() {
             if count == REPORTED_MAX {
-                self.violations.add(&path, "has more unknown keys, not listed here");
+                self.violations.add_more(&path, "more unknown keys are not listed");
                 break;
             }
             let nearest = nearest_key(key, keys);
@@ -115,7 +115,7 @@ impl Reader {
     ///
     /// A user who has misspelt one of them reads only of that.
     pub(crate) fn lacks(&mut self, field: &str, cures: &[String], message: impl Into<String>) {
-        let violation = Violation { field: field.to_owned(), message: message.into() };
+        let violation = Violation { field: field.to_owned(), message: message.into(), more: false };
         self.violations.add(&violation.field, &violation.message);
         if cures.iter().any(|cure| self.suggested.contains(cure)) {
             self.repeated.push(violation);
@@ -229,7 +229,7 @@ impl Reader {
             elements.iter().enumerate().filter(|(_, node)| as_number(&node.value).is_none());
         for (count, (index, node)) in wrong.enumerate() {
             if count == REPORTED_MAX {
-                self.violations.add(path, "has more elements that are no numbers, not listed here");
+                self.violations.add_more(path, "more elements that are not numbers are not listed");
                 break;
             }
             self.wrong_type(element_path(path, index), "a number", &node.value);

@@ -83,7 +83,7 @@ enum Problem {
     NotUtf8,
     #[error("has no header; its first line must name the columns, one of them `{COLUMN}`")]
     Empty,
-    #[error("is no header; it must name the columns, one of them `{COLUMN}`")]
+    #[error("is not a header; it must name the columns, one of them `{COLUMN}`")]
     NoHeader,
     #[error("no column `{column}`; the header has {columns}")]
     NoColumn { column: String, columns: String },
@@ -109,8 +109,15 @@ enum Problem {
     OneRow,
     #[error("has more than {} velocities", limits::DATA_VELOCITIES_MAX)]
     TooMany,
-    #[error("more lines are wrong, not listed here")]
+    #[error("more lines with errors are not listed")]
     More,
+}
+
+impl CsvError {
+    /// Whether it stands for others that are not listed.
+    pub(crate) fn stands_for_more(&self) -> bool {
+        matches!(self.problem, Problem::More)
+    }
 }
 
 /// The velocities of the CSV file at `path`, m/s, in its order.

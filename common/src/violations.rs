@@ -12,6 +12,8 @@ pub struct Violation {
     pub field: String,
     /// What was found and what is allowed, e.g. `is -1.0; it must be above 0 (kg/m³)`.
     pub message: String,
+    /// Whether it stands for others that are not listed.
+    pub more: bool,
 }
 
 impl fmt::Display for Violation {
@@ -40,7 +42,12 @@ impl Violations {
 
     /// Records that `field` is wrong.
     pub fn add(&mut self, field: impl Into<String>, message: impl Into<String>) {
-        self.0.push(Violation { field: field.into(), message: message.into() });
+        self.0.push(Violation { field: field.into(), message: message.into(), more: false });
+    }
+
+    /// Records that more is wrong with `field` than is listed.
+    pub fn add_more(&mut self, field: impl Into<String>, message: impl Into<String>) {
+        self.0.push(Violation { field: field.into(), message: message.into(), more: true });
     }
 
     /// Whether `field`, or a field inside it, is already known to be wrong.

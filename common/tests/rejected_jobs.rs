@@ -359,7 +359,7 @@ fn all_seven_fixed_leaves_nothing_to_search() {
     }
     assert_eq!(
         refusal(&text, JobKind::Identification),
-        "one thing is wrong\n  parameters: all seven are fixed; an identification searches at least \
+        "1 error\n  parameters: all seven are fixed; an identification searches at least \
          one: give it start and bounds (a run at fixed parameters is a propagation)"
     );
     assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");

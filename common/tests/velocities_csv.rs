@@ -81,7 +81,7 @@ fn groups_that_are_refused() {
     check("site,velocity\na,1\na,2\n", "no column `bone`; the header has `site`, `velocity`");
     check("bone,velocity,bone\na,1,b\n", "the header has the column `bone` twice");
     check("bone,velocity\na,1\n,2\n", "line 3: bone is empty; it must name the group");
-    check("bone,velocity\na,1\na,2\nb,3\n", "data.groups.b: is a list of 1;");
+    check("bone,velocity\na,1\na,2\nb,3\n", "data.groups.b: contains only one velocity;");
     let many: String = (0..1001).map(|i| format!("g{i},1\n")).collect();
     check(&format!("bone,velocity\n{many}"), "has more than 1000 groups");
 }

@@ -155,7 +155,7 @@ pub enum Answer {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Refusal {
     /// There is no such job.
-    #[error("there is no job {job}")]
+    #[error("no such job: {job}")]
     NoJob {
         /// The job asked for.
         job: JobId,

@@ -31,7 +31,7 @@ pub enum ReadError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The job was forgotten meanwhile.
-    #[error("there is no job {job} any more: it was pruned")]
+    #[error("no such job: {job}; it was pruned meanwhile")]
     Pruned {
         /// The job.
         job: JobId,

@@ -31,7 +31,7 @@ pub enum ListenAddress {
 /// A text that is no address to listen on.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
-    "`{text}` is no address to listen on; write IP:PORT (for example 127.0.0.1:0, where port 0 \
+    "`{text}` is not a valid listen address; write IP:PORT (for example 127.0.0.1:0, where port 0 \
      takes a free port), [IPV6]:PORT, localhost:PORT, or unix:PATH"
 )]
 pub struct AddressError {
@@ -76,7 +76,7 @@ pub enum BindError {
     },
     /// Something that is no socket is there.
     #[error(
-        "{} is there already, is no socket, and is left as it is; choose another path",
+        "{} exists, is not a socket and is left as it is; choose another path",
         path.display()
     )]
     NotASocket {

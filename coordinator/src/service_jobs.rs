@@ -237,7 +237,7 @@ fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
         return Err(too_long("job", text));
     }
-    JobId::parse(text).ok_or_else(|| status::no_job(text, format!("there is no job `{text}`")))
+    JobId::parse(text).ok_or_else(|| status::no_job(text, format!("no such job: `{text}`")))
 }
 
 fn too_long(field: &str, value: &str) -> Status {

@@ -113,7 +113,7 @@ pub async fn start(
     let core = Core::new(state, clock, commands, failing.clone());
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
-    tracing::info!(%url, "the coordinator listens");
+    tracing::info!(%url, "listening");
     let shutdown_timeout = config.shutdown_timeout;
     Ok(Coordinator { url, failing, messages, stop_serving, server, core, store, shutdown_timeout })
 }

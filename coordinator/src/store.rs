@@ -199,8 +199,7 @@ pub enum StoreError {
     },
     /// The system fails to read or write it.
     #[error(
-        "{} cannot be read or written: {error}; see that its disk is sound and that no quota is \
-         used up",
+        "{} cannot be read or written: {error}; check the disk and its quota",
         path.display()
     )]
     Io {
@@ -223,7 +222,7 @@ pub enum StoreError {
     },
     /// SQLite cannot make sense of it.
     #[error(
-        "{} is damaged or no database: {error}; restore the file from a copy, or choose another \
+        "{} is damaged or not a database: {error}; restore the file from a copy, or choose another \
          directory",
         path.display()
     )]

@@ -106,7 +106,7 @@ pub enum LineFault {
         name: String,
     },
     /// The hash is none.
-    #[error("gives `{name}` what is no hash (`blake3:` and 64 hexadecimal digits)")]
+    #[error("gives `{name}` an invalid hash (it must be `blake3:` and 64 hexadecimal digits)")]
     Hash {
         /// Of whom.
         name: String,
@@ -275,7 +275,7 @@ mod tests {
             (format!("ann write {hash}"), "gives `ann` an unknown role"),
             (format!("ann {secret} {hash}"), "gives `ann` an unknown role"),
             (format!("ann read {secret}"), "holds the token of `ann` itself"),
-            ("ann read blake3:12".to_owned(), "what is no hash"),
+            ("ann read blake3:12".to_owned(), "an invalid hash"),
             (
                 format!("ann read {hash}\n\nbob read {hash}"),
                 "line 3 gives `bob` a token that line 1",

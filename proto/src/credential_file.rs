@@ -39,7 +39,7 @@ pub enum CredentialError {
     },
     /// It is no such file at all.
     #[error(
-        "{} has more than {max} bytes, and is no file of certificates, keys or tokens",
+        "{} has more than {max} bytes, so it is not a file of certificates, keys or tokens",
         visible::path(path)
     )]
     TooLong {
@@ -48,8 +48,8 @@ pub enum CredentialError {
         /// Most bytes.
         max: u64,
     },
-    /// It holds bytes that are no text.
-    #[error("{} holds bytes that are no text", visible::path(path))]
+    /// It is not a text file.
+    #[error("{} is not a text file", visible::path(path))]
     NoText {
         /// The file.
         path: PathBuf,
@@ -78,7 +78,7 @@ pub enum CredentialError {
         mode: u32,
     },
     /// It is damaged.
-    #[error("{} is no PEM file: {fault}", visible::path(path))]
+    #[error("{} is not a valid PEM file: {fault}", visible::path(path))]
     Pem {
         /// The file.
         path: PathBuf,
@@ -149,7 +149,7 @@ pub enum CredentialError {
         source: webpki::Error,
     },
     /// The certificate cannot be an authority's.
-    #[error("the certificate in {} is no authority's: {source}", visible::path(path))]
+    #[error("the certificate in {} is not a certificate authority's: {source}", visible::path(path))]
     Root {
         /// The file.
         path: PathBuf,

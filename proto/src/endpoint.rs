@@ -50,7 +50,7 @@ pub enum Endpoint {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EndpointError {
     /// None of the known schemes.
-    #[error("`{text}` is no coordinator URL; write {FORMS}")]
+    #[error("`{text}` is not a valid coordinator URL; write {FORMS}")]
     Scheme {
         /// What was given.
         text: String,

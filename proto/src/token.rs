@@ -23,7 +23,7 @@ pub struct Token(String);
 /// A text that is no token. It says nothing of the text, which may be another secret.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error(
-    "is no token of osteon (`{PREFIX}` and {} hexadecimal digits, as `osteon token` makes them)",
+    "is not a valid osteon token (`{PREFIX}` and {} hexadecimal digits, as `osteon token` makes them)",
     2 * RANDOM_BYTES
 )]
 pub struct NoToken;

@@ -17,13 +17,13 @@ fn an_answer_is_told_from_a_loss() {
     let endpoint: Endpoint = "unix:a".parse().unwrap();
     let shown = |status: &Status| refused(&endpoint, status).to_string();
     let answered = Status::unavailable("the store is full");
-    assert_eq!(shown(&answered), "the coordinator at unix:a cannot do it now: the store is full");
+    assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
     for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
         broken.set_source(Arc::new(std::io::Error::other("reset")));
         assert_eq!(shown(&broken), "lost the coordinator at unix:a: reset");
     }
     let refusal = shown(&Status::already_exists("taken"));
-    assert_eq!(refusal, "the coordinator at unix:a refuses: taken");
+    assert_eq!(refusal, "taken (coordinator unix:a)");
 }
 
 #[tokio::test(start_paused = true)]
@@ -31,7 +31,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
     let directory = tempfile::tempdir().unwrap();
     let socket = directory.path().join("socket");
     let endpoint = Endpoint::Unix(socket.clone());
-    let remote = Remote { endpoint, files: CredentialFiles::default() };
+    let remote = Remote { endpoint, files: CredentialFiles::default(), from_environment: false };
     let begun = Instant::now();
     let error = Client::connect(&remote).await.unwrap_err().to_string();
     assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
@@ -47,7 +47,8 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
 }
 
 fn remote(socket: &Path) -> Remote {
-    Remote { endpoint: Endpoint::Unix(socket.to_owned()), files: CredentialFiles::default() }
+    let endpoint = Endpoint::Unix(socket.to_owned());
+    Remote { endpoint, files: CredentialFiles::default(), from_environment: false }
 }
 
 fn example() -> JobSpecification {

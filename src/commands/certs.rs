@@ -57,7 +57,7 @@ fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Fa
     let text = credential_file::trusted_text(&certificate).map_err(Failure::bad_input)?;
     let secret = credential_file::secret_text(&key).map_err(Failure::bad_input)?;
     let authority = Authority::from_pem(&text, &secret)
-        .with_context(|| format!("{} is no authority that can sign", certificate.display()))
+        .with_context(|| format!("{} is not an authority that can sign", certificate.display()))
         .map_err(Failure::BadInput)?;
     let copy = NewFile { path: directory.join("ca.pem"), text, secret: false };
     Ok((authority, vec![copy]))

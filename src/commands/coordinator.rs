@@ -51,7 +51,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {
         Ok(()) => tokio::select! {
-            () = interruption => Ok(Ending::Done),
+            _ = interruption => Ok(Ending::Done),
             failed = coordinator.failed() => Err(Failure::failed(failed)),
         },
         Err(error) => Err(stdout_failure(error)),

@@ -38,7 +38,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
         Ensemble::drawn(&point, specification.monte_carlo.germs()).map_err(Failure::bad_input)?;
     let bone = ensemble.bone(index).map_err(|error| {
         Failure::failed(anyhow::Error::new(error).context(format!(
-            "realization {index} is no elasticity in floating point (failure not_finite)"
+            "realization {index} is not an elasticity in floating point (failure not_finite)"
         )))
     })?;
     let text = case_file::to_toml(&Case { setup: specification.setup, bone });

@@ -73,6 +73,7 @@ pub(super) async fn prune(
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
 pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
+    coordinator.tell();
     let mut client = Client::connect(coordinator).await?;
     let mut output = output::stdout(Format::Text);
     let mut last_line: Option<Instant> = None;

@@ -1,5 +1,6 @@
 //! `identify` and `propagate`: a job from its file to its result.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -8,12 +9,11 @@ use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
 use osteon_common::results::Status;
 use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::JobSnapshot;
 
 use crate::client::{Client, Fetched, Remote};
 use crate::embedded::{Embedded, StorePlace};
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::ending::{Ending, Failure, Interruption, stdout_failure};
 use crate::output::{self, ShownResult};
 use crate::progress::{Progress, say};
 use crate::request::Request;
@@ -30,12 +30,18 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
         return show(&run, &specification, &json);
     }
     if let Some(reason) = failed_before(&run, &specification)? {
-        say(&format!("the last run there failed and is run again: {reason}"));
+        say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
     warnings::say_of_job(&specification, &warnings).await;
-    let interruption = signals::interruption()?;
+    let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.
-    let computers = Computers::find(&run.place).await?;
+    let computers = tokio::select! {
+        biased;
+        found = Computers::find(&run.place) => found?,
+        interruption = interruption.as_mut() => {
+            return Err(Failure::Interrupted(interruption, "no job was submitted"));
+        }
+    };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
     // Another run may have ended between the look and the lock.
     if let Some(json) = finished(&run, &specification)? {
@@ -45,8 +51,8 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
         Computers::Here { workers, threads } => {
             here(workers, threads, &specification, directory.as_ref(), interruption).await?
         }
-        Computers::There(client, endpoint) => {
-            there(*client, endpoint, &specification, directory.as_ref(), interruption).await?
+        Computers::There(client) => {
+            there(*client, &specification, directory.as_ref(), interruption).await?
         }
     };
     let json = keep(run.kind, &fetched, directory.as_ref())?;
@@ -54,18 +60,19 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
 }
 
 /// Who computes, and is there.
-enum Computers<'a> {
+enum Computers {
     Here { workers: u32, threads: u32 },
-    There(Box<Client>, &'a Endpoint),
+    There(Box<Client>),
 }
 
-impl<'a> Computers<'a> {
-    async fn find(place: &'a Place) -> Result<Self, Failure> {
+impl Computers {
+    async fn find(place: &Place) -> Result<Self, Failure> {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
             Place::There(remote) => {
+                remote.tell();
                 let client = Client::connect(remote).await?;
-                Self::There(Box::new(client), &remote.endpoint)
+                Self::There(Box::new(client))
             }
         })
     }
@@ -121,14 +128,14 @@ async fn here(
     threads: u32,
     specification: &JobSpecification,
     directory: Option<&ResultsDirectory>,
-    interruption: impl Future<Output = ()>,
+    interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, Failure> {
     let store =
         directory.map_or(StorePlace::Memory, |directory| StorePlace::Directory(directory.store()));
     let progress = Arc::new(AtomicU64::new(0));
     let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
     let endpoint = embedded.endpoint().clone();
-    let remote = Remote { endpoint, files: CredentialFiles::default() };
+    let remote = Remote { endpoint, files: CredentialFiles::default(), from_environment: false };
     let driven = async {
         let client = Client::connect(&remote).await?;
         let note = |snapshot: &JobSnapshot| {
@@ -140,10 +147,10 @@ async fn here(
     let result = tokio::select! {
         driven = driven => driven,
         failure = embedded.failed() => Err(failure),
-        () = interruption => Err(Failure::failed(anyhow!(match directory {
-            Some(_) => "interrupted; the same command continues",
-            None => "interrupted; nothing was kept (with --out DIR a run can be continued)",
-        }))),
+        interruption = interruption => Err(Failure::Interrupted(interruption, match directory {
+            Some(_) => "run the same command again to resume",
+            None => "no results were saved (with --out DIR a run can be resumed)",
+        })),
     };
     embedded.end().await;
     result
@@ -152,16 +159,16 @@ async fn here(
 /// The job on a running coordinator.
 async fn there(
     client: Client,
-    endpoint: &Endpoint,
     specification: &JobSpecification,
     directory: Option<&ResultsDirectory>,
-    interruption: impl Future<Output = ()>,
+    interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, Failure> {
     tokio::select! {
         driven = drive(client, specification, directory, |_| {}) => driven,
-        () = interruption => Err(Failure::failed(anyhow!(
-            "interrupted; the job goes on at {endpoint} (see `osteon jobs`, `osteon cancel`)"
-        ))),
+        interruption = interruption => Err(Failure::Interrupted(
+            interruption,
+            "a job that was accepted goes on (see `osteon jobs`, `osteon cancel`)",
+        )),
     }
 }
 
@@ -180,7 +187,7 @@ async fn drive(
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }
-    let mut progress = Progress::start();
+    let mut progress = Progress::start(specification);
     client
         .watch(&job, |snapshot| {
             note(snapshot);

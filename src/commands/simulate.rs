@@ -3,7 +3,6 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use osteon_common::case::Case;
 use osteon_common::case_file;
 use osteon_common::plausible::case_warnings;
@@ -50,7 +49,7 @@ fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved,
                 .traces(&case.bone, arguments.duration, arguments.time_step)
                 .map_err(trace_failure)?;
             let positions = case.setup.probe.receivers.positions();
-            Some(write(directory, &traces, positions).map_err(Failure::Failed)?)
+            Some(write(directory, &traces, positions)?)
         }
         None => None,
     };
@@ -72,11 +71,15 @@ fn write(
     directory: &Path,
     traces: &Traces,
     positions: impl Iterator<Item = f64>,
-) -> anyhow::Result<PathBuf> {
-    std::fs::create_dir_all(directory)
-        .with_context(|| format!("cannot create the directory {}", directory.display()))?;
+) -> Result<PathBuf, Failure> {
+    results_directory::make_directory(directory)?;
     let path = directory.join("traces.csv");
-    results_directory::write_by(&path, |file| csv(traces, positions, file))?;
+    results_directory::write_by(&path, |file| csv(traces, positions, file)).map_err(|error| {
+        match error.downcast::<io::Error>() {
+            Ok(error) => Failure::unusable_path(error, format!("cannot write {}", path.display())),
+            Err(error) => Failure::Failed(error),
+        }
+    })?;
     Ok(path)
 }
 

@@ -14,7 +14,7 @@ use crate::resolved::Format;
 pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
     let TokenArguments { name, role, out, tokens: list } = arguments;
     let role = Role::named(role).ok_or_else(|| {
-        Failure::bad_input(anyhow!("there is no role `{role}`; allowed are read, submit, admin"))
+        Failure::bad_input(anyhow!("`{role}` is not a role; allowed are read, submit, admin"))
     })?;
     if !tokens::is_name(name) {
         return Err(Failure::bad_input(anyhow!(

@@ -14,6 +14,9 @@ pub(super) async fn serve(
     let credentials = Credentials::load(files, &config.endpoint).map_err(Failure::bad_input)?;
     let config = WorkerConfig { credentials, ..config };
     let interruption = signals::interruption()?;
+    let interruption = async {
+        interruption.await;
+    };
     osteon_worker::run(config, interruption).await.map_err(Failure::failed)?;
     Ok(Ending::Done)
 }

@@ -125,7 +125,7 @@ async fn keep(
         let in_a_row = deaths.count(shared.progress.load(Ordering::Relaxed));
         if in_a_row >= DEATHS_IN_A_ROW_MAX {
             let error = anyhow!(
-                "worker {number} died {in_a_row} times in a row without any progress; \
+                "worker {number} exited {in_a_row} times in a row without any progress; \
                  the last time it {death}{words}"
             );
             // A full channel holds the same message of another worker.
@@ -226,7 +226,7 @@ mod tests {
         let mut workers = Workers::start(executable, &endpoint, 2, 1, Arc::default());
         let failure = workers.failed().await.to_string();
         workers.end().await;
-        assert!(failure.contains("died 10 times in a row"), "{failure}");
+        assert!(failure.contains("exited 10 times in a row"), "{failure}");
         assert!(failure.contains("--coordinator"), "{failure}");
     }
 

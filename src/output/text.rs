@@ -1,8 +1,11 @@
 //! Output for people.
 
 mod check;
+mod fit;
 mod groups;
 mod identified;
+mod layout;
+mod number;
 mod result;
 mod solver;
 
@@ -11,9 +14,14 @@ use std::io::{self, Write};
 use osteon_common::visible;
 use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
+use self::layout::{INDENT, WIDTH, aligned, glued, wrapped};
+use self::number::{VELOCITY_DIGITS, digits, significant};
 use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::client;
-use crate::progress::{describe, span};
+use crate::progress::{Observed, line, span};
+
+/// Columns of the time before a line of `watch`.
+const TIME_WIDTH: usize = 9;
 
 /// Output for people.
 pub(crate) struct TextOutput<'a> {
@@ -50,10 +58,10 @@ impl Output for TextOutput<'_> {
             rows.push([
                 job.job.clone(),
                 kind_name(job).to_owned(),
-                status_name(job).unwrap_or_else(|| state_name(job)).to_owned(),
+                state(job).to_owned(),
                 span(job.elapsed_s),
                 job.workers.to_string(),
-                progress(job),
+                progress(job, WIDTH - INDENT),
             ]);
         }
         self.verbatim(&aligned(&rows))?;
@@ -66,13 +74,17 @@ impl Output for TextOutput<'_> {
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
-        let state = status_name(snapshot).unwrap_or_else(|| state_name(snapshot));
-        let time = span(snapshot.elapsed_s);
-        let line = match progress(snapshot).as_str() {
-            "" => format!("{time:>7}  {state}\n"),
-            progress => format!("{time:>7}  {state}: {}\n", visible::line(progress)),
+        let time = glued(&format!("{:>7}  ", span(snapshot.elapsed_s)));
+        // Who runs has an evaluation to show for it.
+        let state = match snapshot.state() {
+            JobState::Running => String::new(),
+            _ => format!("{}: ", state(snapshot)),
         };
-        self.verbatim(&line)
+        let text = match progress(snapshot, WIDTH - TIME_WIDTH - state.len()) {
+            progress if progress.is_empty() => state.trim_end_matches(": ").to_owned(),
+            progress => format!("{state}{progress}"),
+        };
+        self.verbatim(&wrapped(&format!("{time}{text}")))
     }
 
     fn verbatim(&mut self, text: &str) -> io::Result<()> {
@@ -85,8 +97,8 @@ impl Output for TextOutput<'_> {
 fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     let line = |worker: &ExpelledWorker| {
         let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
-        let (ago, host, reason) = (span(*elapsed_s), visible::line(host), visible::line(reason));
-        format!("expelled {ago} ago: {host} (process {process}) {reason}\n")
+        let ago = span(*elapsed_s);
+        wrapped(&format!("expelled {ago} ago: {host} (process {process}) {reason}"))
     };
     expelled.iter().map(line).collect()
 }
@@ -115,26 +127,34 @@ pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
     client::job_status(snapshot).map(osteon_common::results::Status::name)
 }
 
-fn progress(snapshot: &JobSnapshot) -> String {
+/// How the job ended, or where it stands.
+fn state(snapshot: &JobSnapshot) -> &'static str {
+    status_name(snapshot).unwrap_or_else(|| state_name(snapshot))
+}
+
+/// What there is to tell of a job in so many columns; a reason comes whole, however long it is.
+fn progress(snapshot: &JobSnapshot, width: usize) -> String {
     // A case file may follow the first line of a reason.
     let reason = snapshot.reason.lines().next().unwrap_or_default();
-    let parts = [describe(snapshot), reason.to_owned()];
+    let parts = [line(snapshot, &Observed::default(), width), reason.to_owned()];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
     let picking = simulation.setup.picking;
     let mut text = match simulation.arrival {
-        Ok(arrival) => format!(
-            "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)\n",
-            significant(arrival.velocity, 8),
+        Ok(arrival) => wrapped(&format!(
+            "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)",
+            digits(arrival.velocity, VELOCITY_DIGITS),
             picking.extremum.name(),
             picking.threshold
-        ),
-        Err(failure) if failure.detail.is_empty() => {
-            format!("no velocity: {}\n", failure.kind.name())
+        )),
+        Err(failure) => {
+            let kind = failure.kind.name().replace('_', " ");
+            let detail = Some(&failure.detail).filter(|detail| !detail.is_empty());
+            let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
+            wrapped(&format!("no velocity: {kind}{detail}"))
         }
-        Err(failure) => format!("no velocity: {} ({})\n", failure.kind.name(), failure.detail),
     };
     if let Ok(arrival) = simulation.arrival {
         text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
@@ -144,52 +164,12 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         }
     }
     let solver = solver_value(simulation.setup, simulation.arrival.as_ref().ok());
-    text.push_str(&format!("\n{}\n", solver::line(&solver)));
+    text.push_str(&format!("\n{}", wrapped(&solver::line(&solver))));
     if let Some(check) = simulation.check {
         text.push_str(&format!("\n{}", check::table(check)));
     }
     if let Some(path) = simulation.traces {
-        text.push_str(&format!("\ntraces in {}\n", visible::path(path)));
+        text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", visible::path(path)))));
     }
     text
-}
-
-/// Columns of equal width, two spaces between.
-pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
-    // Names and reasons of others are among them.
-    let cells =
-        |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
-    let rows: Vec<[String; COLUMNS]> = rows.iter().map(cells).collect();
-    let width =
-        |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: [usize; COLUMNS] = std::array::from_fn(width);
-    let mut text = String::new();
-    for row in &rows {
-        let mut line = String::new();
-        for (cell, width) in row.iter().zip(widths) {
-            line.push_str(&format!("{cell:<width$}  "));
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
-}
-
-/// A number with so many significant digits, without trailing zeros.
-pub(super) fn significant(value: f64, digits: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
-    let exponent: i32 = scientific.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
-    if !(-4..=9).contains(&exponent) {
-        return scientific;
-    }
-    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
-    let plain = format!("{value:.decimals$}");
-    if plain.contains('.') {
-        plain.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        plain
-    }
 }

@@ -29,7 +29,7 @@ pub enum WorkerError {
         source: rayon::ThreadPoolBuildError,
     },
     /// The coordinator does not take this worker; trying again would change nothing.
-    #[error("the coordinator at {endpoint} refuses this worker: {reason}")]
+    #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,

@@ -188,7 +188,7 @@ impl Worker {
                 },
                 () = leave.as_mut(), if !draining => {
                     draining = true;
-                    info!("leaving: finishing the batches in hand");
+                    info!("draining");
                     Event::Drain
                 }
                 _ = ticks.tick() => Event::Tick,

@@ -146,7 +146,7 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
         if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
             violations
-                .add(&field, format!("is no name of a group: it must have 1 to {most} bytes"));
+                .add(&field, format!("is not a valid group name: it must have 1 to {most} bytes"));
         } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
             let code = u32::from(c);
             violations.add(
@@ -183,7 +183,7 @@ fn velocities(
         measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
     for (refusals, (index, &velocity)) in refused.enumerate() {
         if refusals == REFUSED_MAX {
-            violations.add(field, "has more velocities to refuse, not listed here");
+            violations.add_more(field, "more velocities out of range are not listed");
             return;
         }
         violations.add(element_path(field, index), VELOCITY.refusal(velocity));
@@ -192,8 +192,9 @@ fn velocities(
         return;
     }
     if count < VELOCITIES_MIN {
+        let contains = if count == 0 { "no velocity" } else { "only one velocity" };
         violations
-            .add(field, format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"));
+            .add(field, format!("contains {contains}; {MOMENTS_NEED} at least two velocities"));
     } else if measured.iter().all(|velocity| velocity == &measured[0]) {
         let velocity = measured[0];
         violations.add(

@@ -135,7 +135,11 @@ fn velocities(
             Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
-                    reader.violations.add(&path, problem.to_string());
+                    if problem.stands_for_more() {
+                        reader.violations.add_more(&path, problem.to_string());
+                    } else {
+                        reader.violations.add(&path, problem.to_string());
+                    }
                 }
                 None
             }

@@ -115,7 +115,7 @@ fn lost(state: &mut State, worker: WorkerId, cause: Cause, now: Duration) {
         state.no_worker_since = now;
     }
     tracing::info!(%worker, name = %gone.name, batches = gone.in_flight.len(),
-        "a worker is gone; what it held goes to others");
+        "worker disconnected; reassigning its batches");
     let cause = if gone.draining { Cause::Announced } else { cause };
     if cause != Cause::Announced && !gone.in_flight.is_empty() {
         state.count_loss(&gone.name, now);

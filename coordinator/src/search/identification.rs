@@ -117,7 +117,7 @@ fn together(groups: &[(&str, &GroupEnding)]) -> Ending {
             groups.iter().filter(|(_, ending)| ending.status == status).collect();
         if let Some((name, first)) = of_status.first() {
             let why = first.reason.as_ref().map_or_else(
-                || ", whose evaluations are used up".to_owned(),
+                || ", which reached its limit of evaluations".to_owned(),
                 |reason| format!(": {reason}"),
             );
             let (count, all) = (of_status.len(), groups.len());

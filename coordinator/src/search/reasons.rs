@@ -73,8 +73,8 @@ fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> 
         (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
     };
     Some(format!(
-        "settled at a cost of {:.3e}, above cost_tolerance {:?}: no point near the best one{} \
-         matches the data better; {}",
+        "settled at a cost of {:.3e}, above cost_tolerance {:?}: no nearby point fits better{}; \
+         {}",
         best.cost.unwrap_or(f64::NAN),
         specification.search.cost_tolerance,
         where_it_is,

@@ -99,10 +99,10 @@ fn a_token_is_read_or_refused_without_being_told() {
     assert_eq!(token(&file).unwrap(), good);
     for (name, bytes, mode, expected) in [
         ("open", good.reveal().as_bytes(), 0o644, "chmod 600"),
-        ("word", b"correct horse".as_slice(), 0o600, "is no token of osteon"),
-        ("hash", good.hash().to_string().as_bytes(), 0o600, "is no token of osteon"),
-        ("bytes", b"\xff\xfe", 0o600, "no text"),
-        ("empty", b"", 0o600, "is no token of osteon"),
+        ("word", b"correct horse".as_slice(), 0o600, "is not a valid osteon token"),
+        ("hash", good.hash().to_string().as_bytes(), 0o600, "is not a valid osteon token"),
+        ("bytes", b"\xff\xfe", 0o600, "is not a text file"),
+        ("empty", b"", 0o600, "is not a valid osteon token"),
     ] {
         let path = place.write(name, bytes, mode);
         let error = token(&path).unwrap_err().to_string();

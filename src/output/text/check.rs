@@ -3,7 +3,8 @@
 use osteon_study::Difference;
 use osteon_study::check::{Check, Solution};
 
-use super::{aligned, significant};
+use super::layout::aligned;
+use super::number::{VELOCITY_DIGITS, digits, significant};
 
 /// The table, and whether the check was passed.
 pub(super) fn table(check: &Check) -> String {
@@ -27,10 +28,10 @@ fn row(solution: &Solution) -> [String; 5] {
     let settings = &solution.setup.solver;
     let name =
         format!("{}, refinement {}", settings.method.name(), significant(settings.refinement, 3));
-    let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| significant(value, 2));
+    let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| digits(value, 2));
     let (velocity, estimated) = match &solution.arrival {
-        Ok(arrival) => (significant(arrival.velocity, 8), Some(arrival.estimated_error)),
-        Err(failure) => (failure.kind.name().to_owned(), None),
+        Ok(arrival) => (digits(arrival.velocity, VELOCITY_DIGITS), Some(arrival.estimated_error)),
+        Err(failure) => (failure.kind.name().replace('_', " "), None),
     };
     let difference = match solution.difference {
         Difference::Picks => "other pick".to_owned(),

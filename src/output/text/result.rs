@@ -1,19 +1,21 @@
 //! The table of a result, made from the text of `result.json`: a result that was stored looks as
 //! one that was just computed.
 
-use osteon_common::job::{JobKind, JobSpecification, Objective, Range, SearchMethod};
+use osteon_common::job::{JobKind, JobSpecification, Objective, Range};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::{results_json, visible};
 use serde_json::Value;
 
-use super::{aligned, groups, identified, significant, solver};
+use super::layout::{aligned, glued, wrapped};
+use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
+use super::{fit, groups, identified, solver};
 use crate::output::ShownResult;
 use crate::verdict;
 
 /// The table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
     let Ok(value) = serde_json::from_str::<Value>(shown.json) else {
-        return format!("the stored result is no JSON:\n{}\n", visible::lines(shown.json));
+        return format!("the stored result is not valid JSON:\n{}\n", visible::lines(shown.json));
     };
     let mut text = String::new();
     match shown.kind {
@@ -22,190 +24,257 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
     }
     let solver = solver::line(&value["solver"]);
     if !solver.is_empty() {
-        text.push_str(&format!("\n{solver}\n"));
+        text.push_str(&format!("\n{}", wrapped(&solver)));
     }
     if let Some(digest) = value["digest"].as_str() {
         text.push_str(&format!("\ndigest {}\n", visible::line(digest)));
     }
     if let Some(directory) = shown.directory {
-        text.push_str(&format!("files in {}\n", visible::path(directory)));
+        text.push_str(&wrapped(&format!("files in {}", visible::path(directory))));
     }
     text
 }
 
 fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
-    let status = value["status"].as_str().unwrap_or("unknown");
-    let reason = value["reason"].as_str().filter(|reason| !reason.is_empty());
-    let headline = match status {
-        "converged" => "Converged",
-        // A search that stops early says itself why.
-        "max_evaluations" if reason.is_some() => "Not converged",
-        "max_evaluations" => "Not converged: the evaluations are used up",
-        "cancelled" => "Cancelled",
-        _ => "Failed",
-    };
-    text.push_str(headline);
-    if let Some(reason) = reason {
-        text.push_str(&format!(": {}", visible::lines(reason)));
-    }
+    let specification = shown.specification;
+    text.push_str(&headline(value, specification));
     let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
-    text.push_str(&format!("\n{evaluations} evaluations of {realizations} realizations"));
+    let mut count = format!("{evaluations} evaluations of {realizations} realizations");
+    if let Some(measured) = value["sensitivities"].as_object() {
+        count.push_str(&format!(" and {} for derivatives", measured.len()));
+    }
     if let Some(groups) = value["groups"].as_array() {
+        text.push_str(&count);
         text.push_str(&groups::table(groups));
         return;
     }
     // Without a finite cost a point says nothing about the data.
     let feasible = value["cost"].is_number();
     let Some(point) = results_json::best_point(shown.json).ok().filter(|_| feasible) else {
-        text.push_str("; no point was feasible\n");
+        text.push_str(&wrapped(&format!("{count}; no point was feasible")));
         return;
     };
-    text.push_str(&format!("; at the best point {}\n\n", failures(value)));
-    text.push_str(&moments(value, true));
-    text.push_str(uncontrolled(value));
-    text.push_str(&failure_bias(value));
-    text.push_str(&kolmogorov(value));
+    text.push_str(&wrapped(&format!("{count}; {} at the best point", failures(value))));
     text.push('\n');
-    text.push_str(&parameters(&point, shown.specification));
-    if status != "failed" {
-        let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
-        let search = &shown.specification.search;
-        let matches = !by_likelihood(value) && cost <= search.cost_tolerance;
-        text.push_str(&uniqueness(&point, shown.specification, matches));
-        text.push_str(&identified::text(value));
+    text.push_str(&moments(value, true));
+    text.push_str(&notes(value));
+    text.push('\n');
+    text.push_str(&parameters(value, &point, specification));
+    if value["status"] == "failed" {
+        return;
     }
+    if fit::fits(value, specification) {
+        text.push_str(&fit::uniqueness(value, &point, specification));
+        text.push_str(&identified::text(value));
+    } else {
+        text.push_str(&fit::misfit(value, &point, specification));
+    }
+}
+
+/// How the search ended, and why.
+fn headline(value: &Value, specification: &JobSpecification) -> String {
+    let status = value["status"].as_str().unwrap_or("unknown");
+    let reason = value["reason"].as_str().filter(|reason| !reason.is_empty());
+    let headline = match status {
+        "converged" => "Converged",
+        "max_evaluations" => "Not converged",
+        "cancelled" => "Cancelled",
+        _ => "Failed",
+    };
+    let used_up = || {
+        let search = &specification.search;
+        let each = if search.starts > 1 { " from each start" } else { "" };
+        format!("reached the limit of {} evaluations{each}", search.max_evaluations)
+    };
+    // A search that stops early says itself why.
+    let reason = match reason {
+        None if status == "max_evaluations" => Some(used_up()),
+        reason => reason.map(str::to_owned),
+    };
+    let Some(reason) = reason else { return format!("{headline}\n") };
+    // A case file may follow the first line of a reason; it must stay as it is.
+    let (first, rest) = reason.split_once('\n').unwrap_or((&reason, ""));
+    let first = wrapped(&format!("{headline}: {first}"));
+    if rest.is_empty() { first } else { format!("{first}{}\n", rest.trim_end()) }
 }
 
 fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
     if let Some(reason) = verdict::propagation_failure(shown.specification, value) {
-        text.push_str(&format!("Failed: {}\n", visible::lines(&reason)));
+        text.push_str(&wrapped(&format!("Failed: {reason}")));
     }
-    text.push_str(&format!("{} realizations; {}\n\n", value["realizations"], failures(value)));
+    text.push_str(&wrapped(&format!(
+        "{} realizations; {}",
+        value["realizations"],
+        failures(value)
+    )));
+    text.push('\n');
     text.push_str(&moments(value, false));
-    text.push_str(uncontrolled(value));
-    text.push_str(&failure_bias(value));
+    text.push_str(&notes(value));
 }
 
+/// How many realizations failed, by kind, by its name.
 fn failures(value: &Value) -> String {
-    let counts = value["failures"].as_object();
-    let counts: Vec<String> =
-        counts.into_iter().flatten().map(|(kind, count)| format!("{count} {kind}")).collect();
-    if counts.is_empty() {
-        "none failed".to_owned()
-    } else {
-        format!("failed: {}", counts.join(", "))
+    let failures = value["failures"].as_object().into_iter().flatten();
+    let named = failures.map(|(kind, count)| (kind.replace('_', " "), count.as_u64().unwrap_or(0)));
+    let counts: Vec<(String, u64)> = named.collect();
+    let all = failure_count(value);
+    match counts.as_slice() {
+        [] => "no failures".to_owned(),
+        [(kind, 1)] => format!("1 failure ({kind})"),
+        [(kind, _)] => format!("{all} failures ({kind})"),
+        counts => {
+            let counts: Vec<String> =
+                counts.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+            format!("{all} failures ({})", counts.join(", "))
+        }
     }
+}
+
+fn failure_count(value: &Value) -> u64 {
+    let counts = value["failures"].as_object().into_iter().flatten();
+    // A file may say anything.
+    counts.filter_map(|(_, count)| count.as_u64()).fold(0, u64::saturating_add)
 }
 
 /// Moments with their standard errors, against the data's.
 fn moments(value: &Value, with_data: bool) -> String {
-    let row = |name: &str, key: &str, unit: &str| {
-        let error = &value["velocity"]["standard_error"][key];
-        let model = match (value["velocity"][key].as_f64(), error.as_f64()) {
-            (Some(number), Some(error)) => with_error(number, error, unit),
-            (Some(number), None) => format!("{}{unit}", significant(number, 8)),
-            _ => "none".to_owned(),
-        };
-        let data = value["data"][key].as_f64();
-        let interval = interval(&value["data"]["interval"], key);
-        let data = data.map(|number| format!("{}{unit}{interval}", significant(number, 7)));
-        [name.to_owned(), model, data.unwrap_or_default()]
+    let row = |name: &str, key: &str| {
+        let error = value["velocity"]["standard_error"][key].as_f64().unwrap_or(f64::NAN);
+        let model = value["velocity"][key].as_f64();
+        let [data, interval] = of_data(value, key, error);
+        let model = model.map_or("none".to_owned(), |number| measured(number, error));
+        [name.to_owned(), model, data, interval]
     };
     let mut rows = Vec::new();
     if with_data {
-        rows.push(["".to_owned(), "model ± standard error".to_owned(), "data".to_owned()]);
+        let level = value["data"]["interval"]["level"].as_f64();
+        let interval = level.map(|level| format!("{} % interval", significant(100.0 * level, 3)));
+        let header = ["", "model ± standard error", "data", &interval.unwrap_or_default()];
+        rows.push(header.map(str::to_owned));
     }
-    rows.push(row("mean velocity", "mean", " m/s"));
-    rows.push(row("coefficient of variation", "coefficient_of_variation", ""));
+    rows.push(row("mean velocity (m/s)", "mean"));
+    rows.push(row("coefficient of variation", "coefficient_of_variation"));
     if let Some(cost) = value["cost"].as_f64() {
-        let shown = if by_likelihood(value) {
-            with_error(cost, value["cost_standard_error"].as_f64().unwrap_or(f64::NAN), " nats")
+        let error = value["cost_standard_error"].as_f64().unwrap_or(f64::NAN);
+        let (name, shown) = if by_likelihood(value) {
+            ("cost (nats)", measured(cost, error))
         } else {
-            significant(cost, 4)
+            ("cost", digits(cost, 3))
         };
-        rows.push(["cost".to_owned(), shown, String::new()]);
+        rows.push([name.to_owned(), shown, String::new(), String::new()]);
     }
     aligned(&rows)
+}
+
+/// A moment of the data and its interval: to the decimal that the interval leaves, or where there
+/// is none, to that of the model's error.
+fn of_data(value: &Value, key: &str, error_of_model: f64) -> [String; 2] {
+    let Some(number) = value["data"][key].as_f64() else { return [String::new(), String::new()] };
+    let ends = &value["data"]["interval"][key];
+    let (Some(low), Some(high)) = (ends[0].as_f64(), ends[1].as_f64()) else {
+        let shown = Decimals::of_error(error_of_model).map(|decimals| decimals.show(number));
+        return [shown.unwrap_or_else(|| digits(number, DIGITS)), String::new()];
+    };
+    // An interval of 95 % reaches two standard errors to each side.
+    match Decimals::of_error((high - low) / 4.0) {
+        Some(decimals) => {
+            [decimals.show(number), format!("{} to {}", decimals.show(low), decimals.show(high))]
+        }
+        None => [digits(number, DIGITS), String::new()],
+    }
+}
+
+/// What is to be known of the moments besides.
+fn notes(value: &Value) -> String {
+    let notes = [uncontrolled(value), effect_of_failures(value), kolmogorov(value)];
+    notes.into_iter().flatten().map(|note| wrapped(&note)).collect()
 }
 
 /// That the control variate which was asked for could not be used.
-fn uncontrolled(value: &Value) -> &'static str {
-    match (value["control_variate"].as_bool(), value["velocity"]["controlled"].as_bool()) {
-        (Some(true), Some(false)) => {
-            "moments without the control variate: it takes three realizations or more, and none failed\n"
-        }
-        _ => "",
-    }
-}
-
-/// The confidence interval of a moment of the data, if it is known.
-fn interval(interval: &Value, key: &str) -> String {
-    let ends = (interval[key][0].as_f64(), interval[key][1].as_f64(), interval["level"].as_f64());
-    let (Some(low), Some(high), Some(level)) = ends else { return String::new() };
-    let [low, high] = [low, high].map(|end| significant(end, 5));
-    format!(" ({} %: {low} to {high})", significant(100.0 * level, 3))
+fn uncontrolled(value: &Value) -> Option<String> {
+    let asked = value["control_variate"].as_bool()?;
+    let used = value["velocity"]["controlled"].as_bool()?;
+    let failed = match failure_count(value) {
+        0 => String::new(),
+        count => format!(" ({count} failed)"),
+    };
+    (asked && !used).then(|| {
+        format!(
+            "Control variate not used: it requires at least three realizations and no \
+             failures{failed}."
+        )
+    })
 }
 
 /// How large a bias the failed realizations may have left, if there are any.
-fn failure_bias(value: &Value) -> String {
-    if value["failures"].as_object().is_none_or(serde_json::Map::is_empty) {
-        return String::new();
-    }
+fn effect_of_failures(value: &Value) -> Option<String> {
+    value["failures"].as_object().filter(|kinds| !kinds.is_empty())?;
     let bias = &value["velocity"]["failure_bias"];
-    let (Some(mean), Some(variation)) =
-        (bias["mean"].as_f64(), bias["coefficient_of_variation"].as_f64())
-    else {
-        return String::new();
+    let signed = |key: &str| {
+        let number = bias[key].as_f64()?;
+        let sign = if number < 0.0 { "-" } else { "+" };
+        Some(format!("{sign}{}", digits(number.abs(), 2)))
     };
-    let signed = |number: f64, digits| {
-        format!("{}{}", if number < 0.0 { "-" } else { "+" }, significant(number.abs(), digits))
-    };
-    format!(
-        "with velocities as expected of their tensors the failed realizations would add {} m/s to the mean\n\
-         and {} to the coefficient of variation\n",
-        signed(mean, 2),
-        signed(variation, 2)
-    )
+    let mean = glued(&format!("{} m/s", signed("mean")?));
+    let variation = signed("coefficient_of_variation")?;
+    Some(format!(
+        "Had the failed realizations succeeded, the mean would change by an estimated {mean} and \
+         the coefficient of variation by {variation}."
+    ))
 }
 
 /// Whether the data can be of the model's law, if that was tested.
-fn kolmogorov(value: &Value) -> String {
+fn kolmogorov(value: &Value) -> Option<String> {
     let test = &value["data"]["kolmogorov"];
-    match (test["distance"].as_f64(), test["p_value"].as_f64()) {
-        (Some(distance), Some(p)) => format!(
-            "Kolmogorov's distance of data and model {}, p {} (too large, as the model was fitted)\n",
-            significant(distance, 2),
-            significant(p, 2)
-        ),
-        _ => String::new(),
-    }
+    let (distance, p) = (test["distance"].as_f64()?, test["p_value"].as_f64()?);
+    let numbers = glued(&format!("D = {}, p = {}", digits(distance, 2), digits(p, 2)));
+    Some(format!(
+        "Kolmogorov–Smirnov test, data vs model: {numbers} (optimistic: the model was fitted to \
+         these data)"
+    ))
 }
 
-fn by_likelihood(value: &Value) -> bool {
+/// Whether the cost is a likelihood's.
+pub(super) fn by_likelihood(value: &Value) -> bool {
     value["objective"].as_str() == Some(Objective::Likelihood.name())
 }
 
-/// A number with enough digits to compare it with the data's, and two digits of its standard
-/// error.
-fn with_error(number: f64, error: f64, unit: &str) -> String {
-    format!("{} ± {}{unit}", significant(number, 7), significant(error, 2))
-}
-
-fn parameters(point: &Point, specification: &JobSpecification) -> String {
-    let mut rows = Vec::new();
-    for parameter in Parameter::ALL {
+/// The best point, with the digits that the data leave each parameter.
+fn parameters(value: &Value, point: &Point, specification: &JobSpecification) -> String {
+    let identified = &value["identified"];
+    let matched = identified["matched"] == true;
+    let row = |parameter: Parameter| {
         let (scale, unit) = scale(parameter);
-        let shown = |value: f64| significant(value * scale, 6);
-        let range = match specification.range(parameter) {
-            Range::Fixed(_) => "fixed".to_owned(),
-            Range::Free { lower, upper, .. } => {
-                format!("searched in {} to {}", shown(lower), shown(upper))
+        let number = point.get(parameter) * scale;
+        let known = match parameter {
+            Parameter::Dispersion => &identified["dispersion"],
+            _ => &identified["parameters"][parameter.name()],
+        };
+        let error = known["standard_error"].as_f64().map(|error| error * scale);
+        let (shown, bounds, note) = match (specification.range(parameter), error) {
+            (Range::Fixed(_), _) => (significant(number, 6), None, "fixed"),
+            (Range::Free { lower, upper, .. }, Some(error)) => {
+                (measured(number, error), Some([lower, upper]), "")
+            }
+            (Range::Free { lower, upper, .. }, None) if matched => {
+                (digits(number, FREE_DIGITS), Some([lower, upper]), "not determined")
+            }
+            (Range::Free { lower, upper, .. }, None) => {
+                (digits(number, DIGITS), Some([lower, upper]), "")
             }
         };
-        let name = parameter.name().replace('_', " ");
-        rows.push([name, format!("{}{unit}", shown(point.get(parameter))), range]);
-    }
+        let bounds = bounds.map(|ends| ends.map(|end| significant(end * scale, 4)).join(" to "));
+        let name = readable(parameter);
+        [name, format!("{shown}{unit}"), bounds.unwrap_or_default(), note.to_owned()]
+    };
+    let mut rows = vec![["", "best point", "bounds", ""].map(str::to_owned)];
+    rows.extend(Parameter::ALL.into_iter().map(row));
     aligned(&rows)
+}
+
+/// Name of a parameter.
+pub(super) fn readable(parameter: Parameter) -> String {
+    parameter.name().replace('_', " ").replace("young", "Young").replace("poisson", "Poisson")
 }
 
 /// Factor and unit that make a parameter readable.
@@ -215,39 +284,4 @@ pub(super) fn scale(parameter: Parameter) -> (f64, &'static str) {
         "" => (1.0, ""),
         _ => (1.0, " kg/m³"),
     }
-}
-
-/// Which of the found numbers the data determine, and what the others are.
-fn uniqueness(point: &Point, specification: &JobSpecification, matches: bool) -> String {
-    let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
-    let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
-    let dispersion = free(Parameter::Dispersion);
-    let elastic = searched - usize::from(dispersion);
-    let Ok(elasticity) = point.constants().elasticity() else { return String::new() };
-    let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
-    let speed = format!("√(c1111/ρ) = {} m/s", significant(speed, 6));
-    if elastic < 2 {
-        return format!("\n{speed} at this point.\n");
-    }
-    let dispersion = if dispersion {
-        format!(" and the dispersion {}", significant(point.dispersion(), 4))
-    } else {
-        String::new()
-    };
-    let known = match specification.objective {
-        Objective::Moments => "Two moments",
-        Objective::Likelihood => "The law of one velocity",
-    };
-    let others = if matches && specification.search.method == SearchMethod::Newton {
-        "of the points that match the data, this is the one nearest to the start\n\
-         (distances in units of the bounds)."
-    } else {
-        "the other values are one of many sets that match the data equally well."
-    };
-    format!(
-        "\n{known} cannot fix {searched} parameters. The data determine only\n    \
-         {speed}{dispersion};\n\
-         {others}\n\
-         Fix what is known from elsewhere (`fixed = …`) to narrow them down.\n"
-    )
 }

@@ -1,0 +1,132 @@
+//! Whether the model fits the data, and which of the found numbers the data determine.
+
+use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
+use osteon_common::parameters::{Parameter, Point};
+use osteon_coordinator::search_box::{SearchBox, Side};
+use serde_json::Value;
+
+use super::identified;
+use super::layout::{glued, wrapped};
+use super::number::{DIGITS, digits, significant};
+use super::result::{by_likelihood, readable};
+
+/// Standard errors that a moment of the model may be off, as where intervals are computed.
+const ERRORS_MAX: f64 = 3.0;
+/// Relative difference below which a moment is matched however small its error is, as there.
+const EXACT: f64 = 1e-4;
+
+/// Whether the model at the best point fits the data: what the derivatives said, or else what cost
+/// and moments say.
+pub(super) fn fits(value: &Value, specification: &JobSpecification) -> bool {
+    if let Some(matched) = value["identified"]["matched"].as_bool() {
+        return matched;
+    }
+    is_reached(value, specification)
+        || ["mean", "coefficient_of_variation"].iter().all(|key| is_within_noise(value, key))
+}
+
+/// Whether the search came to the cost that it was asked for.
+fn is_reached(value: &Value, specification: &JobSpecification) -> bool {
+    let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
+    !by_likelihood(value) && cost <= specification.search.cost_tolerance
+}
+
+/// Whether a moment of the model is within the noise of both.
+fn is_within_noise(value: &Value, key: &str) -> bool {
+    let Some(difference) = difference(value, key) else { return false };
+    let relative = |error: f64, moment: &Value| error / moment.as_f64().unwrap_or(f64::NAN);
+    let of_model = value["velocity"]["standard_error"][key].as_f64().unwrap_or(0.0);
+    // An interval of 95 % reaches two standard errors to each side.
+    let ends = &value["data"]["interval"][key];
+    let of_data = match (ends[0].as_f64(), ends[1].as_f64()) {
+        (Some(low), Some(high)) => (high - low) / 4.0,
+        _ => 0.0,
+    };
+    let errors =
+        [relative(of_model, &value["velocity"][key]), relative(of_data, &value["data"][key])];
+    let noise = errors[0].hypot(errors[1]);
+    difference.abs() <= (ERRORS_MAX * noise).max(EXACT)
+}
+
+/// How far a moment of the model is above that of the data, relative.
+fn difference(value: &Value, key: &str) -> Option<f64> {
+    Some(value["velocity"][key].as_f64()? / value["data"][key].as_f64()? - 1.0)
+}
+
+/// That the model misses the data, by how much, and which parameters it ran into.
+pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecification) -> String {
+    let off = |key: &str| {
+        let difference = difference(value, key)?;
+        // Of other units than the model's, say.
+        if !(-0.5..=1.0).contains(&difference) {
+            return Some(format!("{} times the data's", digits(1.0 + difference, 2)));
+        }
+        let side = if difference < 0.0 { "below" } else { "above" };
+        let percent = glued(&format!("{} %", digits(100.0 * difference.abs(), 2)));
+        Some(format!("{percent} {side} the data's"))
+    };
+    let mut text = "The model does not fit the data, so no intervals can be given.".to_owned();
+    if let (Some(mean), Some(variation)) = (off("mean"), off("coefficient_of_variation")) {
+        text.push_str(&format!(
+            " Its mean velocity is {mean}, its coefficient of variation {variation}."
+        ));
+    }
+    let on_bounds = SearchBox::new(specification.parameters).on_bounds(point);
+    let on_bounds = on_bounds.iter().map(|(parameter, side)| match side {
+        Side::Lower => format!("{} (lower)", readable(*parameter)),
+        Side::Upper => format!("{} (upper)", readable(*parameter)),
+    });
+    let on_bounds: Vec<String> = on_bounds.collect();
+    if on_bounds.is_empty() {
+        text.push_str(" No parameter lies on a bound.");
+    } else {
+        text.push_str(&format!(" On their bounds: {}.", on_bounds.join(", ")));
+    }
+    format!("\n{}", wrapped(&text))
+}
+
+/// Which of the found numbers the data determine, and what the others are, for a model that fits.
+pub(super) fn uniqueness(value: &Value, point: &Point, specification: &JobSpecification) -> String {
+    let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
+    let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
+    let dispersion = free(Parameter::Dispersion);
+    let Ok(elasticity) = point.constants().elasticity() else { return String::new() };
+    let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
+    let speed = glued(&format!("√(c1111/ρ) = {} m/s", digits(speed, DIGITS)));
+    let shown_below = identified::has_intervals(value);
+    if searched - usize::from(dispersion) < 2 {
+        return if shown_below {
+            String::new()
+        } else {
+            format!("\n{}", wrapped(&format!("{speed} at this point.")))
+        };
+    }
+    let known = match specification.objective {
+        Objective::Moments => "Two moments",
+        Objective::Likelihood => "The distribution of one velocity",
+    };
+    let constrained =
+        if dispersion { "√(c1111/ρ) and the dispersion are" } else { "√(c1111/ρ) is" };
+    let nearest =
+        is_reached(value, specification) && specification.search.method == SearchMethod::Newton;
+    let this = if nearest {
+        "many other parameter sets fit equally well, and this is the one nearest to the start \
+         (distances in units of the bounds)."
+    } else {
+        "many other parameter sets fit equally well, and this is one of them."
+    };
+    let mut text = format!(
+        "{known} cannot determine {searched} parameters. Only {constrained} constrained; {this} \
+         Fix parameters that are known from other measurements (`fixed = …`) to narrow the others \
+         down."
+    );
+    if !shown_below {
+        let dispersion = if dispersion {
+            format!(", dispersion {}", significant(point.dispersion(), DIGITS))
+        } else {
+            String::new()
+        };
+        text.push_str(&format!("\n{speed}{dispersion}"));
+    }
+    format!("\n{}", wrapped(&text))
+}
