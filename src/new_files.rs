@@ -72,10 +72,9 @@ pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
-    write()
-        .map_err(|error| {
-            Failure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
-        })
+    write().map_err(|error| {
+        Failure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
+    })
 }
 
 fn write(file: &NewFile) -> std::io::Result<()> {

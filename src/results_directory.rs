@@ -199,7 +199,10 @@ impl Drop for ResultsDirectory {
 /// Bad input when it cannot be one, failed when the machine has no room for it.
 pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(path).map_err(|error| {
-        Failure::unusable_path(error, format!("cannot create the directory {}", visible::path(path)))
+        Failure::unusable_path(
+            error,
+            format!("cannot create the directory {}", visible::path(path)),
+        )
     })
 }
 

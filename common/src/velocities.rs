@@ -180,7 +180,9 @@ fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Locate
             Ok(None) => break,
             Ok(Some((number, line))) => match columns.row(line) {
                 Ok((name, velocity)) => {
-                    gathered.add(number, name, velocity).map_err(|problem| vec![(None, problem)])?;
+                    gathered
+                        .add(number, name, velocity)
+                        .map_err(|problem| vec![(None, problem)])?;
                 }
                 Err(problem) => problems.push((Some(number), problem)),
             },

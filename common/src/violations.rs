@@ -69,6 +69,15 @@ impl Violations {
         self.0.iter()
     }
 
+    /// The same violations with other paths of fields.
+    #[must_use]
+    pub fn with_fields(mut self, rename: impl Fn(&str) -> String) -> Self {
+        for violation in &mut self.0 {
+            violation.field = rename(&violation.field);
+        }
+        self
+    }
+
     /// `value` if nothing is wrong, else the violations.
     ///
     /// # Errors

@@ -149,7 +149,10 @@ pub enum CredentialError {
         source: webpki::Error,
     },
     /// The certificate cannot be an authority's.
-    #[error("the certificate in {} is not a certificate authority's: {source}", visible::path(path))]
+    #[error(
+        "the certificate in {} is not a certificate authority's: {source}",
+        visible::path(path)
+    )]
     Root {
         /// The file.
         path: PathBuf,

@@ -6,7 +6,7 @@ use osteon_common::job::{
     SearchMethod,
 };
 use osteon_common::parameters::Parameter;
-use osteon_common::violations::{Violation, Violations};
+use osteon_common::violations::Violations;
 
 use crate::choice::{JOB_KIND, OBJECTIVE, PARAMETER, SAMPLING, SEARCH_METHOD};
 use crate::setup;
@@ -37,22 +37,17 @@ pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, 
     let mut violations = Violations::new();
     let specification = read(message, &mut violations);
     check::job(&specification, &mut violations);
-    as_of_message(&violations).into_result(specification)
+    violations.with_fields(field_of_message).into_result(specification)
 }
 
-/// The same violations by paths of the message, where they differ from those of a job file.
-fn as_of_message(violations: &Violations) -> Violations {
-    let mut renamed = Violations::new();
-    for Violation { field, message } in violations.iter() {
-        let of_range = field.strip_prefix("parameters.").and_then(|rest| rest.split_once('.'));
-        let field = match of_range {
-            Some((name, "start")) => format!("parameters.{name}.free.start"),
-            Some((name, "bounds")) => format!("parameters.{name}.free"),
-            _ => field.clone(),
-        };
-        renamed.add(field, message);
+/// The path in the message of a field of a job file: they differ for the ranges of parameters.
+fn field_of_message(field: &str) -> String {
+    let of_range = field.strip_prefix("parameters.").and_then(|rest| rest.split_once('.'));
+    match of_range {
+        Some((name, "start")) => format!("parameters.{name}.free.start"),
+        Some((name, "bounds")) => format!("parameters.{name}.free"),
+        _ => field.to_owned(),
     }
-    renamed
 }
 
 /// Reads all fields; one that cannot be read is recorded and replaced by a default.
