@@ -6,9 +6,11 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use osteon_proto::endpoint::Endpoint;
 
+use crate::program;
+
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
-#[command(name = "osteon", version, max_term_width = 100)]
+#[command(name = "osteon", version = program::version_line(), max_term_width = 100)]
 pub(crate) struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -83,7 +85,8 @@ pub(crate) struct RunArguments {
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
     pub(crate) case: PathBuf,
-    /// Write the pressure traces here, as traces.csv (by the exact method, whatever the case asks for)
+    /// Write the case, the result and the pressure traces here (traces.csv, by the exact method,
+    /// whatever the case asks for); a directory belongs to one case
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON

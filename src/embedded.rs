@@ -88,7 +88,7 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
         StorePlace::Directory(path) => Box::new(SqliteStore::open(&path).map_err(Failure::failed)?),
     };
     let store_patience = Some(Duration::from_secs(STORE_PATIENCE_S));
-    let config = Config { store_patience, ..Config::default() };
+    let config = Config { store_patience, commit: program::COMMIT, ..Config::default() };
     osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
 }
 

@@ -15,6 +15,16 @@ pub enum JobKind {
     Propagation,
 }
 
+impl JobKind {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Identification => "identification",
+            Self::Propagation => "propagation",
+        }
+    }
+}
+
 /// What is known of the measured velocities.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {

@@ -5,6 +5,7 @@ use crate::job::Sampling;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::settings::{Picking, SolverSettings};
+use crate::version::Program;
 
 /// How a job ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -170,8 +171,8 @@ pub struct JobResult {
     pub solver: SolverSettings,
     /// Criterion that was used.
     pub picking: Picking,
-    /// Version of the program that computed it.
-    pub version: String,
+    /// The program that computed it.
+    pub program: Program,
 }
 
 /// The best point of a job, with its realizations.

@@ -7,12 +7,13 @@ use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::job::{Data, JobSpecification};
+use crate::job::{Data, JobKind, JobSpecification};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EstimatedError, Evaluation, JobResult, Moments};
 use crate::sampling;
-use crate::settings::Method;
+use crate::settings::{Method, Picking};
+use crate::version::{Program, RESULT_SCHEMA};
 
 use self::found::Asked;
 
@@ -47,6 +48,7 @@ pub fn identification(
     let asked = Asked { specification, history };
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    head(&mut put, JobKind::Identification.name());
     put("status", json!(result.status.name()));
     if let Some(reason) = &result.reason {
         put("reason", json!(reason));
@@ -71,11 +73,10 @@ pub fn identification(
         let groups = result.groups.iter().enumerate();
         put("groups", groups.map(|(set, group)| found::group(&asked, set, group)).collect());
     }
-    let picking = &result.picking;
     let estimated_error = errors(best.and_then(|best| best.estimated_error));
     put("solver", solver(&specification.setup, estimated_error));
-    put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
-    put("version", json!(result.version));
+    put("picking", picking(&result.picking));
+    program(&mut put, &result.program);
     text(object)
 }
 
@@ -84,13 +85,36 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     let best = result.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    head(&mut put, JobKind::Propagation.name());
     put("realizations", json!(result.realizations));
+    put("seed", json!(result.seed));
     sampling(&mut put, result);
+    found::model(&mut put, best);
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", measured::model(best));
     put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
+    put("picking", picking(&result.picking));
     put("digest", json!(result.digest));
+    program(&mut put, &result.program);
     text(object)
+}
+
+/// What every result in JSON begins with: the revision of its keys, and of what it is the result.
+pub fn head(put: &mut impl FnMut(&str, Value) -> Option<Value>, kind: &str) {
+    put("schema", json!(RESULT_SCHEMA));
+    put("kind", json!(kind));
+}
+
+/// What every result in JSON ends with: the program that computed it.
+pub fn program(put: &mut impl FnMut(&str, Value) -> Option<Value>, program: &Program) {
+    put("version", json!(program.version));
+    put("numerics", json!(program.numerics));
+    put("commit", json!(program.commit));
+}
+
+/// The criterion of a first arrival.
+pub fn picking(picking: &Picking) -> Value {
+    json!({"extremum": picking.extremum.name(), "threshold": picking.threshold})
 }
 
 /// How velocities of a setup are computed: method, refinement, the method's sampling, and an

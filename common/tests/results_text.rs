@@ -16,6 +16,7 @@ use osteon_common::results::{
     BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Role, Status,
 };
 use osteon_common::settings::{Method, Picking, SolverSettings};
+use osteon_common::version::Program;
 use osteon_common::{job_file, results_csv, results_json};
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -58,7 +59,11 @@ fn result() -> JobResult {
         control_variate: true,
         solver: SolverSettings::default(),
         picking: Picking::default(),
-        version: "0.1.0".to_owned(),
+        program: Program {
+            version: "0.1.0".to_owned(),
+            numerics: 4,
+            commit: Some("c0ffee".to_owned()),
+        },
     }
 }
 

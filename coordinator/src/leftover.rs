@@ -101,9 +101,9 @@ impl Reading {
             return Ok(None);
         }
         let best = best(store, job, specification, summary, summary.best)?;
-        let (ending, version) = (&self.end.ending, &self.end.version);
+        let (ending, program) = (&self.end.ending, &self.end.program);
         let of_groups = std::mem::take(&mut self.of_groups);
-        let result = summary.result(specification, ending, version, best, of_groups);
+        let result = summary.result(specification, ending, program, best, of_groups);
         let specification = (**specification).clone();
         let history = self.summary.take().map(|summary| summary.history).unwrap_or_default();
         Ok(Some(Leftover { specification, result, history }))

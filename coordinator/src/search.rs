@@ -16,6 +16,7 @@ use osteon_common::results::{
     Status,
 };
 use osteon_common::statistics::{self, Verdict, likelihood_error};
+use osteon_common::version::Program;
 use thiserror::Error;
 
 use self::identification::Identification;
@@ -259,9 +260,9 @@ impl Search {
         }
     }
 
-    /// What the job leaves, given how it ended, computed by `version` of the program. Of groups,
+    /// What the job leaves, given how it ended, computed by `program`. Of groups,
     /// whose outcomes are in the store only, nothing is known here.
-    pub fn result(&self, ending: &Ending, version: &str) -> JobResult {
+    pub fn result(&self, ending: &Ending, program: &Program) -> JobResult {
         let summary = self.summary();
         let outcomes = match &self.plan {
             Plan::Identification(identification) => identification.best_outcomes(),
@@ -270,7 +271,7 @@ impl Search {
         let best = summary.best.zip(outcomes).and_then(|(number, outcomes)| {
             summary.best_point(&self.specification, number, outcomes)
         });
-        summary.result(&self.specification, ending, version, best, Vec::new())
+        summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
     /// Whether the data are groups.
@@ -326,13 +327,13 @@ impl Summary {
         })
     }
 
-    /// What a job with this path leaves, given how it ended, the version of the program that
+    /// What a job with this path leaves, given how it ended, the program that
     /// computed it, its best point, or those of its groups.
     pub fn result(
         &self,
         specification: &JobSpecification,
         ending: &Ending,
-        version: &str,
+        program: &Program,
         best: Option<BestPoint>,
         of_groups: Vec<Option<BestPoint>>,
     ) -> JobResult {
@@ -363,7 +364,7 @@ impl Summary {
             control_variate: specification.monte_carlo.control_variate,
             solver: specification.setup.solver,
             picking: specification.setup.picking,
-            version: version.to_owned(),
+            program: program.clone(),
         }
     }
 }

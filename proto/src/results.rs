@@ -10,6 +10,7 @@ use osteon_common::results::{
     Role, Status,
 };
 use osteon_common::settings::{Picking, SolverSettings};
+use osteon_common::version::Program;
 use osteon_common::violations::Violations;
 
 use crate::batch;
@@ -30,7 +31,9 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         seed: result.seed,
         solver: Some(setup::solver_to_message(&result.solver)),
         picking: Some(setup::picking_to_message(&result.picking)),
-        version: result.version.clone(),
+        version: result.program.version.clone(),
+        numerics: result.program.numerics,
+        commit: result.program.commit.clone().unwrap_or_default(),
         sampling: result.sampling.name().to_owned(),
         scrambles: result.scrambles,
         control_variate: result.control_variate,
@@ -128,7 +131,7 @@ pub fn from_message(
         control_variate: message.control_variate,
         solver,
         picking,
-        version: message.version.clone(),
+        program: program_from_message(message),
     })
 }
 
@@ -228,6 +231,14 @@ fn best_from_message(
         estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
         outcomes,
     })
+}
+
+fn program_from_message(message: &v1::JobResult) -> Program {
+    Program {
+        version: message.version.clone(),
+        numerics: message.numerics,
+        commit: (!message.commit.is_empty()).then(|| message.commit.clone()),
+    }
 }
 
 fn settings_from_message(message: &v1::JobResult) -> Result<(SolverSettings, Picking), Malformed> {

@@ -39,13 +39,14 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
         keep_ended: arguments.keep_ended,
         heartbeat: arguments.lease / HEARTBEATS_PER_LEASE,
         expiry: arguments.lease,
+        commit: program::COMMIT,
         ..Config::default()
     };
     let coordinator = osteon_coordinator::start(listener, Box::new(store), config)
         .await
         .map_err(Failure::failed)?;
     let address_file = directory.join("address");
-    results_directory::write(&address_file, &format!("{}\n", coordinator.url()))
+    result_files::write(&address_file, &format!("{}\n", coordinator.url()))
         .map_err(Failure::Failed)?;
     let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {

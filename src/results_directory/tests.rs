@@ -1,6 +1,7 @@
 use osteon_common::job::Sampling;
 use osteon_common::results::JobResult;
 use osteon_common::settings::{Picking, SolverSettings};
+use osteon_common::version::Program;
 
 use super::*;
 
@@ -37,7 +38,7 @@ fn fetched(status: Status) -> Fetched {
         control_variate: false,
         solver: SolverSettings::default(),
         picking: Picking::default(),
-        version: "0".to_owned(),
+        program: Program::this(None),
     };
     Fetched { specification: specification(), result, history: Vec::new() }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::{Moments, Status};
+use osteon_common::version::Program;
 use osteon_proto::{specification, v1};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
@@ -117,7 +118,7 @@ impl SqliteStore {
 
     fn end(&self, job: JobId) -> Result<Option<EndRecord>, StoreError> {
         let sql = "SELECT status, reason, version, ended_ns, evaluations, best_cost, best_mean,
-                   best_coefficient_of_variation, checksum FROM ending WHERE job = ?1";
+                   best_coefficient_of_variation, checksum, numerics, commit_id FROM ending WHERE job = ?1";
         let read = |row: &Row<'_>| {
             let status: String = row.get(0)?;
             let status = Status::ALL.into_iter().find(|known| known.name() == status);
@@ -129,7 +130,11 @@ impl SqliteStore {
             let end = EndRecord {
                 job,
                 ending: Ending { status, reason },
-                version: row.get(2)?,
+                program: Program {
+                    version: row.get(2)?,
+                    numerics: row.get(9)?,
+                    commit: row.get(10)?,
+                },
                 ended: Duration::from_nanos(row.get(3)?),
                 evaluations: row.get(4)?,
                 best_cost: row.get(5)?,
@@ -275,18 +280,22 @@ impl Store for SqliteStore {
     }
 
     fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
-        let sql = "INSERT OR REPLACE INTO ending VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
+        let sql = "INSERT OR REPLACE INTO ending (job, status, reason, version, ended_ns, evaluations,
+                   best_cost, best_mean, best_coefficient_of_variation, checksum, numerics, commit_id)
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
         let values = params![
             record.job.0,
             record.ending.status.name(),
             record.ending.reason,
-            record.version,
+            record.program.version,
             nanoseconds(record.ended),
             record.evaluations,
             record.best_cost,
             record.best_moments.map(|moments| moments.mean),
             record.best_moments.map(|moments| moments.coefficient_of_variation),
             end_checksum(record),
+            record.program.numerics,
+            record.program.commit,
         ];
         let finish = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
@@ -401,8 +410,8 @@ impl Store for SqliteStore {
 fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
     tracing::error!(%error, "a job is shown as failed; the others are served");
     let ending = Ending { status: Status::Failed, reason: Some(error.to_string()) };
-    let version = "unknown".to_owned();
-    EndRecord { version, ..EndRecord::new(record.job, ending, record.accepted, 0, None) }
+    let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
+    EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }
 
 /// The job of a row, and its identifier; `None` if it is damaged.

@@ -9,7 +9,7 @@ use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective,
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
 use osteon_common::results::{BestPoint, EstimatedError, JobResult};
-use osteon_common::version::{self, VERSION};
+use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::effect::Record;
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, WorkerId};
@@ -172,7 +172,7 @@ pub(crate) fn left_by(
         .iter()
         .map(|group| best(group.best).map(|best| BestPoint { outcomes: Vec::new(), ..best }));
     let of_groups = of_groups.collect();
-    summary.result(specification, ending, VERSION, best(summary.best), of_groups)
+    summary.result(specification, ending, &Program::this(None), best(summary.best), of_groups)
 }
 
 /// All outcomes at one point, with the median and the largest of their estimated errors.

@@ -92,6 +92,8 @@ prop_compose! {
         sampling in 0..Sampling::ALL.len(),
         scrambles in 1..=SCRAMBLES_MAX,
         control_variate: bool,
+        numerics: u32,
+        commit in proptest::option::of("[0-9a-f]{1,40}"),
     ) -> JobResult {
         JobResult {
             status: Status::ALL[status],
@@ -108,7 +110,7 @@ prop_compose! {
             control_variate,
             solver: SolverSettings::default(),
             picking: Picking::default(),
-            version: "0.1.0".to_owned(),
+            program: Program { version: "0.1.0".to_owned(), numerics, commit },
         }
     }
 }

@@ -55,7 +55,7 @@ fn without_derivatives_the_search_ends_with_the_method() {
     let mut specification = specification(400);
     specification.search.sensitivities = false;
     let (search, _) = run(&specification);
-    assert_eq!(search.result(&ending(&search), "1").evaluations, search.history().len() as u64);
+    assert_eq!(search.result(&ending(&search), &Program::this(None)).evaluations, search.history().len() as u64);
 }
 
 /// Three parameters are free and two moments are given: of the points that match them, about, the
@@ -126,7 +126,7 @@ fn each_group_is_identified_by_itself() {
     // All begin at the start of the job.
     let firsts = (0..3).map(|k| summary.history.iter().find(|row| row.role.group == k).unwrap());
     assert!(firsts.into_iter().all(|row| row.point == told[0].0));
-    assert_eq!(search.result(&ending(&search), "1").best, None);
+    assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
 }
 
 #[test]

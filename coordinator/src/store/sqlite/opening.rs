@@ -9,13 +9,11 @@ use std::time::Duration;
 
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, FROM_FORMAT_4, SCHEMA};
+use super::schema::SCHEMA;
 use crate::store::StoreError;
 
 /// Format that this program writes.
-pub(super) const FORMAT: i64 = 5;
-/// Oldest format that this program brings up to date.
-const FORMAT_OLDEST: i64 = 2;
+pub(super) const FORMAT: i64 = 6;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the file that says who has the store open.
@@ -133,7 +131,7 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
     let path = path.to_owned();
-    if found < FORMAT_OLDEST {
+    if found < FORMAT {
         Err(StoreError::Older { path, found, known: FORMAT })
     } else if found > FORMAT {
         Err(StoreError::Newer { path, found, known: FORMAT })
@@ -156,7 +154,7 @@ fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     Err(StoreError::Inconsistent { path: path.to_owned(), found })
 }
 
-/// Sets the modes, makes the tables of a new file, and brings those of an old one up to date.
+/// Sets the modes, and makes the tables of a new file.
 fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()> {
     // Counts for a new file only: removed records give their room back.
     connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
@@ -177,13 +175,6 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute_batch("CREATE TABLE format (version INTEGER NOT NULL)")?;
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
-    }
-    for (format, change) in [(2, FROM_FORMAT_2), (3, FROM_FORMAT_3), (4, FROM_FORMAT_4)] {
-        let found: i64 =
-            transaction.query_row("SELECT version FROM format", [], |row| row.get(0))?;
-        if found == format {
-            transaction.execute_batch(change)?;
-        }
     }
     transaction.commit()
 }

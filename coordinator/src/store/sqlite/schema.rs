@@ -1,4 +1,4 @@
-//! The tables, and the way from older formats to this one.
+//! The tables.
 
 /// Tables of a new file.
 pub(super) const SCHEMA: &str = "
@@ -26,7 +26,9 @@ pub(super) const SCHEMA: &str = "
         job INTEGER PRIMARY KEY REFERENCES job(id),
         status TEXT NOT NULL,
         reason TEXT,
-        version TEXT NOT NULL,
+        version TEXT NOT NULL,           -- of the program
+        numerics INTEGER NOT NULL,       -- their revision in it
+        commit_id TEXT,                  -- that it was built from
         ended_ns INTEGER NOT NULL,
         evaluations INTEGER NOT NULL,
         best_cost REAL,
@@ -51,35 +53,4 @@ pub(super) const SCHEMA: &str = "
         checksum BLOB NOT NULL,
         instance INTEGER NOT NULL DEFAULT 0  -- the number it drew, as a signed one
     );
-";
-
-/// From format 2, which knew no estimated errors. The checksum of a row without one is the same.
-pub(super) const FROM_FORMAT_2: &str = "
-    ALTER TABLE evaluation ADD COLUMN estimated_error BLOB;
-    UPDATE format SET version = 3;
-";
-
-/// From format 3, which knew no clients, no priorities, and not who computed what. The checksum
-/// of a row with neither is the same.
-pub(super) const FROM_FORMAT_3: &str = "
-    ALTER TABLE job ADD COLUMN client TEXT NOT NULL DEFAULT '';
-    ALTER TABLE job ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;
-    ALTER TABLE evaluation ADD COLUMN workers TEXT;
-    CREATE TABLE expulsion (
-        number INTEGER PRIMARY KEY,
-        host TEXT NOT NULL,
-        process INTEGER NOT NULL,
-        job INTEGER NOT NULL,
-        reason TEXT NOT NULL,
-        at_ns INTEGER NOT NULL,
-        checksum BLOB NOT NULL
-    );
-    UPDATE format SET version = 4;
-";
-
-/// From format 4, which knew a worker by host and process alone. The checksum of a row without an
-/// instance is the same.
-pub(super) const FROM_FORMAT_4: &str = "
-    ALTER TABLE expulsion ADD COLUMN instance INTEGER NOT NULL DEFAULT 0;
-    UPDATE format SET version = 5;
 ";

@@ -8,8 +8,7 @@ use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, GroupEnding, Role, Status};
 
-use super::columns::checksum;
-use super::opening::{FILE, FORMAT, Journal, open_file};
+use super::opening::{FILE, Journal, open_file};
 use super::*;
 
 pub(super) fn job(id: u64) -> JobRecord {
@@ -57,7 +56,11 @@ pub(super) fn end(job: u64) -> EndRecord {
     EndRecord {
         job: JobId(job),
         ending: Ending { status: Status::Failed, reason: Some("why".to_owned()) },
-        version: "1.2.3".to_owned(),
+        program: Program {
+            version: "1.2.3".to_owned(),
+            numerics: 4,
+            commit: Some("c0ffee".to_owned()),
+        },
         ended: Duration::from_secs(1_763_000_100),
         evaluations: 2,
         best_cost: None,
@@ -340,8 +343,8 @@ fn a_second_coordinator_is_refused() {
 #[test]
 fn another_format_is_refused() {
     for (version, expected) in [
-        (1, "has format 1 of an older version of osteon, this program writes format 5; finish"),
-        (6, "has format 6, this program writes format 5; use a newer version of osteon"),
+        (5, "has format 5 of an older version of osteon, this program writes format 6; finish"),
+        (7, "has format 7, this program writes format 6; use a newer version of osteon"),
     ] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
@@ -350,128 +353,6 @@ fn another_format_is_refused() {
         let error = SqliteStore::open(directory.path()).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
     }
-}
-
-/// The tables as format 3 had them.
-const FORMAT_3: &str = "
-    CREATE TABLE format (version INTEGER NOT NULL);
-    INSERT INTO format VALUES (3);
-    CREATE TABLE job (
-        id INTEGER PRIMARY KEY,
-        request_id TEXT NOT NULL,
-        accepted_ns INTEGER NOT NULL,
-        specification BLOB NOT NULL,
-        fingerprint TEXT NOT NULL,
-        checksum BLOB NOT NULL
-    );
-    CREATE TABLE evaluation (
-        job INTEGER NOT NULL REFERENCES job(id),
-        number INTEGER NOT NULL,
-        point BLOB NOT NULL,
-        outcomes BLOB NOT NULL,
-        checksum BLOB NOT NULL,
-        estimated_error BLOB,
-        PRIMARY KEY (job, number)
-    );
-    CREATE TABLE ending (
-        job INTEGER PRIMARY KEY REFERENCES job(id),
-        status TEXT NOT NULL,
-        reason TEXT,
-        version TEXT NOT NULL,
-        ended_ns INTEGER NOT NULL,
-        evaluations INTEGER NOT NULL,
-        best_cost REAL,
-        best_mean REAL,
-        best_coefficient_of_variation REAL,
-        checksum BLOB NOT NULL
-    );
-    CREATE TABLE summary (
-        job INTEGER PRIMARY KEY REFERENCES job(id),
-        digest TEXT NOT NULL,
-        best INTEGER,
-        history BLOB NOT NULL,
-        checksum BLOB NOT NULL
-    );
-";
-/// What format 2 did not have of it.
-const BACK_TO_FORMAT_2: &str = "
-    ALTER TABLE evaluation DROP COLUMN estimated_error;
-    UPDATE format SET version = 2;
-";
-
-#[test]
-fn an_expulsion_of_format_4_is_one_without_an_instance() {
-    let mut record = expulsion(1);
-    record.worker = WorkerName::new("a node", 7, 0);
-    let directory = tempfile::tempdir().unwrap();
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    store.put_expulsion(&record).unwrap();
-    let back = "ALTER TABLE expulsion DROP COLUMN instance; UPDATE format SET version = 4;";
-    store.connection.execute_batch(back).unwrap();
-    drop(store);
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    assert_eq!(store.expulsions().unwrap(), [record]);
-    store.put_expulsion(&expulsion(2)).unwrap();
-    assert_eq!(store.expulsions().unwrap()[1], expulsion(2));
-}
-
-#[test]
-fn files_of_older_formats_are_brought_up_to_date() {
-    for oldest in [2, 3] {
-        let directory = tempfile::tempdir().unwrap();
-        let file = Connection::open(directory.path().join(FILE)).unwrap();
-        file.execute_batch(FORMAT_3).unwrap();
-        if oldest == 2 {
-            file.execute_batch(BACK_TO_FORMAT_2).unwrap();
-        }
-        let record = put_as_of_old(&file, oldest);
-        drop(file);
-        for _ in 0..2 {
-            let mut store = SqliteStore::open(directory.path()).unwrap();
-            let expected = StoredJob { record: job(1), end: Some(end(1)), evaluations: 0 };
-            assert_eq!(store.jobs().unwrap(), [expected]);
-            store.put_job(&job(2)).unwrap();
-            store.put_evaluation(&evaluation(1, 2), false).unwrap();
-            assert_eq!(evaluations(&mut store, 1).unwrap(), [record.clone(), evaluation(1, 2)]);
-            let sql = "SELECT version FROM format";
-            let found: i64 = store.connection.query_row(sql, [], |row| row.get(0)).unwrap();
-            assert_eq!(found, FORMAT);
-            store.forget_jobs(&[JobId(2)]).unwrap();
-        }
-    }
-}
-
-/// Job 1, its evaluation 1 and its end as format 2 or 3 wrote them.
-fn put_as_of_old(file: &Connection, format: i64) -> EvaluationRecord {
-    let JobRecord { request_id, specification, accepted, fingerprint, .. } = job(1);
-    let encoded = specification::to_message(&specification).encode_to_vec();
-    let accepted = nanoseconds(accepted);
-    let number = 1_u64.to_le_bytes();
-    let fields: [&[u8]; 5] =
-        [&number, request_id.as_bytes(), &accepted.to_le_bytes(), &encoded, fingerprint.as_bytes()];
-    let sql = "INSERT INTO job VALUES (1, ?1, ?2, ?3, ?4, ?5)";
-    let values = params![request_id, accepted, encoded, fingerprint, checksum(&fields)];
-    file.execute(sql, values).unwrap();
-
-    let kept = if format == 2 { evaluation(1, 1) } else { evaluation(1, 0) };
-    let record = EvaluationRecord { number: 1, workers: [].into(), ..kept };
-    let point: Vec<u8> = record.point.0.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let outcomes = pack_outcomes(&record.outcomes);
-    let errors = record.estimated_error.map(pack_errors);
-    let mut fields: Vec<&[u8]> = vec![&number, &number, &point, &outcomes];
-    fields.extend(errors.as_deref());
-    let checksum = checksum(&fields);
-    let sql = "INSERT INTO evaluation (job, number, point, outcomes, checksum)
-               VALUES (1, 1, ?1, ?2, ?3)";
-    file.execute(sql, params![point, outcomes, checksum]).unwrap();
-    if let Some(errors) = errors {
-        file.execute("UPDATE evaluation SET estimated_error = ?1", [errors]).unwrap();
-    }
-    let EndRecord { version, ended, .. } = end(1);
-    let sql = "INSERT INTO ending VALUES (1, 'failed', 'why', ?1, ?2, 2, NULL, 3900.1, 0.1, ?3)";
-    let values = params![version, nanoseconds(ended), end_checksum(&end(1))];
-    file.execute(sql, values).unwrap();
-    record
 }
 
 #[test]
@@ -515,6 +396,8 @@ fn every_damaged_record_is_named() {
         ("UPDATE ending SET reason = NULL", DamagedRecord::End),
         ("UPDATE ending SET reason = ''", DamagedRecord::End),
         ("UPDATE ending SET version = '1.2.4'", DamagedRecord::End),
+        ("UPDATE ending SET numerics = 3", DamagedRecord::End),
+        ("UPDATE ending SET commit_id = NULL", DamagedRecord::End),
         ("UPDATE ending SET ended_ns = 1", DamagedRecord::End),
         ("UPDATE ending SET evaluations = 3", DamagedRecord::End),
         ("UPDATE ending SET best_cost = 0.0", DamagedRecord::End),
