@@ -17,6 +17,7 @@ use tempfile::TempDir;
 
 use crate::embedded::workers::Workers;
 use crate::ending::Failure;
+use crate::program;
 
 /// Longest directory of temporary files that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;

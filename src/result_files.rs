@@ -53,9 +53,7 @@ impl<'a> ResultFiles<'a> {
         print: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> anyhow::Result<()> {
         let mut hash = blake3::Hasher::new();
-        write_by(&self.directory.join(name), |file| {
-            print(&mut Hashing { file, hash: &mut hash })
-        })?;
+        write_by(&self.directory.join(name), |file| print(&mut Hashing { file, hash: &mut hash }))?;
         self.note(name, &hash);
         Ok(())
     }

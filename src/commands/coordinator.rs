@@ -10,8 +10,9 @@ use crate::arguments::CoordinatorArguments;
 use crate::door::Door;
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
+use crate::program;
 use crate::resolved::Format;
-use crate::results_directory;
+use crate::result_files;
 use crate::signals;
 
 /// Signs of life while a lease lasts: some may come late.

@@ -9,8 +9,8 @@ use osteon_study::check::Solution;
 use serde_json::{Map, Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};
-use crate::program;
 use crate::output::text::{kind_name, state_name, status_name};
+use crate::program;
 
 /// Output for programs.
 pub(crate) struct JsonOutput<'a> {

@@ -32,10 +32,7 @@ pub(super) fn point(
 }
 
 /// Mean model and dispersion of the best point.
-pub(super) fn model(
-    put: &mut impl FnMut(&str, Value) -> Option<Value>,
-    best: Option<&BestPoint>,
-) {
+pub(super) fn model(put: &mut impl FnMut(&str, Value) -> Option<Value>, best: Option<&BestPoint>) {
     let point = best.map(|best| best.point);
     put("parameters", mean_model(point.as_ref()));
     put("dispersion", json!(point.map(|point| point.dispersion())));

@@ -78,7 +78,10 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     for row in search.history() {
         again.retell(row.point, speeds(&job.monte_carlo, &row.point), ERRORS).unwrap();
     }
-    assert_eq!(again.result(&ending(&again), &Program::this(None)), search.result(&ending(&search), &Program::this(None)));
+    assert_eq!(
+        again.result(&ending(&again), &Program::this(None)),
+        search.result(&ending(&search), &Program::this(None))
+    );
 }
 
 /// From far away only the floor of the density tells where the data are.

@@ -55,7 +55,10 @@ fn without_derivatives_the_search_ends_with_the_method() {
     let mut specification = specification(400);
     specification.search.sensitivities = false;
     let (search, _) = run(&specification);
-    assert_eq!(search.result(&ending(&search), &Program::this(None)).evaluations, search.history().len() as u64);
+    assert_eq!(
+        search.result(&ending(&search), &Program::this(None)).evaluations,
+        search.history().len() as u64
+    );
 }
 
 /// Three parameters are free and two moments are given: of the points that match them, about, the
