@@ -114,6 +114,9 @@ pub(crate) struct DrawArguments {
     /// Draw at the best point of DIR/result.json instead of the fixed/start point
     #[arg(long, value_name = "DIR")]
     pub(crate) at: Option<PathBuf>,
+    /// With --at: draw at the best point of this group of the data
+    #[arg(long, value_name = "NAME", requires = "at")]
+    pub(crate) group: Option<String>,
 }
 
 /// Of `coordinator`.

@@ -23,6 +23,7 @@ mod result_files;
 mod results_directory;
 mod signals;
 mod simulation_directory;
+mod unsearched_groups;
 mod verdict;
 
 use std::io::Write as _;

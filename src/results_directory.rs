@@ -186,14 +186,12 @@ impl ResultsDirectory {
                     inference(specification, set, group.best.as_ref()?, history)
                 });
                 let found: Vec<_> = found.collect();
-                let groups = results_csv::groups(specification, result, &found);
+                let groups = results_csv::groups(specification, result, history, &found);
                 files.write(GROUPS, &groups)?;
                 let comparison = results_csv::comparison(result, &found);
                 files.write(COMPARISON, &comparison)?;
             }
-            let outcomes = fetched.result.best.as_ref().map(|best| best.outcomes.as_slice());
-            let realizations = results_csv::realizations(outcomes.unwrap_or_default());
-            files.write(REALIZATIONS, &realizations)?;
+            files.write(REALIZATIONS, &realizations(fetched))?;
             let JobResult { program, digest, seed, .. } = &fetched.result;
             let (digest, seed) = (Some(digest.as_str()), Some(*seed));
             files.finish(&text, &Origin { kind: kind.name(), program, digest, seed })
@@ -213,6 +211,15 @@ impl Drop for ResultsDirectory {
         // Last of all, and still locked; a leftover does no harm.
         drop(fs::remove_file(self.path.join(LOCK)));
     }
+}
+
+/// The realizations at the best point, or at those of the groups.
+fn realizations(fetched: &Fetched) -> String {
+    if matches!(fetched.specification.data, Some(Data::Groups(_))) {
+        return results_csv::realizations_of_groups(&fetched.result.groups);
+    }
+    let best = fetched.result.best.as_ref();
+    results_csv::realizations(best.map(|best| best.outcomes.as_slice()).unwrap_or_default())
 }
 
 /// Whether `file` is what stands at `path`.

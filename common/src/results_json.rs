@@ -26,6 +26,14 @@ pub enum ResultError {
     /// It is no JSON.
     #[error("not valid JSON: {0}")]
     Malformed(serde_json::Error),
+    /// There is no group of this name.
+    #[error("there is no group {name:?}; the groups are {}", listed(.names))]
+    NoGroup {
+        /// The name.
+        name: String,
+        /// Those there are.
+        names: Vec<String>,
+    },
     /// A number of the point is not there: another kind of file, or the job found no point.
     #[error(
         "`{key}` is {found}; it must be a number (the result of an identification that found a point)"
@@ -150,7 +158,41 @@ pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
 /// # Errors
 /// When the text is no JSON, or holds no point.
 pub fn best_point(text: &str) -> Result<Point, ResultError> {
+    point_of(&serde_json::from_str(text).map_err(ResultError::Malformed)?)
+}
+
+/// The best point of the group `name` in the text of an identification's `result.json`.
+///
+/// # Errors
+/// When the text is no JSON, or holds no such group, or no point of it.
+pub fn best_point_of_group(text: &str, name: &str) -> Result<Point, ResultError> {
     let result: Value = serde_json::from_str(text).map_err(ResultError::Malformed)?;
+    let groups = result.get("groups").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    match groups.iter().find(|group| group["name"] == name) {
+        Some(group) => point_of(group),
+        None => Err(ResultError::NoGroup { name: name.to_owned(), names: names(groups) }),
+    }
+}
+
+/// Names of the groups in the text of an identification's `result.json`; none where there are none.
+///
+/// # Errors
+/// When the text is no JSON.
+pub fn group_names(text: &str) -> Result<Vec<String>, ResultError> {
+    let result: Value = serde_json::from_str(text).map_err(ResultError::Malformed)?;
+    Ok(result
+        .get("groups")
+        .and_then(Value::as_array)
+        .map(|groups| names(groups))
+        .unwrap_or_default())
+}
+
+fn names(groups: &[Value]) -> Vec<String> {
+    groups.iter().filter_map(|group| group["name"].as_str()).map(str::to_owned).collect()
+}
+
+/// The best point in the object of a job, or of a group.
+fn point_of(result: &Value) -> Result<Point, ResultError> {
     let mut point = Point([0.0; 7]);
     for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
         let name = parameter.name();
@@ -167,6 +209,19 @@ pub fn best_point(text: &str) -> Result<Point, ResultError> {
         };
     }
     Ok(point)
+}
+
+/// Most groups that a message lists.
+const LISTED_MAX: usize = 20;
+
+/// Names in a message.
+pub fn listed(names: &[String]) -> String {
+    let mut shown: Vec<String> =
+        names.iter().take(LISTED_MAX).map(|name| format!("{name:?}")).collect();
+    if names.len() > LISTED_MAX {
+        shown.push(format!("and {} more", names.len() - LISTED_MAX));
+    }
+    if shown.is_empty() { "none".to_owned() } else { shown.join(", ") }
 }
 
 fn kind(found: Option<&Value>) -> &'static str {

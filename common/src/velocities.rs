@@ -46,6 +46,11 @@ enum Problem {
     RepeatedColumn { column: String },
     #[error("{column} is empty; it must name the group of the velocity")]
     NoGroup { column: String },
+    #[error(
+        "no group of the column `{column}` has two velocities that differ; a coefficient of variation \
+         needs at least two different ones"
+    )]
+    NoVariation { column: String },
     #[error("has more than {} groups", limits::GROUPS_MAX)]
     TooManyGroups,
     #[error("the number of fields is {found}; the header has {expected}")]
@@ -85,6 +90,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
 pub(crate) fn read_groups(path: &Path, column: &str) -> Result<Vec<Group>, Vec<CsvError>> {
     let mut groups: Vec<Group> = Vec::new();
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    let whole = |problem| vec![CsvError { path: path.to_owned(), line: None, problem }];
     for (name, velocity) in rows_of(path, Some(column))? {
         let place = places.get(&name).copied().unwrap_or_else(|| {
             groups.push(Group { name: name.clone(), velocities: Vec::new() });
@@ -93,9 +99,11 @@ pub(crate) fn read_groups(path: &Path, column: &str) -> Result<Vec<Group>, Vec<C
         });
         groups[place].velocities.push(velocity);
         if groups.len() > limits::GROUPS_MAX {
-            let (line, problem) = (None, Problem::TooManyGroups);
-            return Err(vec![CsvError { path: path.to_owned(), line, problem }]);
+            return Err(whole(Problem::TooManyGroups));
         }
+    }
+    if groups.iter().all(|group| group.no_variation().is_some()) {
+        return Err(whole(Problem::NoVariation { column: shortened(column) }));
     }
     Ok(groups)
 }

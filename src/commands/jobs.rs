@@ -17,6 +17,7 @@ use crate::output;
 use crate::request::Request;
 use crate::resolved::Format;
 use crate::results_directory::{self, ResultsDirectory};
+use crate::unsearched_groups;
 use crate::verdict;
 
 /// Shortest time between two lines of `watch`.
@@ -42,6 +43,7 @@ pub(super) async fn submit(
 ) -> Result<Ending, Failure> {
     let Submission { job, kind, request, priority } = submission;
     let specification = job_file::read(job, kind).map_err(Failure::bad_input)?;
+    unsearched_groups::warn(job, &specification);
     let mut client = Client::connect(coordinator).await?;
     let id = client.submit(&specification, request, priority).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;

@@ -20,11 +20,13 @@ use crate::request::Request;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
+use crate::unsearched_groups;
 use crate::verdict;
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let specification = job_file::read(&run.job, run.kind).map_err(Failure::bad_input)?;
+    unsearched_groups::warn(&run.job, &specification);
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
     }

@@ -105,7 +105,8 @@ fn groups(groups: &[Group], violations: &mut Violations) {
         return;
     }
     let mut names = BTreeSet::new();
-    for Group { name, velocities: measured } in groups {
+    for group in groups {
+        let Group { name, velocities: measured } = group;
         let field = entry_path(FIELD, name);
         if name.is_empty() || name.len() > limits::NAME_BYTES_MAX || name.contains(char::is_control)
         {
@@ -117,11 +118,22 @@ fn groups(groups: &[Group], violations: &mut Violations) {
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");
         }
-        velocities(&field, measured, violations);
+        match group.no_variation() {
+            // The job is run for the others.
+            Some(_) => each_velocity(&field, measured, violations),
+            None => velocities(&field, measured, violations),
+        }
+    }
+    if !violations.touches("data") && groups.iter().all(|group| group.no_variation().is_some()) {
+        violations.add(
+            FIELD,
+            format!("none of the {count} has two velocities that differ, which {MOMENTS_NEED}"),
+        );
     }
 }
 
-fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
+/// Checks velocities one by one, and how many there are.
+fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) {
     if known_wrong(field, violations) {
         return;
     }
@@ -140,9 +152,14 @@ fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
         }
         violations.add(element_path(field, index), VELOCITY.refusal(velocity));
     }
-    if violations.touches(field) {
+}
+
+fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
+    each_velocity(field, measured, violations);
+    if violations.touches(field) || known_wrong(field, violations) {
         return;
     }
+    let count = measured.len();
     if count < VELOCITIES_MIN {
         violations
             .add(field, format!("is a list of {count}; {MOMENTS_NEED} at least two velocities"));
