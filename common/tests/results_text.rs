@@ -2,18 +2,20 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
+use osteon_common::inference::{Inference, Known, Quantity, noise};
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, Objective, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, JobResult, Moments, Role, Status,
+    BestPoint, Estimate, EstimatedError, Evaluation, GroupResult, JobResult, Moments, Role, Status,
 };
 use osteon_common::settings::{Method, Picking, SolverSettings};
 use osteon_common::version::Program;
@@ -286,4 +288,168 @@ fn realizations() {
         "index,velocity,failure\n0,3908.25,\n1,,direct_wave_first\n2,3333.3333333333335,\n3,,no_arrival\n"
     );
     assert_eq!(results_csv::realizations(&[]), "index,velocity,failure\n");
+}
+
+fn group(name: &str, status: Status, best: Option<BestPoint>) -> GroupResult {
+    let data = moments(3925.0, 0.00637);
+    GroupResult { name: name.to_owned(), status, reason: None, best, data }
+}
+
+/// Every row of a table by the names of its columns.
+fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let row = |line: &str| {
+        // The last column, which may hold a comma, is in quotes then.
+        let fields = line.splitn(names.len(), ',').map(|field| field.trim_matches('"').to_owned());
+        names.iter().map(|name| (*name).to_owned()).zip(fields).collect()
+    };
+    lines.map(row).collect()
+}
+
+#[test]
+fn a_group_has_its_intervals_its_data_and_a_reason() {
+    let free = |lower, upper, start| Range::Free { start, lower, upper };
+    let mut job = specification();
+    job.parameters[Parameter::LongitudinalYoungModulus as usize] = free(12e9, 25e9, 18e9);
+    let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
+    let of = |name: &str| Group { name: name.to_owned(), velocities: velocities.clone() };
+    job.data = Some(Data::Groups(["a", "b", "c"].map(of).to_vec()));
+    let best = result().best.unwrap();
+    let mut result = JobResult { best: None, data: None, ..result() };
+    let settled = GroupResult {
+        reason: Some("settled at a cost of 7.644e-1, above cost_tolerance 1e-12".to_owned()),
+        ..group("b", Status::Converged, Some(best.clone()))
+    };
+    let failed = GroupResult {
+        reason: Some("only one velocity, and no more".to_owned()),
+        ..group("c", Status::Failed, None)
+    };
+    result.groups = vec![group("a", Status::Converged, Some(best)), settled, failed];
+    let quantity = |value: f64, interval: Option<[f64; 2]>| Quantity {
+        value,
+        known: interval.map(|interval| Known { standard_error: 1.0, interval, free_share: 0.0 }),
+    };
+    let found = |known: bool| Inference {
+        matched: known,
+        noise: noise(
+            job.data.as_ref().unwrap(),
+            0,
+            &result.groups[0].best.as_ref().unwrap().velocity.unwrap(),
+        ),
+        free: vec![Parameter::LongitudinalYoungModulus, Parameter::Dispersion],
+        sensitivities: Vec::new(),
+        fixed: Vec::new(),
+        undetermined: Vec::new(),
+        bulk_velocity: quantity(3960.5, known.then_some([3950.25, 3970.75])),
+        dispersion: quantity(0.1029, known.then_some([0.1, 0.11])),
+        parameters: vec![(
+            Parameter::LongitudinalYoungModulus,
+            quantity(17.717e9, known.then_some([17e9, 18.5e9])),
+        )],
+    };
+    let row = |group, varied| Evaluation {
+        number: 0,
+        role: Role { group, start: 0, varied },
+        point: POINT,
+        moments: None,
+        cost: None,
+        failures: FailureCounts::default(),
+        estimated_error: None,
+    };
+    let varied = Some(Parameter::Dispersion);
+    let history = [row(0, None), row(0, None), row(0, varied), row(1, None)];
+    let text = results_csv::groups(
+        &job,
+        &result,
+        &history,
+        &[Some(found(true)), Some(found(false)), None],
+    );
+    let rows = rows(&text);
+    let check = |group: usize, expected: &[(&str, &str)]| {
+        for (column, value) in expected {
+            assert_eq!(rows[group][*column], *value, "{column} of group {group}: {text}");
+        }
+    };
+    check(
+        0,
+        &[
+            ("longitudinal_young_modulus", "17717000000.0"),
+            ("longitudinal_young_modulus_lower", "17000000000.0"),
+            ("longitudinal_young_modulus_upper", "18500000000.0"),
+            ("dispersion_lower", "0.1"),
+            ("data_mean", "3925.0"),
+            ("data_coefficient_of_variation", "0.00637"),
+            ("kolmogorov_distance", "0.25"),
+            ("kolmogorov_p_value", "0.75"),
+            ("failures", "2"),
+            ("evaluations", "2"),
+            ("reason", ""),
+        ],
+    );
+    let ends =
+        ["data_mean_lower", "data_mean_upper"].map(|end| rows[0][end].parse::<f64>().unwrap());
+    assert!(ends[0] < 3900.0 && ends[1] > 3925.0, "{ends:?}");
+    check(
+        1,
+        &[
+            ("longitudinal_young_modulus", ""),
+            ("longitudinal_young_modulus_lower", ""),
+            ("best_longitudinal_young_modulus", "17717000000.0"),
+            ("evaluations", "1"),
+            ("reason", "settled at a cost of 7.644e-1, above cost_tolerance 1e-12"),
+        ],
+    );
+    check(
+        2,
+        &[("best_density", ""), ("evaluations", "0"), ("reason", "only one velocity, and no more")],
+    );
+    assert!(text.ends_with(",\"only one velocity, and no more\"\n"), "{text}");
+    // Where nothing else is said, a blank is explained.
+    result.groups[1].reason = None;
+    let text = results_csv::groups(
+        &job,
+        &result,
+        &history,
+        &[Some(found(true)), Some(found(false)), None],
+    );
+    assert!(text.contains(",the model does not match the data within their noise: no intervals\n"));
+}
+
+#[test]
+fn realizations_of_groups_follow_each_other() {
+    let best = result().best.unwrap();
+    let groups = [
+        group("left", Status::Converged, Some(best.clone())),
+        group("none", Status::Failed, None),
+        group(
+            "right, \"distal\"",
+            Status::Converged,
+            Some(BestPoint { outcomes: vec![Ok(3900.5)], ..best }),
+        ),
+    ];
+    assert_eq!(
+        results_csv::realizations_of_groups(&groups),
+        "index,velocity,failure,group\n0,3908.25,,left\n1,,direct_wave_first,left\n\
+         2,3333.3333333333335,,left\n3,,no_arrival,left\n0,3900.5,,\"right, \"\"distal\"\"\"\n"
+    );
+}
+
+#[test]
+fn the_best_point_of_a_group_is_found_by_its_name() {
+    let best = result().best.unwrap();
+    let mut result = JobResult { best: None, data: None, ..result() };
+    result.groups =
+        vec![group("left", Status::Converged, Some(best)), group("none", Status::Failed, None)];
+    let velocities = vec![3900.0, 3950.0];
+    let of = |name: &str| Group { name: name.to_owned(), velocities: velocities.clone() };
+    let data = Some(Data::Groups(["left", "none"].map(of).to_vec()));
+    let job = JobSpecification { data, ..specification() };
+    let text = results_json::identification(&result, &job, &[]);
+    assert_eq!(results_json::group_names(&text).unwrap(), ["left", "none"]);
+    assert_eq!(results_json::best_point_of_group(&text, "left").unwrap(), POINT);
+    let refused = |name| results_json::best_point_of_group(&text, name).unwrap_err().to_string();
+    assert!(refused("none").starts_with("`parameters.density` is null;"));
+    assert_eq!(refused("right"), "there is no group \"right\"; the groups are \"left\", \"none\"");
+    assert!(results_json::group_names(&identified(&failed())).unwrap().is_empty());
 }

@@ -182,9 +182,9 @@ fn caveat(groups: &[Value]) -> String {
     }
     let by_likelihood = groups.iter().any(|group| group.get("cost_standard_error").is_some());
     let data = if by_likelihood { "The law of one velocity" } else { "Two moments" };
-    let known = if dispersion { " and the dispersion" } else { "" };
+    let known = if dispersion { " and the dispersion are" } else { " is" };
     format!(
-        "\n{data} cannot determine {} parameters. Only √(c1111/ρ){known} are constrained in each\n\
+        "\n{data} cannot determine {} parameters. Only √(c1111/ρ){known} constrained in each\n\
          group; many other parameter sets fit equally well. Fix what is known from elsewhere\n\
          (`fixed = …`) to compare single parameters.\n",
         NUMBERS.get(searched.len()).unwrap_or(&"so many")
@@ -192,3 +192,6 @@ fn caveat(groups: &[Value]) -> String {
 }
 
 const NUMBERS: [&str; 8] = ["no", "one", "two", "three", "four", "five", "six", "seven"];
+
+#[cfg(test)]
+mod tests;
