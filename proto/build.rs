@@ -7,9 +7,9 @@ use std::path::PathBuf;
 use prost::Message as _;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let files =
-        ["osteon/v1/specification.proto", "osteon/v1/jobs.proto", "osteon/v1/workers.proto"];
-    for file in files {
+    let files = ["specification", "results", "jobs", "workers"];
+    let files = files.map(|name| format!("osteon/v1/{name}.proto"));
+    for file in &files {
         println!("cargo:rerun-if-changed={file}");
     }
     let descriptors = protox::compile(files, ["."])?;

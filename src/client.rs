@@ -3,22 +3,25 @@
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::limits::REALIZATIONS_MAX;
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
 use osteon_common::violations::Violations;
+use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::tls_failure::TlsFailure;
-use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
-use osteon_proto::{realizations, results, specification, status};
+use osteon_proto::{specification, status};
 use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::{Code, Response, Status};
 
 use crate::request::Request;
+
+use self::parts::Parts;
+
+mod parts;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
@@ -62,7 +65,7 @@ pub(crate) enum ClientError {
     #[error("the coordinator refuses the job:{}", indented(.0))]
     Violations(Violations),
     /// It refuses the request.
-    #[error("the coordinator at {endpoint} refuses: {reason}")]
+    #[error("the coordinator at {endpoint} refuses: {reason}{}", hint(*code))]
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -105,6 +108,15 @@ impl ClientError {
     }
 }
 
+/// What a user of the command line can do about a refusal, where the coordinator, whose clients are
+/// programs, does not say it.
+fn hint(code: Code) -> &'static str {
+    match code {
+        Code::NotFound => "; `osteon jobs` lists those there are",
+        _ => "",
+    }
+}
+
 fn indented(violations: &Violations) -> String {
     violations.iter().map(|violation| format!("\n  {violation}")).collect()
 }
@@ -114,7 +126,8 @@ fn indented(violations: &Violations) -> String {
 pub(crate) struct Fetched {
     /// The specification, defaults filled in.
     pub(crate) specification: JobSpecification,
-    /// The result, with the outcomes of the best point.
+    /// The result, with the outcomes of the best point; of groups with those of each, as long as all of
+    /// them are no more than one evaluation may have.
     pub(crate) result: JobResult,
     /// The evaluations in order.
     pub(crate) history: Vec<Evaluation>,
@@ -334,7 +347,7 @@ impl Client {
 
 /// How a job ended; `None` while it has not.
 pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
-    results::status_from_message(snapshot.status).ok().flatten()
+    JOB_STATUS.value(snapshot.status)
 }
 
 fn answer_limit() -> Duration {
@@ -378,63 +391,6 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
         // tonic reports a broken HTTP/2 connection so.
         Code::Internal if !answered => ClientError::Lost { endpoint, reason },
         code => ClientError::Refused { endpoint, code, reason },
-    }
-}
-
-/// The parts of a fetch that have come.
-#[derive(Debug, Default)]
-struct Parts {
-    specification: Option<v1::JobSpecification>,
-    result: Option<v1::JobResult>,
-    history: Vec<Evaluation>,
-    outcomes: Vec<osteon_common::outcome::Outcome>,
-}
-
-impl Parts {
-    fn add(&mut self, part: Part) -> Result<(), Malformed> {
-        match part {
-            Part::Specification(specification) => self.specification = Some(specification),
-            Part::Result(result) => self.result = Some(result),
-            Part::History(block) => {
-                for row in &block.rows {
-                    self.history.push(results::evaluation_from_message(row)?);
-                }
-            }
-            Part::Realizations(block) => {
-                let (first, outcomes) = realizations::from_message(&block)?;
-                let here = self.outcomes.len() as u64;
-                if first != here || here + outcomes.len() as u64 > REALIZATIONS_MAX {
-                    let allowed = "blocks of realizations must follow each other";
-                    return Err(Malformed::OutOfRange {
-                        field: "first",
-                        value: first as f64,
-                        allowed,
-                    });
-                }
-                self.outcomes.extend(outcomes);
-            }
-        }
-        Ok(())
-    }
-
-    fn whole(self) -> Result<Fetched, Malformed> {
-        let specification =
-            self.specification.ok_or(Malformed::Missing { field: "specification" })?;
-        let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
-        let expected = if result.best.is_some() { result.realizations } else { 0 };
-        if self.outcomes.len() as u64 != expected {
-            return Err(Malformed::WrongLength {
-                field: "realizations",
-                found: self.outcomes.len(),
-                expected: usize::try_from(expected).unwrap_or(usize::MAX),
-            });
-        }
-        Ok(Fetched {
-            specification: specification::from_message(&specification)
-                .map_err(Malformed::InvalidSpecification)?,
-            result: results::from_message(&result, self.outcomes)?,
-            history: self.history,
-        })
     }
 }
 

@@ -9,6 +9,7 @@ use std::path::Path;
 use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results_json;
+use osteon_common::sampling::NominalSampling;
 use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_solver::{Arrival, Failure};
 use osteon_study::check::Check;
@@ -45,7 +46,8 @@ pub(crate) struct ShownSimulation<'a> {
 /// The object `solver` of one solved case: the sampling that decided, where it is known.
 fn solver_value(setup: &Setup, arrival: Option<&Arrival>) -> Value {
     let estimated_error = json!(arrival.map(|arrival| arrival.estimated_error));
-    let mut value = results_json::solver(setup, estimated_error);
+    let mut value =
+        results_json::solver(&setup.solver, NominalSampling::of(setup), estimated_error);
     if let Some(looks) = arrival.and_then(|arrival| arrival.looks) {
         value["band"] = json!(looks.last.band);
         value["period"] = json!(looks.last.period);

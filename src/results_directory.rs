@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::document::Format;
-use osteon_common::inference::inference;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::{JobResult, Status};
@@ -48,10 +47,9 @@ pub(crate) struct ResultsDirectory {
 
 /// The object of `result.json` and `--json`.
 pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    let Fetched { specification, result, history } = fetched;
     match kind {
-        JobKind::Identification => results_json::identification(result, specification, history),
-        JobKind::Propagation => results_json::propagation(result, &specification.setup),
+        JobKind::Identification => results_json::identification(&fetched.result),
+        JobKind::Propagation => results_json::propagation(&fetched.result),
     }
 }
 
@@ -140,11 +138,10 @@ impl ResultsDirectory {
         let path = self.path.join(REQUEST);
         let stored = read_if_there(&path).map_err(Failure::Failed)?.unwrap_or_default();
         let mut lines = stored.lines().map(str::trim);
-        if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
-            let request = Request::with_id(id.to_owned());
-            // An older version wrote no client.
-            let client = lines.next().map_or(request.client, str::to_owned);
-            return Ok(Request { client, ..request });
+        if let Some((id, client)) = lines.next().zip(lines.next()).filter(|(id, _)| !id.is_empty())
+        {
+            let client = client.to_owned();
+            return Ok(Request { client, ..Request::with_id(id.to_owned()) });
         }
         let request = Request::new();
         let text = format!("{}\n{}\n", request.id, request.client);
@@ -180,16 +177,10 @@ impl ResultsDirectory {
                 files.write(HISTORY, &history)?;
             }
             if matches!(fetched.specification.data, Some(Data::Groups(_))) {
-                let Fetched { specification, result, history } = fetched;
-                let groups = result.groups.iter().enumerate();
-                let found = groups.map(|(set, group)| {
-                    inference(specification, set, group.best.as_ref()?, history)
-                });
-                let found: Vec<_> = found.collect();
-                let groups = results_csv::groups(specification, result, history, &found);
+                let Fetched { result, history, .. } = fetched;
+                let groups = results_csv::groups(&fetched.specification, result, history);
                 files.write(GROUPS, &groups)?;
-                let comparison = results_csv::comparison(result, &found);
-                files.write(COMPARISON, &comparison)?;
+                files.write(COMPARISON, &results_csv::comparison(result))?;
             }
             files.write(REALIZATIONS, &realizations(fetched))?;
             let JobResult { program, digest, seed, .. } = &fetched.result;

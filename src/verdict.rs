@@ -2,7 +2,7 @@
 //! `result.json`, so that a stored result is judged as one that was just computed.
 
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::results::Status;
+use osteon_common::results::{JobFailure, Status};
 use serde_json::Value;
 
 use crate::client::Fetched;
@@ -36,9 +36,10 @@ pub(crate) fn may_end_otherwise(json: &str) -> bool {
 /// Why a run failed, if that lies in the machines that it ran on.
 pub(crate) fn machine_failure(json: &str) -> Option<String> {
     let value: Value = serde_json::from_str(json).unwrap_or_default();
-    let failed = value["status"].as_str() == Some(Status::Failed.name());
-    let reason = value["reason"].as_str().filter(|_| failed)?;
-    osteon_coordinator::failure::lies_in_machines(reason).then(|| reason.to_owned())
+    let name = value["failure"].as_str()?;
+    let failure = JobFailure::ALL.into_iter().find(|failure| failure.name() == name)?;
+    let reason = value["reason"].as_str().unwrap_or(name);
+    failure.lies_in_machines().then(|| reason.to_owned())
 }
 
 /// Why the result of a propagation is a failure; `None` if it is none.

@@ -26,7 +26,7 @@ const SOBOL_WORTH: f64 = 10.0;
 /// Terms of Kolmogorov's series; the next one is below rounding.
 const SERIES_TERMS: usize = 12;
 
-/// An interval that holds a value with probability [`CONFIDENCE`].
+/// An interval that holds a value with some probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
     /// Its lower end.
@@ -42,6 +42,8 @@ pub struct MomentIntervals {
     pub mean: Interval,
     /// Of the coefficient of variation.
     pub coefficient_of_variation: Interval,
+    /// Probability with which each holds its moment.
+    pub level: f64,
 }
 
 /// Kolmogorov's test of two samples.
@@ -76,6 +78,7 @@ pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
             found.coefficient_of_variation,
             &influences.coefficient_of_variation,
         )?,
+        level: CONFIDENCE,
     })
 }
 
@@ -138,6 +141,7 @@ impl Influences {
                 at.coefficient_of_variation,
                 &self.coefficient_of_variation,
             ),
+            level: CONFIDENCE,
         }
     }
 }

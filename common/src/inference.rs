@@ -16,6 +16,7 @@
 //! normal law). That of the model has the squares of the reported standard errors, relative, on its
 //! diagonal; what one error says of the other is neglected.
 
+mod conclusions;
 mod jacobian;
 mod linear;
 mod noise;
@@ -32,8 +33,9 @@ use crate::results::{BestPoint, Evaluation};
 use self::jacobian::log_ratios;
 use self::linear::{Linear, Response};
 
+pub use self::conclusions::{Conclusions, Solutions, below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
-pub use self::noise::{Noise, noise};
+pub use self::noise::{Noise, NoiseErrors, noise};
 pub use self::profile::{PROFILE_POINTS, Profile, profiles};
 pub use self::solutions::{Solution, Spread, Spreads, solutions, spread};
 pub use crate::data_statistics::CONFIDENCE;
@@ -61,7 +63,7 @@ pub struct Quantity {
 pub struct Known {
     /// Standard error.
     pub standard_error: f64,
-    /// Ends of its confidence interval of level [`CONFIDENCE`].
+    /// Ends of its confidence interval.
     pub interval: [f64; 2],
     /// Share of its gradient, in units of the box, that lies in directions which the data leave
     /// free: sine of the angle between it and those that they fix.
@@ -73,8 +75,10 @@ pub struct Known {
 pub struct Inference {
     /// Whether the model matches the data to within noise.
     pub matched: bool,
+    /// Level of all intervals.
+    pub level: f64,
     /// Errors of both moments.
-    pub noise: Noise,
+    pub noise: NoiseErrors,
     /// The free parameters, in the order of the components of directions.
     pub free: Vec<Parameter>,
     /// Derivatives of both moments.
@@ -118,6 +122,7 @@ pub fn inference(
     };
     Some(Inference {
         matched,
+        level: CONFIDENCE,
         free: jacobian.free.clone(),
         sensitivities: jacobian.sensitivities(&best.point, specification),
         fixed: linear.fixed.clone(),
@@ -125,7 +130,7 @@ pub fn inference(
         bulk_velocity: context.bulk_velocity(&jacobian.free)?,
         dispersion: context.dispersion(&jacobian.free),
         parameters: context.parameters(&jacobian.free),
-        noise,
+        noise: noise.errors(),
     })
 }
 

@@ -1,9 +1,11 @@
 //! What a job leaves: the result and the history of its evaluations.
 
-use crate::data_statistics::KolmogorovTest;
-use crate::job::Sampling;
+use crate::data_statistics::{KolmogorovTest, MomentIntervals, moment_intervals};
+use crate::inference::Conclusions;
+use crate::job::{Data, Objective, Sampling, Search};
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
+use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
 
@@ -16,7 +18,7 @@ pub enum Status {
     MaxEvaluations,
     /// A user cancelled the job.
     Cancelled,
-    /// No feasible point, or an integrity error.
+    /// It has no result to rely on; [`JobFailure`] says of which kind.
     Failed,
 }
 
@@ -32,6 +34,45 @@ impl Status {
             Self::MaxEvaluations => "max_evaluations",
             Self::Cancelled => "cancelled",
             Self::Failed => "failed",
+        }
+    }
+}
+
+/// Why a job failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JobFailure {
+    /// No point that was evaluated is feasible: too many realizations failed at each, or it has no
+    /// cost.
+    NoFeasiblePoint,
+    /// Workers gave different answers for one realization, and none was left to decide.
+    IntegrityError,
+    /// Workers vanished over one realization, again and again.
+    LostRealization,
+    /// What the store holds of the job is not what was put there.
+    Store,
+}
+
+impl JobFailure {
+    /// Every kind.
+    pub const ALL: [Self; 4] =
+        [Self::NoFeasiblePoint, Self::IntegrityError, Self::LostRealization, Self::Store];
+
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoFeasiblePoint => "no_feasible_point",
+            Self::IntegrityError => "integrity_error",
+            Self::LostRealization => "lost_realization",
+            Self::Store => "store",
+        }
+    }
+
+    /// Whether the cause lies in the machines that the job ran on: another run of the same job may
+    /// end otherwise.
+    pub fn lies_in_machines(self) -> bool {
+        match self {
+            Self::NoFeasiblePoint => false,
+            Self::IntegrityError | Self::LostRealization | Self::Store => true,
         }
     }
 }
@@ -113,6 +154,59 @@ pub struct Evaluation {
     pub estimated_error: Option<EstimatedError>,
 }
 
+/// What the best point of a search is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PointMeaning {
+    /// Of the points that were evaluated, the one with the least cost.
+    LeastCost,
+    /// Of the points that match the data, the one where the simplex ended.
+    SimplexEnd,
+    /// Of the points that match the data, the one nearest to the start.
+    NearestToStart,
+}
+
+impl PointMeaning {
+    /// Every meaning.
+    pub const ALL: [Self; 3] = [Self::LeastCost, Self::SimplexEnd, Self::NearestToStart];
+
+    /// The meaning in words, as in `result.json`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::LeastCost => "of the points evaluated, the one with the least cost",
+            Self::SimplexEnd => {
+                "of the points that match the data, the one where the simplex ended"
+            }
+            Self::NearestToStart => {
+                "of the points that match the data, the one nearest to the start"
+            }
+        }
+    }
+}
+
+/// What is known of the data of one search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DataSummary {
+    /// Their moments.
+    pub moments: Moments,
+    /// Number of the velocities; `None` where only their moments are known.
+    pub count: Option<u64>,
+    /// Confidence intervals of the moments of their law; `None` where only the moments are known, and
+    /// where the velocities give no interval.
+    pub intervals: Option<MomentIntervals>,
+}
+
+impl DataSummary {
+    /// Of set number `set` of the data. Resamples velocities, which takes up to a fraction of a second.
+    pub fn of(data: &Data, set: usize) -> Self {
+        let velocities = data.velocities(set);
+        Self {
+            moments: data.moments(set),
+            count: velocities.map(|velocities| velocities.len() as u64),
+            intervals: velocities.and_then(moment_intervals),
+        }
+    }
+}
+
 /// How the search for one group ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupEnding {
@@ -124,7 +218,7 @@ pub struct GroupEnding {
     pub best: Option<u64>,
 }
 
-/// What was found for one group of the data.
+/// What was found for one group of the data. One that failed has no feasible point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupResult {
     /// Its name.
@@ -133,10 +227,12 @@ pub struct GroupResult {
     pub status: Status,
     /// Why, in a sentence, where the status needs one.
     pub reason: Option<String>,
-    /// Its best feasible evaluation, without the outcomes.
+    /// Its best feasible evaluation.
     pub best: Option<BestPoint>,
-    /// Moments of its data.
-    pub data: Moments,
+    /// Its data.
+    pub data: DataSummary,
+    /// What its data say.
+    pub conclusions: Conclusions,
 }
 
 /// The result of a job. No wall times in it: one job, the same bytes.
@@ -144,6 +240,8 @@ pub struct GroupResult {
 pub struct JobResult {
     /// How it ended.
     pub status: Status,
+    /// Of which kind the failure is; `None` with any other status than failed.
+    pub failure: Option<JobFailure>,
     /// Why, in a sentence, where the status needs one (failed).
     pub reason: Option<String>,
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
@@ -151,10 +249,16 @@ pub struct JobResult {
     /// The best feasible evaluation (of a propagation: the only one), if any was complete; `None`
     /// where the data are groups.
     pub best: Option<BestPoint>,
-    /// The data's moments; `None` for a propagation, and where the data are groups.
-    pub data: Option<Moments>,
+    /// The data; `None` for a propagation, and where the data are groups.
+    pub data: Option<DataSummary>,
+    /// What the data say; nothing for a propagation, and where the data are groups.
+    pub conclusions: Conclusions,
     /// What was found for each group of the data; empty where there are none.
     pub groups: Vec<GroupResult>,
+    /// What was minimised; of no use to a propagation.
+    pub objective: Objective,
+    /// How it was searched; of no use to a propagation.
+    pub search: Search,
     /// Points that the search went to, and whose realizations were run.
     pub evaluations: u64,
     /// Realizations of each evaluation.
@@ -169,6 +273,8 @@ pub struct JobResult {
     pub control_variate: bool,
     /// Solver settings that were used.
     pub solver: SolverSettings,
+    /// The exact method's sampling of the usual bone; `None` of other methods.
+    pub nominal: Option<NominalSampling>,
     /// Criterion that was used.
     pub picking: Picking,
     /// The program that computed it.
@@ -180,10 +286,17 @@ pub struct JobResult {
 pub struct BestPoint {
     /// The point.
     pub point: Point,
+    /// What it is among the points that the search knows; `None` for a propagation.
+    pub meaning: Option<PointMeaning>,
     /// Its cost; `None` for a propagation.
     pub cost: Option<f64>,
     /// Standard error of a likelihood's cost; `None` of other costs.
     pub cost_error: Option<f64>,
+    /// What priors have added to the cost; `None` where there is no prior.
+    pub penalty: Option<f64>,
+    /// Number of the first evaluation whose cost was no larger than what sampling noise alone makes of
+    /// it; `None` if there was none, and of costs that are no moments' alone.
+    pub below_noise_from: Option<u64>,
     /// Its moments with standard errors, unless every realization failed.
     pub velocity: Option<Estimate>,
     /// What the failed realizations would change the moments by, had they the velocities that are

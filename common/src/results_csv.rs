@@ -2,12 +2,12 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::data_statistics::moment_intervals;
-use crate::inference::{Inference, Known, Quantity};
+use crate::data_statistics::Interval;
+use crate::inference::{Known, Quantity};
 use crate::job::{Data, JobSpecification, Range};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
-use crate::results::{Evaluation, GroupResult, JobResult, Status};
+use crate::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
 
 /// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
 /// number and its moments; with groups or several starts, also which of them it was for.
@@ -66,41 +66,38 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
 const COMPARED_MAX: usize = 200;
 
 /// The text of `groups.csv`: one row per group, with what was measured and what is identified of it (m/s,
-/// kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty where they are unknown;
-/// given all evaluations, and what the data say of each group.
+/// kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty where they are unknown.
 pub fn groups(
     specification: &JobSpecification,
     result: &JobResult,
     history: &[Evaluation],
-    found: &[Option<Inference>],
 ) -> String {
     let free = |name: &Parameter| matches!(specification.range(*name), Range::Free { .. });
     // The dispersion has its columns whether it is free or not.
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     let free: Vec<Parameter> = elastic.filter(free).collect();
     let mut out = header(&free);
-    for (set, (group, found)) in result.groups.iter().zip(found).enumerate() {
-        let velocities = specification.data.as_ref().and_then(|data| data.velocities(set));
+    for (set, group) in result.groups.iter().enumerate() {
         let best = group.best.as_ref();
         let mut fields = vec![
             field(&group.name),
-            velocities.map_or(0, <[f64]>::len).to_string(),
+            group.data.count.unwrap_or(0).to_string(),
             group.status.name().to_owned(),
             number(best.and_then(|best| best.cost)),
         ];
-        for quantity in quantities_of(found.as_ref()) {
+        for quantity in quantities_of(group) {
             fields.push(number(quantity.map(|quantity| quantity.value)));
             let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
             fields.extend(ends(interval));
         }
         fields.extend(Parameter::ALL.map(|name| number(best.map(|best| best.point.get(name)))));
-        fields.extend(free.iter().flat_map(|&name| identified(name, found.as_ref())));
-        fields.extend(measured(group, velocities));
+        fields.extend(free.iter().flat_map(|&name| identified(name, group)));
+        fields.extend(measured(group));
         fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
         let of_group = |row: &&Evaluation| row.role.group as usize == set;
         let searched = history.iter().filter(|row| row.role.varied.is_none());
         fields.push(searched.filter(of_group).count().to_string());
-        fields.push(field(reason(group, found.as_ref())));
+        fields.push(field(reason(group)));
         out.push_str(&fields.join(","));
         out.push('\n');
     }
@@ -125,7 +122,8 @@ fn header(free: &[Parameter]) -> String {
 }
 
 /// A free parameter with the ends of its interval, where the data fix it.
-fn identified(name: Parameter, found: Option<&Inference>) -> [String; 3] {
+fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
+    let found = group.conclusions.inference.as_ref();
     let of = found.and_then(|found| found.parameters.iter().find(|(known, _)| *known == name));
     let quantity = of.map(|(_, quantity)| *quantity).filter(|quantity| quantity.known.is_some());
     let [lower, upper] =
@@ -134,19 +132,18 @@ fn identified(name: Parameter, found: Option<&Inference>) -> [String; 3] {
 }
 
 /// Moments of a group's data with their intervals, and the test against the model's law.
-fn measured(group: &GroupResult, velocities: Option<&[f64]>) -> [String; 8] {
-    let intervals = velocities.and_then(moment_intervals);
-    let [mean_lower, mean_upper] =
-        ends(intervals.map(|intervals| [intervals.mean.low, intervals.mean.high]));
-    let variation = intervals.map(|intervals| intervals.coefficient_of_variation);
+fn measured(group: &GroupResult) -> [String; 8] {
+    let DataSummary { moments, intervals, .. } = group.data;
+    let both = |interval: Option<Interval>| ends(interval.map(|found| [found.low, found.high]));
+    let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));
     let [variation_lower, variation_upper] =
-        ends(variation.map(|variation| [variation.low, variation.high]));
+        both(intervals.map(|found| found.coefficient_of_variation));
     let test = group.best.as_ref().and_then(|best| best.kolmogorov);
     [
-        number(Some(group.data.mean)),
+        number(Some(moments.mean)),
         mean_lower,
         mean_upper,
-        number(Some(group.data.coefficient_of_variation)),
+        number(Some(moments.coefficient_of_variation)),
         variation_lower,
         variation_upper,
         number(test.map(|test| test.distance)),
@@ -155,9 +152,9 @@ fn measured(group: &GroupResult, velocities: Option<&[f64]>) -> [String; 8] {
 }
 
 /// Why a group did not converge, or why it has no intervals; empty where there is nothing to say.
-fn reason<'a>(group: &'a GroupResult, found: Option<&Inference>) -> &'a str {
+fn reason(group: &GroupResult) -> &str {
     let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
-    let unknown = match (&group.best, found) {
+    let unknown = match (&group.best, &group.conclusions.inference) {
         (None, _) => "no point was feasible",
         (Some(_), None) => "the derivatives are not known: no intervals",
         (Some(_), Some(found)) if !found.matched => {
@@ -175,11 +172,11 @@ fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
 }
 
 /// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
-/// identified, the first less the second, and the ends of their confidence intervals, each of level
-/// [`crate::inference::CONFIDENCE`] by itself; empty where they are unknown.
+/// identified, the first less the second, and the ends of their confidence intervals, each by itself of
+/// the level of the groups' own; empty where they are unknown.
 ///
 /// The noise of sampling, which all groups share, is counted in both: intervals are rather too wide.
-pub fn comparison(result: &JobResult, found: &[Option<Inference>]) -> String {
+pub fn comparison(result: &JobResult) -> String {
     let mut out = "first,second".to_owned();
     for name in ["bulk_velocity", "dispersion"] {
         out.push_str(&format!(
@@ -187,14 +184,12 @@ pub fn comparison(result: &JobResult, found: &[Option<Inference>]) -> String {
         ));
     }
     out.push('\n');
-    let groups: Vec<_> = result.groups.iter().zip(found).collect();
+    let groups = &result.groups;
     let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
-    for (first, (one, of_one)) in groups.iter().enumerate().take(firsts) {
-        for (other, of_other) in &groups[first + 1..] {
+    for (first, one) in groups.iter().enumerate().take(firsts) {
+        for other in &groups[first + 1..] {
             let mut fields = vec![field(&one.name), field(&other.name)];
-            let pairs =
-                quantities_of(of_one.as_ref()).into_iter().zip(quantities_of(of_other.as_ref()));
-            for pair in pairs {
+            for pair in quantities_of(one).into_iter().zip(quantities_of(other)) {
                 fields.extend(difference(pair).map(number));
             }
             out.push_str(&fields.join(","));
@@ -217,7 +212,8 @@ fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<
     [Some(difference), Some(difference - reach), Some(difference + reach)]
 }
 
-fn quantities_of(found: Option<&Inference>) -> [Option<Quantity>; 2] {
+fn quantities_of(group: &GroupResult) -> [Option<Quantity>; 2] {
+    let found = group.conclusions.inference.as_ref();
     [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
 }
 

@@ -6,16 +6,13 @@
 use serde_json::{Map, Value, json};
 use thiserror::Error;
 
-use crate::case::Setup;
-use crate::job::{Data, JobKind, JobSpecification};
+use crate::job::JobKind;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::results::{Estimate, EstimatedError, Evaluation, JobResult, Moments};
-use crate::sampling;
-use crate::settings::{Method, Picking};
+use crate::results::{Estimate, EstimatedError, JobResult, Moments};
+use crate::sampling::NominalSampling;
+use crate::settings::{Method, Picking, SolverSettings};
 use crate::version::{Program, RESULT_SCHEMA};
-
-use self::found::Asked;
 
 mod found;
 mod measured;
@@ -46,50 +43,46 @@ pub enum ResultError {
     },
 }
 
-/// The object of an identification, given all its evaluations, with a final newline.
-pub fn identification(
-    result: &JobResult,
-    specification: &JobSpecification,
-    history: &[Evaluation],
-) -> String {
+/// The object of an identification, with a final newline.
+pub fn identification(result: &JobResult) -> String {
     let best = result.best.as_ref();
-    let asked = Asked { specification, history };
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     head(&mut put, JobKind::Identification.name());
     put("status", json!(result.status.name()));
+    if let Some(failure) = result.failure {
+        put("failure", json!(failure.name()));
+    }
     if let Some(reason) = &result.reason {
         put("reason", json!(reason));
     }
     put("digest", json!(result.digest));
-    put("objective", json!(specification.objective.name()));
-    found::point(&mut put, specification, best);
-    let grouped = matches!(specification.data, Some(Data::Groups(_)));
-    if !grouped {
-        let velocities = specification.data.as_ref().and_then(|data| data.velocities(0));
-        put("data", measured::data(result.data, velocities, best));
+    put("objective", json!(result.objective.name()));
+    found::point(&mut put, result.objective, best);
+    if let Some(data) = &result.data {
+        put("data", measured::data(data, best));
     }
     put("evaluations", json!(result.evaluations));
     put("realizations", json!(result.realizations));
     put("failures", failures(best.map(|best| best.failures)));
     put("seed", json!(result.seed));
     sampling(&mut put, result);
-    put("search", found::search(&asked, best));
-    if !grouped {
-        found::inference(&mut put, &asked, 0, best);
+    put("search", found::search(result));
+    // There are data, or groups of them.
+    if result.data.is_some() {
+        found::conclusions(&mut put, &result.conclusions);
     } else {
-        let groups = result.groups.iter().enumerate();
-        put("groups", groups.map(|(set, group)| found::group(&asked, set, group)).collect());
+        let group = |group| found::group(result.objective, group);
+        put("groups", result.groups.iter().map(group).collect());
     }
-    let estimated_error = errors(best.and_then(|best| best.estimated_error));
-    put("solver", solver(&specification.setup, estimated_error));
+    put("solver", solver_of(result));
     put("picking", picking(&result.picking));
     program(&mut put, &result.program);
     text(object)
 }
 
-/// The object of a propagation in this setup, with a final newline.
-pub fn propagation(result: &JobResult, setup: &Setup) -> String {
+/// The object of a propagation, with a final newline.
+pub fn propagation(result: &JobResult) -> String {
     let best = result.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
@@ -100,7 +93,7 @@ pub fn propagation(result: &JobResult, setup: &Setup) -> String {
     found::model(&mut put, best);
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", measured::model(best));
-    put("solver", solver(setup, errors(best.and_then(|best| best.estimated_error))));
+    put("solver", solver_of(result));
     put("picking", picking(&result.picking));
     put("digest", json!(result.digest));
     program(&mut put, &result.program);
@@ -125,23 +118,31 @@ pub fn picking(picking: &Picking) -> Value {
     json!({"extremum": picking.extremum.name(), "threshold": picking.threshold})
 }
 
-/// How velocities of a setup are computed: method, refinement, the method's sampling, and an
-/// estimate of their relative error.
+fn solver_of(result: &JobResult) -> Value {
+    let estimated_error = result.best.as_ref().and_then(|best| best.estimated_error);
+    solver(&result.solver, result.nominal, errors(estimated_error))
+}
+
+/// How velocities are computed: method, refinement, the method's sampling, and an estimate of their
+/// relative error.
 ///
 /// Of the exact method: highest frequency (`band`, Hz), `period` (s) and (frequency, wavenumber)
-/// `pairs` at the usual speeds of bone; a realization with faster waves may use others.
-pub fn solver(setup: &Setup, estimated_error: Value) -> Value {
-    let settings = &setup.solver;
+/// `pairs` of its `nominal` sampling, at the usual speeds of bone; a realization with faster waves may
+/// use others.
+pub fn solver(
+    settings: &SolverSettings,
+    nominal: Option<NominalSampling>,
+    estimated_error: Value,
+) -> Value {
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("method", json!(settings.method.name()));
     put("refinement", json!(settings.refinement));
     match settings.method {
         Method::Exact => {
-            let sampling = sampling::nominal(setup);
-            put("band", json!(sampling.first_band));
-            put("period", json!(sampling.period));
-            put("pairs", json!(sampling.pairs(sampling.first_band).round() as u64));
+            put("band", json!(nominal.map(|nominal| nominal.band)));
+            put("period", json!(nominal.map(|nominal| nominal.period)));
+            put("pairs", json!(nominal.map(|nominal| nominal.pairs)));
         }
         Method::Hybrid => {
             put("element_size", json!(settings.element_size));

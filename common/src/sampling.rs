@@ -24,6 +24,7 @@ use std::f64::consts::PI;
 
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
+use crate::settings::Method;
 
 pub use thinning::{RUN, Run, smooth_step};
 
@@ -127,6 +128,28 @@ pub fn nominal(setup: &Setup) -> Sampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
     let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
     Sampling::at_rung(setup, rung, first_grade(setup))
+}
+
+/// How finely the exact method samples the waves of the usual bone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NominalSampling {
+    /// Highest frequency, Hz.
+    pub band: f64,
+    /// Period, s.
+    pub period: f64,
+    /// Number of (frequency, wavenumber) pairs.
+    pub pairs: u64,
+}
+
+impl NominalSampling {
+    /// Of a setup; `None` of other methods than the exact one.
+    pub fn of(setup: &Setup) -> Option<Self> {
+        (setup.solver.method == Method::Exact).then(|| {
+            let sampling = nominal(setup);
+            let pairs = sampling.pairs(sampling.first_band).round() as u64;
+            Self { band: sampling.first_band, period: sampling.period, pairs }
+        })
+    }
 }
 
 /// The grade that a bone is first computed with.

@@ -8,15 +8,17 @@ use std::path::Path;
 use osteon_common::case::Setup;
 use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
-use osteon_common::inference::{Inference, Known, Quantity, noise};
+use osteon_common::inference::{Conclusions, Inference, Known, Quantity, meaning, noise};
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, GroupResult, JobResult, Moments, Role, Status,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
+    JobResult, Moments, Role, Status,
 };
+use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Method, Picking, SolverSettings};
 use osteon_common::version::Program;
 use osteon_common::{job_file, results_csv, results_json};
@@ -34,12 +36,16 @@ fn outcomes() -> Vec<Outcome> {
 fn result() -> JobResult {
     JobResult {
         status: Status::Converged,
+        failure: None,
         reason: None,
         digest: "0123abcd".to_owned(),
         best: Some(BestPoint {
             point: POINT,
+            meaning: None,
             cost: Some(4.5e-11),
             cost_error: None,
+            penalty: None,
+            below_noise_from: None,
             velocity: Some(Estimate {
                 moments: moments(3906.27, 0.027083),
                 standard_error: moments(2.0, 3.6e-4),
@@ -51,8 +57,11 @@ fn result() -> JobResult {
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
             outcomes: outcomes(),
         }),
-        data: Some(moments(3906.3, 0.02709)),
+        data: Some(DataSummary { moments: moments(3906.3, 0.02709), count: None, intervals: None }),
+        conclusions: Conclusions::default(),
         groups: Vec::new(),
+        objective: Objective::Moments,
+        search: Search::default(),
         evaluations: 123,
         realizations: 4,
         seed: 9_223_372_036_854_775_807,
@@ -60,6 +69,7 @@ fn result() -> JobResult {
         scrambles: 2,
         control_variate: true,
         solver: SolverSettings::default(),
+        nominal: NominalSampling::of(&Setup::default()),
         picking: Picking::default(),
         program: Program {
             version: "0.1.0".to_owned(),
@@ -85,14 +95,36 @@ fn specification() -> JobSpecification {
 fn failed() -> JobResult {
     JobResult {
         status: Status::Failed,
+        failure: Some(JobFailure::NoFeasiblePoint),
         reason: Some("no feasible point".to_owned()),
         best: None,
         ..result()
     }
 }
 
+/// The text of an identification by this specification, with these numbers of its result.
+fn identified_by(specification: &JobSpecification, result: &JobResult) -> String {
+    let best = result.best.clone().map(|best| {
+        let cost = best.cost.unwrap();
+        let penalty = specification.has_priors().then(|| specification.penalty(&best.point));
+        BestPoint { meaning: Some(meaning(specification, cost)), penalty, ..best }
+    });
+    let moments = result.data.unwrap().moments;
+    results_json::identification(&JobResult {
+        data: Some(DataSummary {
+            moments,
+            ..DataSummary::of(specification.data.as_ref().unwrap(), 0)
+        }),
+        conclusions: Conclusions::of(specification, 0, best.as_ref(), &[]),
+        objective: specification.objective,
+        search: specification.search,
+        best,
+        ..result.clone()
+    })
+}
+
 fn identified(result: &JobResult) -> String {
-    results_json::identification(result, &specification(), &[])
+    identified_by(&specification(), result)
 }
 
 fn check(name: &str, text: &str) {
@@ -123,7 +155,7 @@ fn the_result_says_how_it_was_searched_and_what_its_point_is() {
         result.best.as_mut().unwrap().cost = Some(cost);
         let search = Search { cost_tolerance: 1e-11, ..Search::by(method) };
         let specification = JobSpecification { search, ..specification() };
-        let text = results_json::identification(&result, &specification, &[]);
+        let text = identified_by(&specification, &result);
         let value: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["search"]["method"], method.name());
         assert_eq!(value["search"]["cost_tolerance"], 1e-11);
@@ -147,10 +179,10 @@ fn a_likelihood_has_an_error_and_no_tolerance() {
         data: Some(Data::Velocities(vec![3900.0, 3950.0, 3925.5])),
         ..specification()
     };
-    check("result_likelihood", &results_json::identification(&result, &job, &[]));
+    check("result_likelihood", &identified_by(&job, &result));
     // Moments of measured velocities are searched with their tolerance, and the velocities are tested too.
     let job = JobSpecification { objective: Objective::Moments, ..job };
-    let text = results_json::identification(&result, &job, &[]);
+    let text = identified_by(&job, &result);
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert!(value.get("cost_standard_error").is_none());
     assert_eq!(value["search"]["cost_tolerance"], 1e-10);
@@ -160,14 +192,15 @@ fn a_likelihood_has_an_error_and_no_tolerance() {
 
 #[test]
 fn propagation() {
-    check("result_propagation", &results_json::propagation(&result(), &Setup::default()));
-    check("result_propagation_failed", &results_json::propagation(&failed(), &Setup::default()));
+    check("result_propagation", &results_json::propagation(&result()));
+    check("result_propagation_failed", &results_json::propagation(&failed()));
 }
 
 #[test]
 fn the_solver_states_its_method_and_sampling() {
     let keys = |setup: &Setup| -> Vec<String> {
-        let solver = results_json::solver(setup, 2e-5.into());
+        let nominal = NominalSampling::of(setup);
+        let solver = results_json::solver(&setup.solver, nominal, 2e-5.into());
         let numbers = ["refinement", "band", "period", "pairs", "element_size", "estimated_error"];
         for key in numbers.iter().filter(|key| solver.get(key).is_some()) {
             assert!(solver[key].as_f64().unwrap() > 0.0, "{key}: {solver}");
@@ -221,10 +254,7 @@ fn a_result_without_a_point_gives_none() {
     check("[]", "`parameters.density` is missing; it must be a number");
     check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
     check(&identified(&failed()), "`parameters.density` is null;");
-    check(
-        &results_json::propagation(&result(), &Setup::default()),
-        "`parameters.density` is missing;",
-    );
+    check(&results_json::propagation(&result()), "`parameters.density` is missing;");
     let text = identified(&result());
     check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
 }
@@ -291,8 +321,10 @@ fn realizations() {
 }
 
 fn group(name: &str, status: Status, best: Option<BestPoint>) -> GroupResult {
-    let data = moments(3925.0, 0.00637);
-    GroupResult { name: name.to_owned(), status, reason: None, best, data }
+    let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
+    let data = DataSummary::of(&Data::Velocities(velocities), 0);
+    let (name, conclusions) = (name.to_owned(), Conclusions::default());
+    GroupResult { name, status, reason: None, best, data, conclusions }
 }
 
 /// Every row of a table by the names of its columns.
@@ -312,9 +344,6 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
     let free = |lower, upper, start| Range::Free { start, lower, upper };
     let mut job = specification();
     job.parameters[Parameter::LongitudinalYoungModulus as usize] = free(12e9, 25e9, 18e9);
-    let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
-    let of = |name: &str| Group { name: name.to_owned(), velocities: velocities.clone() };
-    job.data = Some(Data::Groups(["a", "b", "c"].map(of).to_vec()));
     let best = result().best.unwrap();
     let mut result = JobResult { best: None, data: None, ..result() };
     let settled = GroupResult {
@@ -330,13 +359,10 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
         value,
         known: interval.map(|interval| Known { standard_error: 1.0, interval, free_share: 0.0 }),
     };
+    let estimate = result.groups[0].best.as_ref().unwrap().velocity.unwrap();
     let found = |known: bool| Inference {
         matched: known,
-        noise: noise(
-            job.data.as_ref().unwrap(),
-            0,
-            &result.groups[0].best.as_ref().unwrap().velocity.unwrap(),
-        ),
+        noise: noise(job.data.as_ref().unwrap(), 0, &estimate),
         free: vec![Parameter::LongitudinalYoungModulus, Parameter::Dispersion],
         sensitivities: Vec::new(),
         fixed: Vec::new(),
@@ -348,6 +374,8 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
             quantity(17.717e9, known.then_some([17e9, 18.5e9])),
         )],
     };
+    result.groups[0].conclusions.inference = Some(found(true));
+    result.groups[1].conclusions.inference = Some(found(false));
     let row = |group, varied| Evaluation {
         number: 0,
         role: Role { group, start: 0, varied },
@@ -359,12 +387,7 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
     };
     let varied = Some(Parameter::Dispersion);
     let history = [row(0, None), row(0, None), row(0, varied), row(1, None)];
-    let text = results_csv::groups(
-        &job,
-        &result,
-        &history,
-        &[Some(found(true)), Some(found(false)), None],
-    );
+    let text = results_csv::groups(&job, &result, &history);
     let rows = rows(&text);
     let check = |group: usize, expected: &[(&str, &str)]| {
         for (column, value) in expected {
@@ -407,12 +430,7 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
     assert!(text.ends_with(",\"only one velocity, and no more\"\n"), "{text}");
     // Where nothing else is said, a blank is explained.
     result.groups[1].reason = None;
-    let text = results_csv::groups(
-        &job,
-        &result,
-        &history,
-        &[Some(found(true)), Some(found(false)), None],
-    );
+    let text = results_csv::groups(&job, &result, &history);
     assert!(text.contains(",the model does not match the data within their noise: no intervals\n"));
 }
 
@@ -441,11 +459,7 @@ fn the_best_point_of_a_group_is_found_by_its_name() {
     let mut result = JobResult { best: None, data: None, ..result() };
     result.groups =
         vec![group("left", Status::Converged, Some(best)), group("none", Status::Failed, None)];
-    let velocities = vec![3900.0, 3950.0];
-    let of = |name: &str| Group { name: name.to_owned(), velocities: velocities.clone() };
-    let data = Some(Data::Groups(["left", "none"].map(of).to_vec()));
-    let job = JobSpecification { data, ..specification() };
-    let text = results_json::identification(&result, &job, &[]);
+    let text = results_json::identification(&result);
     assert_eq!(results_json::group_names(&text).unwrap(), ["left", "none"]);
     assert_eq!(results_json::best_point_of_group(&text, "left").unwrap(), POINT);
     let refused = |name| results_json::best_point_of_group(&text, name).unwrap_err().to_string();

@@ -155,7 +155,7 @@ pub enum Answer {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Refusal {
     /// There is no such job.
-    #[error("there is no job {job}; `osteon jobs` lists those there are")]
+    #[error("there is no job {job}")]
     NoJob {
         /// The job asked for.
         job: JobId,
@@ -196,7 +196,7 @@ pub enum Refusal {
         limit: u64,
     },
     /// The job has not ended.
-    #[error("job {job} has not ended; wait for it with `osteon watch {job}`")]
+    #[error("job {job} has not ended")]
     NotEnded {
         /// The job.
         job: JobId,

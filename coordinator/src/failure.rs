@@ -2,6 +2,7 @@
 
 use osteon_common::outcome::{Solved, encode};
 use osteon_common::parameters::Point;
+use osteon_common::results::JobFailure;
 use thiserror::Error;
 
 use crate::dispute::Contradiction;
@@ -52,13 +53,15 @@ pub enum Failure {
     },
 }
 
-/// Whether a job that failed for `reason` may end otherwise when it is run again: the reason lies in
-/// machines, and not in the job.
-pub fn lies_in_machines(reason: &str) -> bool {
-    reason.starts_with("integrity error: ")
-        || reason.contains(" workers that vanished")
-        || reason.starts_with("stored evaluation ")
-        || reason.starts_with("the store has no evaluation ")
+impl Failure {
+    /// Of which kind it is.
+    pub fn kind(&self) -> JobFailure {
+        match self {
+            Self::Contradiction { .. } => JobFailure::IntegrityError,
+            Self::LethalRealization { .. } => JobFailure::LostRealization,
+            Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
+        }
+    }
 }
 
 /// An answer, for people.
@@ -70,39 +73,5 @@ pub(crate) fn shown(solved: Solved) -> String {
             solved.estimated_error
         ),
         Err(kind) => kind.name().to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::worker_name::WorkerName;
-
-    #[test]
-    fn every_failure_of_this_kind_lies_in_machines() {
-        let (point, index) = (Point([1.0; 7]), 3);
-        let answer = |process| {
-            let solved = Solved { outcome: Ok(3900.0), estimated_error: 0.0 };
-            (WorkerName::new("node", process, 0), solved)
-        };
-        let contradiction = Box::new(Contradiction { index, answers: [answer(1), answer(2)] });
-        let replay = ReplayError { number: 1, found: Box::new([0.0; 7]), expected: None };
-        for failure in [
-            Failure::Contradiction { contradiction, point },
-            Failure::LethalRealization {
-                index,
-                workers: 3,
-                hosts: "a, b".to_owned(),
-                case: "[bone]".to_owned(),
-            },
-            Failure::Replay(replay),
-            Failure::Missing { number: 2 },
-        ] {
-            assert!(lies_in_machines(&failure.to_string()), "{failure}");
-        }
-        for reason in ["", "no feasible point among the 9 evaluated", "3 of 9 realizations failed"]
-        {
-            assert!(!lies_in_machines(reason), "{reason}");
-        }
     }
 }

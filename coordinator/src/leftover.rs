@@ -1,9 +1,13 @@
 //! What an ended job left, out of the store: without computing its path again, so that neither its
-//! length nor the version that went it matters.
+//! length nor the version that went it matters. What the data say is computed here, from what is read.
 
-use osteon_common::job::JobSpecification;
-use osteon_common::results::{BestPoint, Evaluation, JobResult};
+use std::sync::Arc;
+
+use osteon_common::job::{Data, JobSpecification};
+use osteon_common::outcome::Outcome;
+use osteon_common::results::{BestPoint, Evaluation, GroupResult, JobResult};
 use thiserror::Error;
+use tokio::sync::oneshot;
 
 use crate::ids::JobId;
 use crate::search::Summary;
@@ -14,7 +18,7 @@ use crate::store::{EndRecord, JobRecord, Store, StoreError};
 pub struct Leftover {
     /// What was to be computed.
     pub specification: JobSpecification,
-    /// The result.
+    /// The result, with the outcomes of every best point.
     pub result: JobResult,
     /// Rows of the history, in order.
     pub history: Vec<Evaluation>,
@@ -48,80 +52,129 @@ pub enum ReadError {
     },
 }
 
-/// Reads what a job left. Blocks.
+/// Reads what a job left, all at once. Blocks.
 ///
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
 pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadError> {
-    let mut reading = Reading::new(end.clone());
-    loop {
-        if let Some(leftover) = reading.step(store)? {
-            return Ok(leftover);
+    let job = end.job;
+    let JobRecord { specification, .. } = job_record(store, job)?;
+    let left = Left { end: end.clone(), specification, summary: summary(store, job)? };
+    let mut read =
+        |number: Option<u64>| number.map(|number| outcomes(store, job, number)).transpose();
+    let groups = (0..left.groups()).map(|set| Ok(left.group(set, read(left.best_of(set))?)));
+    let groups: Vec<_> = groups.collect::<Result<_, ReadError>>()?;
+    let mut result = left.result(read(left.best())?);
+    result.groups = groups.into_iter().flatten().collect();
+    let Left { specification, summary, .. } = left;
+    let specification = Arc::unwrap_or_clone(specification);
+    Ok(Leftover { specification, result, history: summary.history })
+}
+
+/// What an ended job left but its outcomes, of which there may be more than memory holds.
+#[derive(Debug)]
+pub(crate) struct Left {
+    /// How it ended.
+    pub(crate) end: EndRecord,
+    /// What was to be computed.
+    pub(crate) specification: Arc<JobSpecification>,
+    /// What its path came to.
+    pub(crate) summary: Summary,
+}
+
+impl Left {
+    /// Number of the best evaluation, if one was feasible; `None` where the data are groups.
+    pub(crate) fn best(&self) -> Option<u64> {
+        self.summary.best
+    }
+
+    /// Groups of the data whose searches have ended.
+    pub(crate) fn groups(&self) -> usize {
+        match &self.specification.data {
+            Some(Data::Groups(groups)) => groups.len().min(self.summary.groups.len()),
+            _ => 0,
         }
+    }
+
+    /// Number of the best evaluation of a group, if one was feasible.
+    pub(crate) fn best_of(&self, set: usize) -> Option<u64> {
+        self.summary.groups.get(set)?.best
+    }
+
+    /// The result without its groups, given the outcomes of the best evaluation. Computes what the data
+    /// say.
+    pub(crate) fn result(&self, outcomes: Option<Arc<[Outcome]>>) -> JobResult {
+        let best = self.best_point(self.best(), outcomes);
+        let EndRecord { ending, program, .. } = &self.end;
+        self.summary.result(&self.specification, ending, program, best, Vec::new())
+    }
+
+    /// What was found for a group, given the outcomes of its best evaluation. Computes what its data say.
+    pub(crate) fn group(
+        &self,
+        set: usize,
+        outcomes: Option<Arc<[Outcome]>>,
+    ) -> Option<GroupResult> {
+        let best = self.best_point(self.best_of(set), outcomes);
+        self.summary.group(&self.specification, set, best)
+    }
+
+    fn best_point(
+        &self,
+        number: Option<u64>,
+        outcomes: Option<Arc<[Outcome]>>,
+    ) -> Option<BestPoint> {
+        let (number, outcomes) = number.zip(outcomes)?;
+        self.summary.best_point(&self.specification, number, &outcomes)
     }
 }
 
-/// Reading what a job left record by record, so that others have the store in between: a record
-/// may be as large as ten million realizations.
+/// One record of what an ended job left, to be read for somebody.
 #[derive(Debug)]
-pub(crate) struct Reading {
-    end: EndRecord,
-    record: Option<JobRecord>,
-    summary: Option<Summary>,
-    /// Best points of the groups so far.
-    of_groups: Vec<Option<BestPoint>>,
+pub(crate) enum Reading {
+    /// The job.
+    Job(JobId, Reply<JobRecord>),
+    /// What its path came to.
+    Summary(JobId, Reply<Summary>),
+    /// The outcomes of the evaluation with this number.
+    Outcomes(JobId, u64, Reply<Arc<[Outcome]>>),
 }
+
+/// Where a record that was read goes.
+pub(crate) type Reply<T> = oneshot::Sender<Result<T, ReadError>>;
 
 impl Reading {
-    /// Nothing is read yet.
-    pub(crate) fn new(end: EndRecord) -> Self {
-        Self { end, record: None, summary: None, of_groups: Vec::new() }
-    }
-
-    /// Reads the next record; what the job left, once that was the last. Blocks for that long.
-    ///
-    /// # Errors
-    /// When the store cannot be read, or something is missing in it.
-    pub(crate) fn step(&mut self, store: &mut dyn Store) -> Result<Option<Leftover>, ReadError> {
-        let job = self.end.job;
-        let Some(record) = &self.record else {
-            self.record = Some(store.job(job)?.ok_or(ReadError::Pruned { job })?);
-            return Ok(None);
-        };
-        let Some(summary) = &self.summary else {
-            let summary = store.summary(job)?;
-            self.summary = Some(found(store, job, summary, ReadError::NoSummary { job })?);
-            return Ok(None);
-        };
-        let specification = &record.specification;
-        if let Some(group) = summary.groups.get(self.of_groups.len()) {
-            let best = best(store, job, specification, summary, group.best)?;
-            // The outcomes of all groups together may be very many.
-            self.of_groups.push(best.map(|best| BestPoint { outcomes: Vec::new(), ..best }));
-            return Ok(None);
+    /// Reads it, unless nobody waits for it any more. Blocks for that long.
+    pub(crate) fn serve(self, store: &mut dyn Store) {
+        // Who asked may go while it is read.
+        match self {
+            Self::Job(job, reply) if !reply.is_closed() => {
+                drop(reply.send(job_record(store, job)));
+            }
+            Self::Summary(job, reply) if !reply.is_closed() => {
+                drop(reply.send(summary(store, job)));
+            }
+            Self::Outcomes(job, number, reply) if !reply.is_closed() => {
+                drop(reply.send(outcomes(store, job, number)));
+            }
+            Self::Job(..) | Self::Summary(..) | Self::Outcomes(..) => {}
         }
-        let best = best(store, job, specification, summary, summary.best)?;
-        let (ending, program) = (&self.end.ending, &self.end.program);
-        let of_groups = std::mem::take(&mut self.of_groups);
-        let result = summary.result(specification, ending, program, best, of_groups);
-        let specification = (**specification).clone();
-        let history = self.summary.take().map(|summary| summary.history).unwrap_or_default();
-        Ok(Some(Leftover { specification, result, history }))
     }
 }
 
-/// The best point of a job or a group, whose evaluation has this number, if there is one.
-fn best(
-    store: &mut dyn Store,
-    job: JobId,
-    specification: &JobSpecification,
-    summary: &Summary,
-    number: Option<u64>,
-) -> Result<Option<BestPoint>, ReadError> {
-    let Some(number) = number else { return Ok(None) };
+fn job_record(store: &mut dyn Store, job: JobId) -> Result<JobRecord, ReadError> {
+    store.job(job)?.ok_or(ReadError::Pruned { job })
+}
+
+fn summary(store: &mut dyn Store, job: JobId) -> Result<Summary, ReadError> {
+    let summary = store.summary(job)?;
+    found(store, job, summary, ReadError::NoSummary { job })
+}
+
+fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Arc<[Outcome]>, ReadError> {
     let evaluation = store.evaluation(job, number)?;
     let evaluation = found(store, job, evaluation, ReadError::NoBest { job, number })?;
-    Ok(summary.best_point(specification, number, &evaluation.outcomes))
+    Ok(evaluation.outcomes)
 }
 
 /// What is missing was forgotten with its job, or is `lost`.

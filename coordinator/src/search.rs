@@ -8,13 +8,15 @@ use std::sync::Arc;
 
 use osteon_common::data_statistics::kolmogorov_test;
 use osteon_common::digest::PathDigest;
+use osteon_common::inference::{Conclusions, below_noise_from, meaning};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
-    BestPoint, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments, Role,
-    Status,
+    BestPoint, DataSummary, EstimatedError, Evaluation, GroupEnding, GroupResult, JobFailure,
+    JobResult, Role, Status,
 };
+use osteon_common::sampling::NominalSampling;
 use osteon_common::statistics::{self, Verdict, likelihood_error};
 use osteon_common::version::Program;
 use thiserror::Error;
@@ -45,8 +47,18 @@ pub enum Step {
 pub struct Ending {
     /// The status.
     pub status: Status,
+    /// Of which kind the failure is; `None` with any other status than failed.
+    pub failure: Option<JobFailure>,
     /// Why, in a sentence, where the status needs one.
     pub reason: Option<String>,
+}
+
+impl Ending {
+    /// As a search ends, which fails only where no point is feasible.
+    pub fn of_search(status: Status, reason: Option<String>) -> Self {
+        let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
+        Self { status, failure, reason }
+    }
 }
 
 /// What the path of a search comes to, its outcomes aside.
@@ -281,11 +293,11 @@ impl Search {
 
     fn propagated(&self, verdict: &Verdict) -> Ending {
         if verdict.feasible {
-            return Ending { status: Status::Converged, reason: None };
+            return Ending::of_search(Status::Converged, None);
         }
         let reason = self.history.first();
         let reason = reason.map(|row| reasons::failed(row, &self.specification));
-        Ending { status: Status::Failed, reason: Some(reason.unwrap_or_default()) }
+        Ending::of_search(Status::Failed, Some(reason.unwrap_or_default()))
     }
 }
 
@@ -312,9 +324,12 @@ impl Summary {
         let data = specification.data.as_ref();
         let measured = data.and_then(|data| data.velocities(row.role.group as usize));
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
-        Some(BestPoint {
+        let mut best = BestPoint {
             point: row.point,
+            meaning: row.cost.map(|cost| meaning(specification, cost)),
             cost: row.cost,
+            penalty: specification.has_priors().then(|| specification.penalty(&row.point)),
+            below_noise_from: None,
             cost_error: by_likelihood
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
             velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
@@ -324,38 +339,38 @@ impl Summary {
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),
-        })
+        };
+        let set = row.role.group as usize;
+        best.below_noise_from = below_noise_from(specification, set, &best, &self.history);
+        Some(best)
     }
 
-    /// What a job with this path leaves, given how it ended, the program that
-    /// computed it, its best point, or those of its groups.
+    /// What a job with this path leaves, given how it ended, the program that computed it, its best
+    /// point, or what was found for its groups.
     pub fn result(
         &self,
         specification: &JobSpecification,
         ending: &Ending,
         program: &Program,
         best: Option<BestPoint>,
-        of_groups: Vec<Option<BestPoint>>,
+        groups: Vec<GroupResult>,
     ) -> JobResult {
-        let data = specification.data.as_ref();
-        let data = data.filter(|_| specification.kind == JobKind::Identification);
-        let names = data.into_iter().flat_map(Data::names);
-        let found = names.zip(&self.groups).zip(of_groups).enumerate();
-        let groups = found.map(|(set, ((name, ending), best))| GroupResult {
-            name: name.to_owned(),
-            status: ending.status,
-            reason: ending.reason.clone(),
-            best,
-            data: data.map_or(Moments::UNKNOWN, |data| data.moments(set)),
-        });
+        let of_one_set = !matches!(specification.data, Some(Data::Groups(_)));
+        let data = specification.data.as_ref().filter(|_| of_one_set);
+        let conclusions =
+            data.map(|_| Conclusions::of(specification, 0, best.as_ref(), &self.history));
         let searched = self.history.iter().filter(|row| row.role.varied.is_none());
         JobResult {
             status: ending.status,
+            failure: ending.failure,
             reason: ending.reason.clone(),
             digest: self.digest.clone(),
             best,
-            groups: groups.collect(),
-            data: data.filter(|data| data.names().next().is_none()).map(|data| data.moments(0)),
+            data: data.map(|data| DataSummary::of(data, 0)),
+            conclusions: conclusions.unwrap_or_default(),
+            groups,
+            objective: specification.objective,
+            search: specification.search,
             evaluations: searched.count() as u64,
             realizations: specification.monte_carlo.realizations,
             seed: specification.monte_carlo.seed,
@@ -363,8 +378,29 @@ impl Summary {
             scrambles: specification.monte_carlo.scrambles,
             control_variate: specification.monte_carlo.control_variate,
             solver: specification.setup.solver,
+            nominal: NominalSampling::of(&specification.setup),
             picking: specification.setup.picking,
             program: program.clone(),
         }
+    }
+
+    /// What was found for group number `set` of the data, given its best point; `None` if its search
+    /// has not ended.
+    pub fn group(
+        &self,
+        specification: &JobSpecification,
+        set: usize,
+        best: Option<BestPoint>,
+    ) -> Option<GroupResult> {
+        let data = specification.data.as_ref()?;
+        let ending = self.groups.get(set)?;
+        Some(GroupResult {
+            name: data.names().nth(set)?.to_owned(),
+            status: ending.status,
+            reason: ending.reason.clone(),
+            data: DataSummary::of(data, set),
+            conclusions: Conclusions::of(specification, set, best.as_ref(), &self.history),
+            best,
+        })
     }
 }

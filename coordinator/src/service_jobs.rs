@@ -8,15 +8,13 @@ use futures::Stream;
 use osteon_common::limits::{
     FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
 };
-use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
     CancelRequest, CancelResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest,
-    GetResponse, HistoryBlock, JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest,
-    ListResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest,
-    WatchResponse,
+    GetResponse, JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest, ListResponse,
+    PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest, WatchResponse,
 };
-use osteon_proto::{realizations, results, specification, status};
+use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
@@ -29,23 +27,18 @@ use crate::effect::{Answer, Refusal};
 use crate::event::{self, Retention};
 use crate::fetching;
 use crate::ids::JobId;
-use crate::leftover::{Leftover, ReadError};
 use crate::observers;
 use crate::places::{Caller, Places};
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
 const PAGE_JOBS_MAX: u32 = 1000;
-/// Rows of the history in one message.
-const HISTORY_BLOCK_ROWS: usize = 4096;
 /// A request that finds no place among those that wait for this long is refused.
 const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
 /// Who cancels a job that has not ended after this long is told what it waits for.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 /// When what was refused for want of room may be tried again.
 const RETRY: Duration = Duration::from_secs(10);
-/// Realizations in one message.
-const REALIZATION_BLOCK: usize = 65_536;
 
 /// The service of clients.
 pub(crate) struct JobsService {
@@ -97,17 +90,12 @@ impl JobsService {
         Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
-    async fn leftover(&self, job: JobId) -> Result<Leftover, Status> {
+    /// Opens what an ended job left.
+    async fn left(&self, job: JobId) -> Result<fetching::Opened, Status> {
         let Answer::Ended(end) = self.ask(event::Request::Fetch(job)).await? else {
             return Err(unexpected());
         };
-        let (reply, leftover) = oneshot::channel();
-        let fetch = Command::Fetch { end, reply };
-        self.store.send(fetch).await.map_err(|_| stopped())?;
-        leftover.await.map_err(|_| stopped())?.map_err(|error| match error {
-            ReadError::Pruned { .. } => Status::not_found(error.to_string()),
-            _ => Status::data_loss(error.to_string()),
-        })
+        fetching::open(&self.store, end).await
     }
 }
 
@@ -204,8 +192,9 @@ impl Jobs for JobsService {
         let caller = Caller::of(request.extensions());
         let job = job(&request.into_inner().job)?;
         let place = self.fetches.take(caller).await?;
-        let leftover = self.leftover(job).await?;
-        Ok(Response::new(Box::pin(fetching::paced(parts(leftover), place))))
+        let opened = self.left(job).await?;
+        let sent = fetching::paced(place, |reader| fetching::send_all(opened, reader));
+        Ok(Response::new(Box::pin(sent)))
     }
 
     async fn prune(
@@ -244,35 +233,11 @@ impl Jobs for JobsService {
     }
 }
 
-/// One specification, one result, history blocks, realization blocks; made as they are sent.
-fn parts(leftover: Leftover) -> impl Iterator<Item = Part> + Send {
-    let Leftover { specification, result, history } = leftover;
-    let head = [
-        Part::Specification(specification::to_message(&specification)),
-        Part::Result(results::to_message(&result)),
-    ];
-    let outcomes = result.best.map(|best| best.outcomes).unwrap_or_default();
-    let rows = (0..history.len().div_ceil(HISTORY_BLOCK_ROWS)).map(move |block| {
-        let rows = history.iter().skip(block * HISTORY_BLOCK_ROWS).take(HISTORY_BLOCK_ROWS);
-        let rows = rows.map(results::evaluation_to_message).collect();
-        Part::History(HistoryBlock { rows, groups: Vec::new() })
-    });
-    let blocks = (0..outcomes.len().div_ceil(REALIZATION_BLOCK)).map(move |block| {
-        let first = block * REALIZATION_BLOCK;
-        let end = (first + REALIZATION_BLOCK).min(outcomes.len());
-        Part::Realizations(realizations::to_message(first as u64, &outcomes[first..end]))
-    });
-    head.into_iter().chain(rows).chain(blocks)
-}
-
 fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
         return Err(too_long("job", text));
     }
-    JobId::parse(text).ok_or_else(|| {
-        let message = format!("there is no job `{text}`; `osteon jobs` lists those there are");
-        status::no_job(text, message)
-    })
+    JobId::parse(text).ok_or_else(|| status::no_job(text, format!("there is no job `{text}`")))
 }
 
 fn too_long(field: &str, value: &str) -> Status {

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_proto::results::status_to_message;
-use osteon_proto::specification::kind_to_message;
+use osteon_proto::choice::{JOB_FAILURE, JOB_KIND, JOB_STATUS};
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
@@ -24,7 +23,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
     let realizations = specification.monte_carlo.realizations;
     let mut snapshot = JobSnapshot {
         job: id.to_string(),
-        kind: kind_to_message(specification.kind).into(),
+        kind: JOB_KIND.number(specification.kind),
         max_evaluations: specification.evaluations_max(),
         realizations,
         workers: workers(state),
@@ -53,8 +52,9 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
     let end = &job.end;
     let mut snapshot = JobSnapshot {
         job: end.job.to_string(),
-        kind: kind_to_message(job.kind).into(),
-        status: status_to_message(end.ending.status).into(),
+        kind: JOB_KIND.number(job.kind),
+        status: JOB_STATUS.number(end.ending.status),
+        failure: end.ending.failure.map_or(0, |failure| JOB_FAILURE.number(failure)),
         reason: end.ending.reason.clone().unwrap_or_default(),
         evaluations: end.evaluations,
         max_evaluations: job.max_evaluations,

@@ -53,9 +53,9 @@ pub struct EvaluationRecord {
     pub point: Point,
     /// Outcomes in index order.
     pub outcomes: Arc<[Outcome]>,
-    /// Estimated errors of the successes, unless there are none, or an older version has stored it.
+    /// Estimated errors of the successes, unless there are none.
     pub estimated_error: Option<EstimatedError>,
-    /// Everybody whose answers are in it; empty if an older version has stored it.
+    /// Everybody whose answers are in it.
     pub workers: BTreeSet<WorkerName>,
 }
 
@@ -255,32 +255,18 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// An older version wrote it.
+    /// A version of osteon with another format wrote it.
     #[error(
-        "{} has format {found} of an older version of osteon, this program writes format {known}; \
-         finish its jobs with the version that wrote it, or choose another directory",
+        "{}: this store has format {found}; this version writes {known}: run the version that wrote \
+         it, or take a new directory",
         path.display()
     )]
-    Older {
+    Format {
         /// The file.
         path: PathBuf,
         /// Format of the file.
         found: i64,
-        /// Only format known.
-        known: i64,
-    },
-    /// A newer version wrote it.
-    #[error(
-        "{} has format {found}, this program writes format {known}; use a newer version of osteon, \
-         or another directory",
-        path.display()
-    )]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Format of the file.
-        found: i64,
-        /// Newest format known.
+        /// The only format known.
         known: i64,
     },
     /// An evaluation is missing.

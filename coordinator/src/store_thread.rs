@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 use std::thread::{self, JoinHandle};
 
 use osteon_common::limits::JOBS_MAX;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 
 use crate::effect::Record;
 use crate::event::{Event, Unread};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
-use crate::leftover::{Leftover, ReadError, Reading};
-use crate::store::{EndRecord, ExpulsionRecord, Store, StoreError};
+use crate::leftover::Reading;
+use crate::store::{ExpulsionRecord, Store, StoreError};
 
 /// Commands that may wait: a record for every job, and some readers.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
@@ -25,8 +25,8 @@ pub(crate) enum Command {
     Read { job: JobId, number: u64 },
     /// Forget ended jobs.
     Prune { token: Option<Token>, jobs: Vec<JobId> },
-    /// Read what an ended job left.
-    Fetch { end: EndRecord, reply: oneshot::Sender<Result<Leftover, ReadError>> },
+    /// Read a record of what an ended job left.
+    Fetch(Reading),
 }
 
 /// Starts the thread. It ends when every sender of commands is gone.
@@ -44,9 +44,8 @@ pub(crate) fn start(
     Ok((sender, thread))
 }
 
-/// Does what is asked for until every sender of commands is gone. Of what is fetched one record is
-/// read at a time, and a command that has come meanwhile goes first: no record of a job under way
-/// waits for longer than it takes to read one.
+/// Does what is asked for until every sender of commands is gone. Between two other commands one record
+/// that is fetched is read: no record of a job under way waits for longer than it takes to read one.
 pub(crate) fn serve(
     store: &mut dyn Store,
     commands: &mut mpsc::Receiver<Command>,
@@ -74,20 +73,14 @@ pub(crate) fn serve(
                 let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
                 drop(events.blocking_send(Event::Pruned { token, jobs, outcome }));
             }
-            Some(Command::Fetch { end, reply }) => readings.push_back((Reading::new(end), reply)),
+            Some(Command::Fetch(reading)) => {
+                readings.push_back(reading);
+                continue;
+            }
             None => {}
         }
-        let Some((mut reading, reply)) = readings.pop_front() else {
-            continue;
-        };
-        // The reader may have gone.
-        if reply.is_closed() {
-            continue;
-        }
-        match reading.step(store) {
-            Ok(None) => readings.push_back((reading, reply)),
-            Ok(Some(leftover)) => drop(reply.send(Ok(leftover))),
-            Err(error) => drop(reply.send(Err(error))),
+        if let Some(reading) = readings.pop_front() {
+            reading.serve(store);
         }
     }
 }

@@ -9,7 +9,9 @@ use osteon_common::outcome::{self, Solved};
 use osteon_common::parameters::Point;
 use osteon_common::violations::Violations;
 
+use crate::choice::SAMPLING;
 use crate::malformed::Malformed;
+use crate::parameter_values::{point_from_message, point_to_message};
 use crate::realizations;
 use crate::setup::{self, SetupMessages};
 use crate::v1;
@@ -33,8 +35,8 @@ pub struct Work {
 pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
     let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&work.setup);
     let (sampling, points) = match work.germs.scheme {
-        GermScheme::Streams => (Sampling::MonteCarlo, 0),
-        GermScheme::Sobol { points } => (Sampling::Sobol, points),
+        GermScheme::Streams => (Sampling::MonteCarlo, None),
+        GermScheme::Sobol { points } => (Sampling::Sobol, Some(points)),
     };
     v1::Batch {
         batch,
@@ -42,9 +44,9 @@ pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
         probe: Some(probe),
         picking: Some(picking),
         solver: Some(solver),
-        point: work.point.0.to_vec(),
+        point: Some(point_to_message(&work.point)),
         seed: work.germs.seed,
-        sampling: sampling.name().to_owned(),
+        sampling: SAMPLING.number(sampling),
         first: work.first,
         count: work.count,
         points_per_scramble: points,
@@ -72,29 +74,29 @@ pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
     }
     let mut violations = Violations::new();
     let setup = read_setup(message, &mut violations)?;
-    let sampling = setup::named(
-        Some(&message.sampling),
-        &Sampling::ALL.map(|sampling| (sampling.name(), sampling)),
-        "sampling",
-        &mut violations,
-    );
+    let sampling = SAMPLING.required(message.sampling, "sampling")?;
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
     let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
-    let point = point(&message.point)?;
+    let point = point_from_message(message.point.as_ref())?;
     Ok(Work { setup, point, germs, first: message.first, count: message.count })
 }
 
 /// How the germs are made of the seed.
 fn scheme(message: &v1::Batch, sampling: Sampling) -> Result<GermScheme, Malformed> {
     let points = message.points_per_scramble;
-    let allowed = match (sampling, points) {
-        (Sampling::MonteCarlo, 0) => return Ok(GermScheme::Streams),
-        (Sampling::MonteCarlo, _) => "it must be 0 without scrambles",
-        (Sampling::Sobol, 1..=REALIZATIONS_MAX) => return Ok(GermScheme::Sobol { points }),
-        (Sampling::Sobol, _) => "it must be 1 to 10^7",
+    let (value, allowed) = match (sampling, points) {
+        (Sampling::MonteCarlo, None) => return Ok(GermScheme::Streams),
+        (Sampling::MonteCarlo, Some(points)) => (points, "it must be absent without scrambles"),
+        (Sampling::Sobol, Some(points @ 1..=REALIZATIONS_MAX)) => {
+            return Ok(GermScheme::Sobol { points });
+        }
+        (Sampling::Sobol, Some(points)) => (points, "it must be 1 to 10^7"),
+        (Sampling::Sobol, None) => {
+            return Err(Malformed::Missing { field: "points_per_scramble" });
+        }
     };
     let field = "points_per_scramble";
-    Err(Malformed::OutOfRange { field, value: points as f64, allowed })
+    Err(Malformed::OutOfRange { field, value: value as f64, allowed })
 }
 
 /// The answer to batch number `batch`: its realizations in index order, and the wall time, s,
@@ -124,25 +126,6 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Mal
             solved.is_sound().then_some(solved).ok_or(unsound)
         })
         .collect()
-}
-
-/// The point of seven finite numbers.
-///
-/// # Errors
-/// When there are not seven, or one is not finite.
-pub fn point(numbers: &[f64]) -> Result<Point, Malformed> {
-    let point: [f64; 7] = numbers.try_into().map_err(|_| Malformed::WrongLength {
-        field: "point",
-        found: numbers.len(),
-        expected: 7,
-    })?;
-    match point.iter().find(|number| !number.is_finite()) {
-        Some(&value) => {
-            let allowed = "every number of a point must be finite";
-            Err(Malformed::OutOfRange { field: "point", value, allowed })
-        }
-        None => Ok(Point(point)),
-    }
 }
 
 /// The setup, which must be complete: what it reads as must be written back as the same messages.
@@ -243,12 +226,14 @@ mod tests {
             batch.layers.as_mut().unwrap().coupling.as_mut().unwrap().density = None;
         };
         assert_eq!(refused(without_density), Malformed::IncompleteSetup);
-        assert!(matches!(
-            refused(|batch| batch.sampling = "dice".to_owned()),
-            Malformed::InvalidSetup(_)
-        ));
+        let field = "sampling";
+        assert_eq!(refused(|batch| batch.sampling = 0), Malformed::Missing { field });
+        let unknown = Malformed::UnknownValue { field, value: 17 };
+        assert_eq!(refused(|batch| batch.sampling = 17), unknown);
+        let unspecified = |batch: &mut v1::Batch| batch.picking.as_mut().unwrap().extremum = 0;
+        assert_eq!(refused(unspecified), Malformed::IncompleteSetup);
         let hybrid = |batch: &mut v1::Batch| {
-            batch.solver.as_mut().unwrap().method = Some("hybrid".to_owned());
+            batch.solver.as_mut().unwrap().set_method(v1::SolverMethod::Hybrid);
         };
         assert_eq!(refused(hybrid), Malformed::IncompleteSetup);
         let element_size = |batch: &mut v1::Batch| {
@@ -264,7 +249,7 @@ mod tests {
     #[test]
     fn each_number_has_its_limit() {
         let field = |malformed| match malformed {
-            Malformed::OutOfRange { field, .. } | Malformed::WrongLength { field, .. } => field,
+            Malformed::OutOfRange { field, .. } | Malformed::Missing { field } => field,
             other => panic!("{other}"),
         };
         assert_eq!(field(refused(|batch| batch.count = 0)), "count");
@@ -272,16 +257,21 @@ mod tests {
         assert_eq!(field(refused(|batch| batch.first = REALIZATIONS_MAX - 9)), "first");
         assert_eq!(field(refused(|batch| batch.first = u64::MAX)), "first");
         assert_eq!(field(refused(|batch| batch.seed = SEED_MAX + 1)), "seed");
-        let points = |sampling: &str, points| {
+        let points = |sampling, points| {
             field(refused(|batch| {
-                batch.sampling = sampling.to_owned();
+                batch.set_sampling(sampling);
                 batch.points_per_scramble = points;
             }))
         };
-        assert_eq!(points("monte_carlo", 1), "points_per_scramble");
-        assert_eq!(points("sobol", 0), "points_per_scramble");
-        assert_eq!(points("sobol", REALIZATIONS_MAX + 1), "points_per_scramble");
-        assert_eq!(field(refused(|batch| batch.point.clear())), "point");
-        assert_eq!(field(refused(|batch| batch.point[6] = f64::NAN)), "point");
+        let (streams, sobol) = (v1::Sampling::MonteCarlo, v1::Sampling::Sobol);
+        assert_eq!(points(streams, Some(1)), "points_per_scramble");
+        assert_eq!(points(sobol, None), "points_per_scramble");
+        assert_eq!(points(sobol, Some(0)), "points_per_scramble");
+        assert_eq!(points(sobol, Some(REALIZATIONS_MAX + 1)), "points_per_scramble");
+        assert_eq!(field(refused(|batch| batch.point = None)), "point");
+        let of_point =
+            |dispersion| refused(|batch| batch.point.as_mut().unwrap().dispersion = dispersion);
+        assert_eq!(field(of_point(None)), "dispersion");
+        assert_eq!(field(of_point(Some(f64::NAN))), "dispersion");
     }
 }

@@ -6,10 +6,13 @@
 //! worker sends is either well formed or a typed [`malformed::Malformed`].
 
 pub mod batch;
+pub mod choice;
+mod conclusions;
 pub mod credential_file;
 pub mod credentials;
 pub mod endpoint;
 pub mod malformed;
+pub mod parameter_values;
 pub mod realizations;
 pub mod results;
 pub mod setup;

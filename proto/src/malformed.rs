@@ -30,12 +30,6 @@ pub enum Malformed {
         /// What was found.
         value: i64,
     },
-    /// A name that is not known.
-    #[error("field `{field}` has an unknown name")]
-    UnknownName {
-        /// Name of the field in the `.proto` file.
-        field: &'static str,
-    },
     /// A number that is not allowed.
     #[error("field `{field}` is {value}; {allowed}")]
     OutOfRange {

@@ -5,10 +5,11 @@ use osteon_common::outcome::{self, Outcome};
 use crate::malformed::Malformed;
 use crate::v1;
 
-/// The block of `outcomes` whose first has index `first`.
-pub fn to_message(first: u64, outcomes: &[Outcome]) -> v1::RealizationBlock {
+/// The block of `outcomes` at the best point of a group, if there are groups, whose first has index
+/// `first`.
+pub fn to_message(group: Option<u32>, first: u64, outcomes: &[Outcome]) -> v1::RealizationBlock {
     let (codes, velocities) = pack(outcomes);
-    v1::RealizationBlock { first, codes, velocities }
+    v1::RealizationBlock { group, first, codes, velocities }
 }
 
 /// Index of the first realization of a block, and its outcomes.
@@ -61,8 +62,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn outcomes_survive_the_wire(first: u64, outcomes in outcomes()) {
-            let block = to_message(first, &outcomes);
+        fn outcomes_survive_the_wire(group: Option<u32>, first: u64, outcomes in outcomes()) {
+            let block = to_message(group, first, &outcomes);
+            prop_assert_eq!(block.group, group);
             prop_assert_eq!(from_message(&block).unwrap(), (first, outcomes));
         }
 

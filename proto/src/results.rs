@@ -1,51 +1,143 @@
 //! Results and the history of a job as messages.
 
-use osteon_common::data_statistics::KolmogorovTest;
-use osteon_common::job::{JobKind, MonteCarlo, Sampling};
+use osteon_common::data_statistics::{Interval, KolmogorovTest, MomentIntervals};
+use osteon_common::inference::Conclusions;
+use osteon_common::job::{Objective, Search};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
-use osteon_common::parameters::Parameter;
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult, JobResult, Moments,
-    Role, Status,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult,
+    JobResult, Moments, Role,
 };
+use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::version::Program;
 use osteon_common::violations::Violations;
 
-use crate::batch;
+use crate::choice::{
+    FAILURE_KIND, JOB_FAILURE, JOB_STATUS, OBJECTIVE, PARAMETER, POINT_MEANING, SAMPLING,
+};
+use crate::conclusions::{self, FieldsOf, interval_from_message};
 use crate::malformed::Malformed;
+use crate::parameter_values::{point_from_message, point_to_message};
 use crate::setup;
+use crate::specification::{search_from_message, search_to_message};
 use crate::v1;
 
-/// The message of a result; the outcomes of its best point travel in realization blocks.
+/// The message of a result. Its groups have messages of their own, and the outcomes of best points
+/// travel in realization blocks.
 pub fn to_message(result: &JobResult) -> v1::JobResult {
+    let conclusions = conclusions::to_message(&result.conclusions);
     v1::JobResult {
-        status: status_to_message(result.status).into(),
-        reason: result.reason.clone().unwrap_or_default(),
+        status: JOB_STATUS.number(result.status),
+        failure: result.failure.map_or(0, |failure| JOB_FAILURE.number(failure)),
+        reason: result.reason.clone(),
         digest: result.digest.clone(),
         best: result.best.as_ref().map(best_to_message),
-        data: result.data.as_ref().map(moments_to_message),
+        data: result.data.as_ref().map(data_to_message),
+        sensitivities: conclusions.sensitivities,
+        identified: conclusions.identified,
+        profiles: conclusions.profiles,
+        solutions: conclusions.solutions,
+        objective: Some(v1::Objective { kind: OBJECTIVE.number(result.objective) }),
+        search: Some(search_to_message(&result.search)),
         evaluations: result.evaluations,
         realizations: result.realizations,
         seed: result.seed,
+        sampling: SAMPLING.number(result.sampling),
+        scrambles: result.scrambles,
+        control_variate: result.control_variate,
         solver: Some(setup::solver_to_message(&result.solver)),
+        nominal_sampling: result.nominal.map(nominal_to_message),
         picking: Some(setup::picking_to_message(&result.picking)),
         version: result.program.version.clone(),
         numerics: result.program.numerics,
-        commit: result.program.commit.clone().unwrap_or_default(),
-        sampling: result.sampling.name().to_owned(),
-        scrambles: result.scrambles,
-        control_variate: result.control_variate,
-        groups: result.groups.iter().map(group_to_message).collect(),
+        commit: result.program.commit.clone(),
     }
+}
+
+/// The result of a message, with the `outcomes` of its best point, and its `groups`.
+///
+/// # Errors
+/// When a required field is absent, or a value is not one that a coordinator writes.
+pub fn from_message(
+    message: &v1::JobResult,
+    outcomes: Vec<Outcome>,
+    groups: Vec<GroupResult>,
+) -> Result<JobResult, Malformed> {
+    let best = message.best.as_ref().map(|best| best_from_message(best, outcomes));
+    let Settings { objective, search, solver, picking } = settings_from_message(message)?;
+    Ok(JobResult {
+        status: JOB_STATUS.required(message.status, "status")?,
+        failure: JOB_FAILURE.optional(message.failure, "failure")?,
+        reason: message.reason.clone(),
+        digest: message.digest.clone(),
+        best: best.transpose()?,
+        data: message.data.as_ref().map(data_from_message).transpose()?,
+        conclusions: conclusions_from_message(message)?,
+        groups,
+        objective,
+        search,
+        evaluations: message.evaluations,
+        realizations: message.realizations,
+        seed: message.seed,
+        sampling: SAMPLING.required(message.sampling, "sampling")?,
+        scrambles: scrambles(message.scrambles)?,
+        control_variate: message.control_variate,
+        solver,
+        nominal: message.nominal_sampling.map(nominal_from_message),
+        picking,
+        program: program_from_message(message),
+    })
+}
+
+/// The message of what was found for group number `group`.
+pub fn group_to_message(group: u32, found: &GroupResult) -> v1::GroupResult {
+    let conclusions = conclusions::to_message(&found.conclusions);
+    v1::GroupResult {
+        group,
+        name: found.name.clone(),
+        status: JOB_STATUS.number(found.status),
+        reason: found.reason.clone(),
+        best: found.best.as_ref().map(best_to_message),
+        data: Some(data_to_message(&found.data)),
+        sensitivities: conclusions.sensitivities,
+        identified: conclusions.identified,
+        profiles: conclusions.profiles,
+        solutions: conclusions.solutions,
+    }
+}
+
+/// What was found for a group, with the `outcomes` of its best point.
+///
+/// # Errors
+/// As [`from_message`].
+pub fn group_from_message(
+    message: &v1::GroupResult,
+    outcomes: Vec<Outcome>,
+) -> Result<GroupResult, Malformed> {
+    let data = message.data.as_ref().ok_or(Malformed::Missing { field: "data" })?;
+    let best = message.best.as_ref().map(|best| best_from_message(best, outcomes));
+    Ok(GroupResult {
+        name: message.name.clone(),
+        status: JOB_STATUS.required(message.status, "status")?,
+        reason: message.reason.clone(),
+        best: best.transpose()?,
+        data: data_from_message(data)?,
+        conclusions: conclusions::from_message(&FieldsOf {
+            sensitivities: &message.sensitivities,
+            identified: message.identified.as_ref(),
+            profiles: &message.profiles,
+            solutions: message.solutions.as_ref(),
+        })?,
+    })
 }
 
 /// The message of how the search for a group ended.
 pub fn group_ending_to_message(ending: &GroupEnding) -> v1::GroupEnding {
     v1::GroupEnding {
-        status: status_to_message(ending.status).into(),
-        reason: ending.reason.clone().unwrap_or_default(),
+        status: JOB_STATUS.number(ending.status),
+        reason: ending.reason.clone(),
         best: ending.best,
     }
 }
@@ -56,82 +148,9 @@ pub fn group_ending_to_message(ending: &GroupEnding) -> v1::GroupEnding {
 /// When the status is absent or unknown.
 pub fn group_ending_from_message(message: &v1::GroupEnding) -> Result<GroupEnding, Malformed> {
     Ok(GroupEnding {
-        status: ended(message.status)?,
-        reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
+        status: JOB_STATUS.required(message.status, "status")?,
+        reason: message.reason.clone(),
         best: message.best,
-    })
-}
-
-fn group_to_message(group: &GroupResult) -> v1::GroupResult {
-    v1::GroupResult {
-        name: group.name.clone(),
-        status: status_to_message(group.status).into(),
-        reason: group.reason.clone().unwrap_or_default(),
-        best: group.best.as_ref().map(best_to_message),
-        data: Some(moments_to_message(&group.data)),
-    }
-}
-
-fn group_from_message(message: &v1::GroupResult) -> Result<GroupResult, Malformed> {
-    let data = message.data.as_ref().ok_or(Malformed::Missing { field: "data" })?;
-    let best = message.best.as_ref().map(|best| best_from_message(best, Vec::new()));
-    Ok(GroupResult {
-        name: message.name.clone(),
-        status: ended(message.status)?,
-        reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
-        best: best.transpose()?,
-        data: moments_from_message(data),
-    })
-}
-
-fn best_to_message(best: &BestPoint) -> v1::BestPoint {
-    v1::BestPoint {
-        point: best.point.0.to_vec(),
-        cost: best.cost,
-        cost_error: best.cost_error,
-        velocity: best.velocity.as_ref().map(estimate_to_message),
-        failure_bias: best.failure_bias.as_ref().map(moments_to_message),
-        kolmogorov: best.kolmogorov.map(test_to_message),
-        failures: failures_to_message(&best.failures),
-        estimated_error: best.estimated_error.map(errors_to_message),
-    }
-}
-
-/// The status of something that has ended.
-fn ended(number: i32) -> Result<Status, Malformed> {
-    status_from_message(number)?.ok_or(Malformed::Missing { field: "status" })
-}
-
-/// The result of a message, with the `outcomes` of its best point.
-///
-/// # Errors
-/// When a required field is absent, or a value is not one that a coordinator writes.
-pub fn from_message(
-    message: &v1::JobResult,
-    outcomes: Vec<Outcome>,
-) -> Result<JobResult, Malformed> {
-    let best = match &message.best {
-        Some(best) => Some(best_from_message(best, outcomes)?),
-        None => None,
-    };
-    let (solver, picking) = settings_from_message(message)?;
-    let (sampling, scrambles) = sampling_from_message(message)?;
-    Ok(JobResult {
-        status: ended(message.status)?,
-        reason: (!message.reason.is_empty()).then(|| message.reason.clone()),
-        digest: message.digest.clone(),
-        best,
-        data: message.data.as_ref().map(moments_from_message),
-        groups: message.groups.iter().map(group_from_message).collect::<Result<_, _>>()?,
-        evaluations: message.evaluations,
-        realizations: message.realizations,
-        seed: message.seed,
-        sampling,
-        scrambles,
-        control_variate: message.control_variate,
-        solver,
-        picking,
-        program: program_from_message(message),
     })
 }
 
@@ -139,35 +158,28 @@ pub fn from_message(
 pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
     v1::EvaluationRow {
         number: evaluation.number,
-        point: evaluation.point.0.to_vec(),
+        point: Some(point_to_message(&evaluation.point)),
         moments: evaluation.moments.as_ref().map(moments_to_message),
         cost: evaluation.cost,
         failures: failures_to_message(&evaluation.failures),
         estimated_error: evaluation.estimated_error.map(errors_to_message),
         group: evaluation.role.group,
         start: evaluation.role.start,
-        varied: evaluation.role.varied.map_or(0, |parameter| parameter as u32 + 1),
+        varied: evaluation.role.varied.map(|parameter| PARAMETER.number(parameter)),
     }
 }
 
 /// One row of the history.
 ///
 /// # Errors
-/// When the point has not seven finite numbers, or a failure's code or the varied parameter is not
+/// When the point has not seven finite numbers, or the kind of a failure or the varied parameter is not
 /// known.
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
-    let varied = match message.varied {
-        0 => None,
-        number => {
-            let value = number.into();
-            let parameter = Parameter::ALL.get(number as usize - 1).copied();
-            Some(parameter.ok_or(Malformed::UnknownValue { field: "varied", value })?)
-        }
-    };
+    let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     Ok(Evaluation {
         number: message.number,
         role: Role { group: message.group, start: message.start, varied },
-        point: batch::point(&message.point)?,
+        point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,
         failures: failures_from_message(&message.failures)?,
@@ -175,40 +187,19 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
     })
 }
 
-/// What `status` stands for in messages.
-pub fn status_to_message(status: Status) -> v1::JobStatus {
-    match status {
-        Status::Converged => v1::JobStatus::Converged,
-        Status::MaxEvaluations => v1::JobStatus::MaxEvaluations,
-        Status::Cancelled => v1::JobStatus::Cancelled,
-        Status::Failed => v1::JobStatus::Failed,
-    }
-}
-
-/// The status of a message's number; `None` for a job that has not ended.
-///
-/// # Errors
-/// When the number is not known.
-pub fn status_from_message(number: i32) -> Result<Option<Status>, Malformed> {
-    let unknown = Malformed::UnknownValue { field: "status", value: number.into() };
-    Ok(match v1::JobStatus::try_from(number).map_err(|_| unknown)? {
-        v1::JobStatus::Unspecified => None,
-        v1::JobStatus::Converged => Some(Status::Converged),
-        v1::JobStatus::MaxEvaluations => Some(Status::MaxEvaluations),
-        v1::JobStatus::Cancelled => Some(Status::Cancelled),
-        v1::JobStatus::Failed => Some(Status::Failed),
-    })
-}
-
-/// The kind of a message's number.
-///
-/// # Errors
-/// When the number is not known.
-pub fn kind_from_message(number: i32) -> Result<JobKind, Malformed> {
-    match v1::JobKind::try_from(number) {
-        Ok(v1::JobKind::Identification) => Ok(JobKind::Identification),
-        Ok(v1::JobKind::Propagation) => Ok(JobKind::Propagation),
-        _ => Err(Malformed::UnknownValue { field: "kind", value: number.into() }),
+fn best_to_message(best: &BestPoint) -> v1::BestPoint {
+    v1::BestPoint {
+        point: Some(point_to_message(&best.point)),
+        meaning: best.meaning.map_or(0, |meaning| POINT_MEANING.number(meaning)),
+        cost: best.cost,
+        cost_error: best.cost_error,
+        penalty: best.penalty,
+        below_noise_from: best.below_noise_from,
+        velocity: best.velocity.as_ref().map(estimate_to_message),
+        failure_bias: best.failure_bias.as_ref().map(moments_to_message),
+        kolmogorov: best.kolmogorov.map(test_to_message),
+        failures: failures_to_message(&best.failures),
+        estimated_error: best.estimated_error.map(errors_to_message),
     }
 }
 
@@ -221,9 +212,12 @@ fn best_from_message(
         None => None,
     };
     Ok(BestPoint {
-        point: batch::point(&message.point)?,
+        point: point_from_message(message.point.as_ref())?,
+        meaning: POINT_MEANING.optional(message.meaning, "meaning")?,
         cost: message.cost,
         cost_error: message.cost_error,
+        penalty: message.penalty,
+        below_noise_from: message.below_noise_from,
         velocity,
         failure_bias: message.failure_bias.as_ref().map(moments_from_message),
         kolmogorov: message.kolmogorov.as_ref().map(test_from_message),
@@ -237,44 +231,97 @@ fn program_from_message(message: &v1::JobResult) -> Program {
     Program {
         version: message.version.clone(),
         numerics: message.numerics,
-        commit: (!message.commit.is_empty()).then(|| message.commit.clone()),
+        commit: message.commit.clone(),
     }
 }
 
-fn settings_from_message(message: &v1::JobResult) -> Result<(SolverSettings, Picking), Malformed> {
-    let solver = message.solver.as_ref().ok_or(Malformed::Missing { field: "solver" })?;
-    let picking = message.picking.as_ref().ok_or(Malformed::Missing { field: "picking" })?;
+fn conclusions_from_message(message: &v1::JobResult) -> Result<Conclusions, Malformed> {
+    conclusions::from_message(&FieldsOf {
+        sensitivities: &message.sensitivities,
+        identified: message.identified.as_ref(),
+        profiles: &message.profiles,
+        solutions: message.solutions.as_ref(),
+    })
+}
+
+/// What of a specification a result repeats as its messages.
+struct Settings {
+    objective: Objective,
+    search: Search,
+    solver: SolverSettings,
+    picking: Picking,
+}
+
+fn settings_from_message(message: &v1::JobResult) -> Result<Settings, Malformed> {
+    let missing = |field| Malformed::Missing { field };
+    let objective = message.objective.as_ref().ok_or(missing("objective"))?;
+    let search = message.search.as_ref().ok_or(missing("search"))?;
+    let solver = message.solver.as_ref().ok_or(missing("solver"))?;
+    let picking = message.picking.as_ref().ok_or(missing("picking"))?;
     let mut violations = Violations::new();
-    let solver = setup::solver_from_message(solver, &mut violations);
-    let picking = setup::picking_from_message(picking, &mut violations);
-    violations.into_result((solver, picking)).map_err(Malformed::InvalidSetup)
+    let settings = Settings {
+        objective: OBJECTIVE.required(objective.kind, "kind")?,
+        search: search_from_message(Some(search), &mut violations),
+        solver: setup::solver_from_message(solver, &mut violations),
+        picking: setup::picking_from_message(picking, &mut violations),
+    };
+    violations.into_result(settings).map_err(Malformed::InvalidSetup)
 }
 
-/// Sampling and scrambles; an older version, which had no choice, says nothing of them.
-fn sampling_from_message(message: &v1::JobResult) -> Result<(Sampling, u64), Malformed> {
-    let default = MonteCarlo::default();
-    let sampling = match message.sampling.as_str() {
-        "" => default.sampling,
-        name => {
-            let named = Sampling::ALL.into_iter().find(|sampling| sampling.name() == name);
-            named.ok_or(Malformed::UnknownName { field: "sampling" })?
-        }
-    };
-    match message.scrambles {
-        0 => Ok((sampling, default.scrambles)),
-        scrambles @ 1..=SCRAMBLES_MAX => Ok((sampling, scrambles)),
-        scrambles => {
-            let (value, allowed) = (scrambles as f64, "it must be at most 1024");
-            Err(Malformed::OutOfRange { field: "scrambles", value, allowed })
-        }
+fn scrambles(scrambles: u64) -> Result<u64, Malformed> {
+    let allowed = "it must be 1 to 1024";
+    let refused = Malformed::OutOfRange { field: "scrambles", value: scrambles as f64, allowed };
+    (1..=SCRAMBLES_MAX).contains(&scrambles).then_some(scrambles).ok_or(refused)
+}
+
+fn nominal_to_message(nominal: NominalSampling) -> v1::NominalSampling {
+    let NominalSampling { band, period, pairs } = nominal;
+    v1::NominalSampling { band, period, pairs }
+}
+
+fn nominal_from_message(message: v1::NominalSampling) -> NominalSampling {
+    let v1::NominalSampling { band, period, pairs } = message;
+    NominalSampling { band, period, pairs }
+}
+
+fn data_to_message(data: &DataSummary) -> v1::DataSummary {
+    let interval =
+        |Interval { low, high }: Interval| v1::Interval { lower: Some(low), upper: Some(high) };
+    v1::DataSummary {
+        moments: Some(moments_to_message(&data.moments)),
+        count: data.count,
+        intervals: data.intervals.map(|found| v1::MomentIntervals {
+            mean: Some(interval(found.mean)),
+            coefficient_of_variation: Some(interval(found.coefficient_of_variation)),
+            level: found.level,
+        }),
     }
 }
 
-fn moments_to_message(moments: &Moments) -> v1::Moments {
+fn data_from_message(message: &v1::DataSummary) -> Result<DataSummary, Malformed> {
+    let moments = message.moments.as_ref().ok_or(Malformed::Missing { field: "moments" })?;
+    let interval = |message: Option<&v1::Interval>| {
+        interval_from_message(message).map(|[low, high]| Interval { low, high })
+    };
+    let intervals = |found: &v1::MomentIntervals| {
+        Ok(MomentIntervals {
+            mean: interval(found.mean.as_ref())?,
+            coefficient_of_variation: interval(found.coefficient_of_variation.as_ref())?,
+            level: found.level,
+        })
+    };
+    Ok(DataSummary {
+        moments: moments_from_message(moments),
+        count: message.count,
+        intervals: message.intervals.as_ref().map(intervals).transpose()?,
+    })
+}
+
+pub(crate) fn moments_to_message(moments: &Moments) -> v1::Moments {
     v1::Moments { mean: moments.mean, coefficient_of_variation: moments.coefficient_of_variation }
 }
 
-fn moments_from_message(message: &v1::Moments) -> Moments {
+pub(crate) fn moments_from_message(message: &v1::Moments) -> Moments {
     Moments { mean: message.mean, coefficient_of_variation: message.coefficient_of_variation }
 }
 
@@ -320,19 +367,19 @@ fn errors_from_message(message: v1::EstimatedError) -> Result<EstimatedError, Ma
 }
 
 fn failures_to_message(failures: &FailureCounts) -> Vec<v1::FailureCount> {
-    let count =
-        |(kind, count): (FailureKind, u64)| v1::FailureCount { code: kind.code().into(), count };
+    let count = |(kind, count): (FailureKind, u64)| v1::FailureCount {
+        kind: FAILURE_KIND.number(kind),
+        count,
+    };
     failures.iter().map(count).collect()
 }
 
 fn failures_from_message(messages: &[v1::FailureCount]) -> Result<FailureCounts, Malformed> {
     let mut failures = FailureCounts::default();
     for message in messages {
-        let kind = FailureKind::ALL.into_iter().find(|kind| u32::from(kind.code()) == message.code);
-        let unknown = Malformed::UnknownValue { field: "code", value: message.code.into() };
-        let kind = kind.ok_or(unknown)?;
+        let kind = FAILURE_KIND.required(message.kind, "kind")?;
         if failures.get(kind) != 0 {
-            return Err(Malformed::UnknownValue { field: "code", value: message.code.into() });
+            return Err(Malformed::UnknownValue { field: "kind", value: message.kind.into() });
         }
         if message.count > REALIZATIONS_MAX {
             let (value, allowed) =

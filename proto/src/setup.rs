@@ -7,9 +7,10 @@ use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_common::settings::{Method, Picking, SolverSettings};
 use osteon_common::violations::Violations;
 
+use crate::choice::{EXTREMUM, SOLVER_METHOD};
 use crate::v1;
 
 /// The four messages that stand for a [`Setup`].
@@ -35,7 +36,7 @@ pub fn to_messages(setup: &Setup) -> SetupMessages {
     }
 }
 
-/// The setup of four optional messages. Names that are not known are added to `violations`;
+/// The setup of four optional messages. Choices that are not known are added to `violations`;
 /// numbers are not looked at.
 pub fn from_messages(
     layers: Option<&v1::Layers>,
@@ -56,17 +57,14 @@ pub fn from_messages(
 
 /// Picking as a complete message.
 pub fn picking_to_message(picking: &Picking) -> v1::Picking {
-    v1::Picking {
-        extremum: Some(picking.extremum.name().to_owned()),
-        threshold: Some(picking.threshold),
-    }
+    v1::Picking { extremum: EXTREMUM.number(picking.extremum), threshold: Some(picking.threshold) }
 }
 
 /// Solver settings as a complete message.
 pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
     let hybrid = solver.method == Method::Hybrid;
     v1::SolverSettings {
-        method: Some(solver.method.name().to_owned()),
+        method: SOLVER_METHOD.number(solver.method),
         refinement: Some(solver.refinement),
         element_size: hybrid.then_some(solver.element_size),
         element_order: hybrid.then_some(solver.element_order),
@@ -74,13 +72,13 @@ pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
     }
 }
 
-/// Picking of a message; a name that is not known is added to `violations`.
+/// Picking of a message; an extremum that is not known is added to `violations`.
 pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) -> Picking {
     let default = Picking::default();
     Picking {
-        extremum: named(
-            message.extremum.as_deref(),
-            &Extremum::ALL.map(|extremum| (extremum.name(), extremum)),
+        extremum: EXTREMUM.or_default(
+            message.extremum,
+            default.extremum,
             "picking.extremum",
             violations,
         ),
@@ -88,19 +86,15 @@ pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) 
     }
 }
 
-/// Solver settings of a message; a name that is not known, and a field that the method does not
+/// Solver settings of a message; a method that is not known, and a field that the method does not
 /// have, are added to `violations`.
 pub fn solver_from_message(
     message: &v1::SolverSettings,
     violations: &mut Violations,
 ) -> SolverSettings {
     let default = SolverSettings::default();
-    let method = named(
-        message.method.as_deref(),
-        &Method::ALL.map(|method| (method.name(), method)),
-        "solver.method",
-        violations,
-    );
+    let method =
+        SOLVER_METHOD.or_default(message.method, default.method, "solver.method", violations);
     let given = [
         message.element_size.is_some(),
         message.element_order.is_some(),
@@ -125,26 +119,6 @@ pub fn solver_from_message(
         time_step: message.time_step,
     }
 }
-
-/// The value that `name` stands for; the default if it is absent, or unknown and so recorded.
-pub(crate) fn named<T: Copy + Default>(
-    name: Option<&str>,
-    known: &[(&str, T)],
-    field: &str,
-    violations: &mut Violations,
-) -> T {
-    let Some(name) = name else { return T::default() };
-    if let Some(&(_, value)) = known.iter().find(|&&(known, _)| known == name) {
-        return value;
-    }
-    let allowed: Vec<String> = known.iter().map(|(known, _)| format!("\"{known}\"")).collect();
-    let shown: String = name.chars().take(SHOWN_CHARACTERS_MAX).collect();
-    violations.add(field, format!("is {shown:?}; it must be {}", allowed.join(" or ")));
-    T::default()
-}
-
-/// Most characters of a client's string that a message repeats.
-const SHOWN_CHARACTERS_MAX: usize = 64;
 
 fn layers_to_message(layers: &Layers) -> v1::Layers {
     let fluid = |fluid: &Fluid| v1::Fluid {

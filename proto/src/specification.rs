@@ -2,12 +2,13 @@
 
 use osteon_common::check;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Search,
     SearchMethod,
 };
 use osteon_common::parameters::Parameter;
-use osteon_common::violations::Violations;
+use osteon_common::violations::{Violation, Violations};
 
+use crate::choice::{JOB_KIND, OBJECTIVE, PARAMETER, SAMPLING, SEARCH_METHOD};
 use crate::setup;
 use crate::v1;
 
@@ -15,7 +16,7 @@ use crate::v1;
 pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
     let messages = setup::to_messages(&specification.setup);
     v1::JobSpecification {
-        kind: kind_to_message(specification.kind).into(),
+        kind: JOB_KIND.number(specification.kind),
         layers: Some(messages.layers),
         probe: Some(messages.probe),
         picking: Some(messages.picking),
@@ -23,7 +24,7 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         data: specification.data.as_ref().map(data_to_message),
         parameters: Some(parameters_to_message(&specification.parameters)),
         monte_carlo: Some(monte_carlo_to_message(&specification.monte_carlo)),
-        objective: Some(v1::Objective { kind: Some(specification.objective.name().to_owned()) }),
+        objective: Some(v1::Objective { kind: OBJECTIVE.number(specification.objective) }),
         search: Some(search_to_message(&specification.search)),
     }
 }
@@ -31,33 +32,35 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
 /// The specification of a message, defaults filled in and every rule checked.
 ///
 /// # Errors
-/// Every violation, by the field's path in the job file.
+/// Every violation, by the field's path in the message.
 pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, Violations> {
     let mut violations = Violations::new();
     let specification = read(message, &mut violations);
     check::job(&specification, &mut violations);
-    violations.into_result(specification)
+    as_of_message(&violations).into_result(specification)
 }
 
-/// What `kind` stands for in messages.
-pub fn kind_to_message(kind: JobKind) -> v1::JobKind {
-    match kind {
-        JobKind::Identification => v1::JobKind::Identification,
-        JobKind::Propagation => v1::JobKind::Propagation,
+/// The same violations by paths of the message, where they differ from those of a job file.
+fn as_of_message(violations: &Violations) -> Violations {
+    let mut renamed = Violations::new();
+    for Violation { field, message } in violations.iter() {
+        let of_range = field.strip_prefix("parameters.").and_then(|rest| rest.split_once('.'));
+        let field = match of_range {
+            Some((name, "start")) => format!("parameters.{name}.free.start"),
+            Some((name, "bounds")) => format!("parameters.{name}.free"),
+            _ => field.clone(),
+        };
+        renamed.add(field, message);
     }
+    renamed
 }
 
 /// Reads all fields; one that cannot be read is recorded and replaced by a default.
 fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpecification {
-    let kind = match message.kind() {
-        v1::JobKind::Identification => JobKind::Identification,
-        v1::JobKind::Propagation => JobKind::Propagation,
-        v1::JobKind::Unspecified => {
-            violations
-                .add("kind", "is missing or unknown; it must be identification or propagation");
-            JobKind::Identification
-        }
-    };
+    let kind = JOB_KIND.value(message.kind).unwrap_or_else(|| {
+        violations.add("kind", JOB_KIND.refusal(message.kind));
+        JobKind::Identification
+    });
     JobSpecification {
         kind,
         setup: setup::from_messages(
@@ -70,9 +73,9 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
         parameters: parameters_from_message(message.parameters.as_ref(), violations),
         monte_carlo: monte_carlo_from_message(message.monte_carlo.as_ref(), violations),
-        objective: setup::named(
-            message.objective.as_ref().and_then(|objective| objective.kind.as_deref()),
-            &Objective::ALL.map(|objective| (objective.name(), objective)),
+        objective: OBJECTIVE.or_default(
+            message.objective.map_or(0, |objective| objective.kind),
+            Objective::default(),
             "objective.kind",
             violations,
         ),
@@ -170,7 +173,7 @@ fn parameters_from_message(
             None => {
                 violations.add(
                     format!("parameters.{}", parameter.name()),
-                    "is missing; give `fixed`, or `start` and `bounds`",
+                    "is missing; give `fixed`, or `free` with `start`, `lower` and `upper`",
                 );
                 Range::Fixed(f64::NAN)
             }
@@ -197,7 +200,7 @@ fn monte_carlo_to_message(monte_carlo: &MonteCarlo) -> v1::MonteCarlo {
     v1::MonteCarlo {
         realizations: Some(monte_carlo.realizations),
         seed: Some(monte_carlo.seed),
-        sampling: Some(monte_carlo.sampling.name().to_owned()),
+        sampling: SAMPLING.number(monte_carlo.sampling),
         max_failed_fraction: Some(monte_carlo.max_failed_fraction),
         scrambles: Some(monte_carlo.scrambles),
         control_variate: Some(monte_carlo.control_variate),
@@ -213,9 +216,9 @@ fn monte_carlo_from_message(
     MonteCarlo {
         realizations: message.realizations.unwrap_or(default.realizations),
         seed: message.seed.unwrap_or(default.seed),
-        sampling: setup::named(
-            message.sampling.as_deref(),
-            &Sampling::ALL.map(|sampling| (sampling.name(), sampling)),
+        sampling: SAMPLING.or_default(
+            message.sampling,
+            default.sampling,
             "monte_carlo.sampling",
             violations,
         ),
@@ -225,9 +228,10 @@ fn monte_carlo_from_message(
     }
 }
 
-fn search_to_message(search: &Search) -> v1::Search {
+/// The complete message of a search.
+pub(crate) fn search_to_message(search: &Search) -> v1::Search {
     v1::Search {
-        method: Some(search.method.name().to_owned()),
+        method: SEARCH_METHOD.number(search.method),
         max_evaluations: Some(search.max_evaluations),
         cost_tolerance: Some(search.cost_tolerance),
         size_tolerance: Some(search.size_tolerance),
@@ -239,12 +243,16 @@ fn search_to_message(search: &Search) -> v1::Search {
     }
 }
 
-fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations) -> Search {
+/// The search of a message, defaults filled in.
+pub(crate) fn search_from_message(
+    message: Option<&v1::Search>,
+    violations: &mut Violations,
+) -> Search {
     let nothing = v1::Search::default();
     let message = message.unwrap_or(&nothing);
-    let method = setup::named(
-        message.method.as_deref(),
-        &SearchMethod::ALL.map(|method| (method.name(), method)),
+    let method = SEARCH_METHOD.or_default(
+        message.method,
+        SearchMethod::default(),
         "search.method",
         violations,
     );
@@ -256,8 +264,7 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
         size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
         initial_step: message.initial_step.unwrap_or(default.initial_step),
         starts: message.starts.unwrap_or(default.starts),
-        // An older client knows none, and would take their evaluations for the search's.
-        sensitivities: message.sensitivities.unwrap_or(false),
+        sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
         speculation: message.speculation.unwrap_or(default.speculation),
         priors: priors_from_message(&message.priors, violations),
     }
@@ -266,29 +273,24 @@ fn search_from_message(message: Option<&v1::Search>, violations: &mut Violations
 fn priors_to_message(priors: &[Option<Prior>; 7]) -> Vec<v1::Prior> {
     let message = |(parameter, prior): (&Parameter, &Option<Prior>)| {
         let Prior { value, weight } = (*prior)?;
-        Some(v1::Prior { parameter: parameter.name().to_owned(), value, weight })
+        Some(v1::Prior { parameter: PARAMETER.number(*parameter), value, weight })
     };
     Parameter::ALL.iter().zip(priors).filter_map(message).collect()
 }
 
 fn priors_from_message(messages: &[v1::Prior], violations: &mut Violations) -> [Option<Prior>; 7] {
     let mut priors = [None; 7];
-    for v1::Prior { parameter, value, weight } in messages {
-        let known = Parameter::ALL.into_iter().find(|known| known.name() == parameter);
-        match known.map(|known| &mut priors[known as usize]) {
-            Some(slot @ None) => *slot = Some(Prior { value: *value, weight: *weight }),
-            Some(Some(_)) => {
-                let known = parameter.as_str();
-                violations.add(format!("search.priors.{known}"), "is given twice");
-            }
-            None => {
-                let names = Parameter::ALL.map(Parameter::name).join(", ");
-                violations.add(
-                    "search.priors",
-                    format!("has one for an unknown parameter; it must be one of {names}"),
-                );
-                // One is enough to read.
-                return priors;
+    for &v1::Prior { parameter, value, weight } in messages {
+        let Some(known) = PARAMETER.value(parameter) else {
+            violations
+                .add("search.priors", format!("`parameter` {}", PARAMETER.refusal(parameter)));
+            // One is enough to read.
+            return priors;
+        };
+        match &mut priors[known as usize] {
+            slot @ None => *slot = Some(Prior { value, weight }),
+            Some(_) => {
+                violations.add(format!("search.priors.{}", known.name()), "is given twice");
             }
         }
     }

@@ -100,7 +100,7 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
-                Failure::failed(anyhow!("{reason}"))
+                Failure::failed(anyhow!("{reason}; wait for it with `osteon watch {job}`"))
             }
             _ => Failure::from(error),
         })?;

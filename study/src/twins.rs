@@ -1,7 +1,7 @@
 //! Whether an identification finds again what made its data, and how often within its intervals.
 
 use osteon_common::case::Setup;
-use osteon_common::inference::{Inference, Known as HowWell, Quantity, inference};
+use osteon_common::inference::{Inference, Known as HowWell, Quantity};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
@@ -215,8 +215,7 @@ fn found(
     known: &mut Known,
     isa: Isa,
 ) -> Result<Option<Inference>, PointError> {
-    let (result, history) = identify(specification, known, isa)?;
-    Ok(result.best.and_then(|best| inference(specification, 0, &best, &history)))
+    Ok(identify(specification, known, isa)?.0.conclusions.inference)
 }
 
 fn of(found: &Inference, parameter: Parameter) -> Option<Quantity> {

@@ -3,7 +3,7 @@
 #[cfg(doc)]
 use crate::data_statistics::CONFIDENCE;
 use crate::job::Data;
-use crate::results::Estimate;
+use crate::results::{Estimate, Moments};
 use crate::statistics;
 
 /// Quantile of the standard normal law at (1 + [`CONFIDENCE`]) / 2.
@@ -17,6 +17,15 @@ pub struct Noise {
     pub data: Option<([[f64; 2]; 2], usize)>,
     /// Of the model's: by sampling, on the diagonal.
     pub model: [f64; 2],
+}
+
+/// Relative standard errors of both moments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseErrors {
+    /// By the noise of the data; `None` where only their moments are known.
+    pub data: Option<Moments>,
+    /// By sampling.
+    pub sampling: Moments,
 }
 
 /// The noise of set number `set` of the data, and of a model's estimate.
@@ -37,6 +46,16 @@ impl Noise {
             sum[axis][axis] += variance;
         }
         sum
+    }
+
+    /// The standard errors.
+    pub fn errors(&self) -> NoiseErrors {
+        let errors = |variances: [f64; 2]| {
+            let [mean, coefficient_of_variation] = variances.map(f64::sqrt);
+            Moments { mean, coefficient_of_variation }
+        };
+        let data = self.data.map(|([[mean, _], [_, variation]], _)| errors([mean, variation]));
+        NoiseErrors { data, sampling: errors(self.model) }
     }
 
     /// How many standard errors an interval reaches to each side.

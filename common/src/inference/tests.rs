@@ -55,6 +55,9 @@ fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
 fn best(cost: f64, standard_error: Moments) -> BestPoint {
     BestPoint {
         point: OPTIMUM,
+        meaning: None,
+        penalty: None,
+        below_noise_from: None,
         cost: Some(cost),
         velocity: Some(Estimate { moments: model(&OPTIMUM), standard_error, controlled: false }),
         cost_error: None,
@@ -157,8 +160,9 @@ fn noise_of_the_data_counts() {
     let free = [Parameter::Density, Parameter::Dispersion];
     let found = found(&specification(&free, Some(velocities)), [0.0; 2]);
     let expected = coefficient_of_variation / 99.0_f64.sqrt();
-    close(found.noise.covariance()[0][0].sqrt(), expected, 1e-12);
-    close(found.noise.covariance()[1][1].sqrt(), expected, 1e-12);
+    let noise = found.noise.data.unwrap();
+    close(noise.mean, expected, 1e-12);
+    close(noise.coefficient_of_variation, expected, 1e-12);
     close(
         found.bulk_velocity.known.unwrap().standard_error / found.bulk_velocity.value,
         expected,

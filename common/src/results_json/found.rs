@@ -4,27 +4,21 @@ use serde_json::{Map, Value, json};
 
 use super::{failures, measured, moments};
 use crate::inference::{
-    self, CONFIDENCE, Direction, Inference, Noise, Profile, Quantity, Sensitivity, Solution,
-    Spread, Spreads,
+    Conclusions, Direction, Inference, NoiseErrors, Profile, Quantity, Sensitivity, Solution,
+    Solutions, Spread, Spreads,
 };
-use crate::job::{JobSpecification, Objective, Prior, Search, SearchMethod};
+use crate::job::{Objective, Prior, Search, SearchMethod};
 use crate::parameters::{Parameter, Point};
-use crate::results::{BestPoint, Evaluation, GroupResult, Moments};
-
-/// What was asked, and every evaluation that was made for it.
-pub(super) struct Asked<'a> {
-    pub(super) specification: &'a JobSpecification,
-    pub(super) history: &'a [Evaluation],
-}
+use crate::results::{BestPoint, GroupResult, JobResult, Moments};
 
 /// The best point: cost, parameters, dispersion, moments.
 pub(super) fn point(
     put: &mut impl FnMut(&str, Value) -> Option<Value>,
-    specification: &JobSpecification,
+    objective: Objective,
     best: Option<&BestPoint>,
 ) {
     put("cost", json!(best.and_then(|best| best.cost)));
-    if specification.objective == Objective::Likelihood {
+    if objective == Objective::Likelihood {
         put("cost_standard_error", json!(best.and_then(|best| best.cost_error)));
     }
     model(put, best);
@@ -39,7 +33,7 @@ pub(super) fn model(put: &mut impl FnMut(&str, Value) -> Option<Value>, best: Op
 }
 
 /// What was found for a group.
-pub(super) fn group(asked: &Asked<'_>, set: usize, group: &GroupResult) -> Value {
+pub(super) fn group(objective: Objective, group: &GroupResult) -> Value {
     let best = group.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
@@ -48,40 +42,38 @@ pub(super) fn group(asked: &Asked<'_>, set: usize, group: &GroupResult) -> Value
     if let Some(reason) = &group.reason {
         put("reason", json!(reason));
     }
-    point(&mut put, asked.specification, best);
-    let velocities = asked.specification.data.as_ref().and_then(|data| data.velocities(set));
-    let mut data = measured::data(Some(group.data), velocities, best);
-    data["count"] = json!(velocities.map(<[f64]>::len));
+    point(&mut put, objective, best);
+    let mut data = measured::data(&group.data, best);
+    data["count"] = json!(group.data.count);
     put("data", data);
     put("failures", failures(best.map(|best| best.failures)));
-    inference(&mut put, asked, set, best);
+    conclusions(&mut put, &group.conclusions);
     Value::Object(object)
 }
 
 /// How a search went, and what its best point is.
-pub(super) fn search(asked: &Asked<'_>, best: Option<&BestPoint>) -> Value {
-    let search = &asked.specification.search;
+pub(super) fn search(result: &JobResult) -> Value {
+    let (search, best) = (&result.search, result.best.as_ref());
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
     put("method", json!(search.method.name()));
     put("max_evaluations", json!(search.max_evaluations));
-    put("cost_tolerance", json!(tolerance(asked.specification)));
+    // A likelihood has none.
+    let by_moments = result.objective == Objective::Moments;
+    put("cost_tolerance", json!(by_moments.then_some(search.cost_tolerance)));
     put("size_tolerance", json!(search.size_tolerance));
     if search.method == SearchMethod::Simplex {
         put("initial_step", json!(search.initial_step));
     }
     put("starts", json!(search.starts));
     put("sensitivities", json!(search.sensitivities));
-    if asked.specification.has_priors() {
+    if search.priors.iter().any(Option::is_some) {
         put("priors", priors(search));
-        put("penalty", json!(best.map(|best| asked.specification.penalty(&best.point))));
+        put("penalty", json!(best.and_then(|best| best.penalty)));
     }
-    let cost = best.and_then(|best| best.cost);
-    put("point", json!(cost.map(|cost| meaning(asked.specification, cost))));
-    let by_moments = asked.specification.objective == Objective::Moments;
-    let below = best.filter(|_| by_moments && !asked.specification.has_priors());
-    let below = below.and_then(|best| inference::first_below_noise(0, best, asked.history));
-    put("below_noise_from", json!(below));
+    let meaning = best.and_then(|best| best.meaning);
+    put("point", json!(meaning.map(|meaning| meaning.words())));
+    put("below_noise_from", json!(best.and_then(|best| best.below_noise_from)));
     Value::Object(object)
 }
 
@@ -93,48 +85,19 @@ fn priors(search: &Search) -> Value {
     Value::Object(Parameter::ALL.iter().zip(&search.priors).filter_map(of).collect())
 }
 
-/// The cost that is low enough; a likelihood has none.
-fn tolerance(specification: &JobSpecification) -> Option<f64> {
-    let by_moments = specification.objective == Objective::Moments;
-    by_moments.then_some(specification.search.cost_tolerance)
-}
-
 /// What the data say: derivatives, what is identified, what is not.
-pub(super) fn inference(
+pub(super) fn conclusions(
     put: &mut impl FnMut(&str, Value) -> Option<Value>,
-    asked: &Asked<'_>,
-    set: usize,
-    best: Option<&BestPoint>,
+    conclusions: &Conclusions,
 ) {
-    let specification = asked.specification;
-    let found = best.and_then(|best| inference::inference(specification, set, best, asked.history));
-    put("sensitivities", found.as_ref().map_or(Value::Null, sensitivities));
-    put("identified", found.as_ref().map_or(Value::Null, identified));
-    // Those of a likelihood, or with priors, would be another matter.
-    if let (Some(best), Some(data), Objective::Moments) =
-        (best, &specification.data, specification.objective)
-        && let Some(velocity) = best.velocity
-        && !specification.has_priors()
-    {
-        let data = data.moments(set);
-        let profiles = inference::profiles(specification, &best.point, velocity.moments, data);
+    let Conclusions { inference, profiles, solutions } = conclusions;
+    put("sensitivities", inference.as_ref().map_or(Value::Null, sensitivities));
+    put("identified", inference.as_ref().map_or(Value::Null, identified));
+    if !profiles.is_empty() {
         put("profiles", profiles.iter().map(profile).collect::<Map<_, _>>().into());
     }
-    if specification.search.starts > 1 {
-        put("solutions", solutions(asked, set, best));
-    }
-}
-
-/// What the best point of a search is, by its cost.
-fn meaning(specification: &JobSpecification, cost: f64) -> &'static str {
-    match specification.search.method {
-        _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
-            "of the points evaluated, the one with the least cost"
-        }
-        SearchMethod::Simplex => {
-            "of the points that match the data, the one where the simplex ended"
-        }
-        SearchMethod::Newton => "of the points that match the data, the one nearest to the start",
+    if let Some(solutions) = solutions {
+        put("solutions", all_solutions(solutions));
     }
 }
 
@@ -171,7 +134,7 @@ fn identified(found: &Inference) -> Value {
     });
     json!({
         "matched": found.matched,
-        "level": CONFIDENCE,
+        "level": found.level,
         "noise": noise(&found.noise),
         "bulk_velocity": quantity(&found.bulk_velocity),
         "dispersion": quantity(&found.dispersion),
@@ -181,14 +144,9 @@ fn identified(found: &Inference) -> Value {
     })
 }
 
-/// Standard errors of both moments, relative.
-fn noise(noise: &Noise) -> Value {
-    let errors = |variances: [f64; 2]| {
-        let [mean, coefficient_of_variation] = variances.map(f64::sqrt);
-        moments(Some(Moments { mean, coefficient_of_variation }))
-    };
-    let data = noise.data.map(|([[mean, _], [_, variation]], _)| errors([mean, variation]));
-    json!({ "data": data, "sampling": errors(noise.model) })
+fn noise(noise: &NoiseErrors) -> Value {
+    let data = noise.data.map(|data| moments(Some(data)));
+    json!({ "data": data, "sampling": moments(Some(noise.sampling)) })
 }
 
 fn quantity(quantity: &Quantity) -> Value {
@@ -207,12 +165,8 @@ fn profile(profile: &Profile) -> (String, Value) {
 }
 
 /// The answers from all starts, and how far apart those are that match the data.
-fn solutions(asked: &Asked<'_>, set: usize, best: Option<&BestPoint>) -> Value {
-    let solutions = inference::solutions(set, asked.history);
-    let cost = best.and_then(|best| best.cost).unwrap_or(f64::INFINITY);
-    let most = tolerance(asked.specification).map_or(cost, |tolerance| tolerance.max(cost));
-    let matching: Vec<Point> =
-        solutions.iter().filter(|one| one.cost <= most).map(|one| one.point).collect();
+fn all_solutions(solutions: &Solutions) -> Value {
+    let Solutions { points, matching, spread } = solutions;
     let point = |one: &Solution| {
         json!({
             "start": one.start,
@@ -222,8 +176,8 @@ fn solutions(asked: &Asked<'_>, set: usize, best: Option<&BestPoint>) -> Value {
             "dispersion": one.point.dispersion(),
         })
     };
-    let spread = inference::spread(&matching).map(|Spreads { parameters, entries }| {
-        let parameters = Parameter::ALL.iter().zip(&parameters);
+    let spread = spread.as_ref().map(|Spreads { parameters, entries }| {
+        let parameters = Parameter::ALL.iter().zip(parameters);
         let parameters = parameters.map(|(name, over)| (name.name().to_owned(), range(over)));
         let entries =
             entries.iter().map(|(i, j, over)| (format!("{}{}", i + 1, j + 1), range(over)));
@@ -233,9 +187,9 @@ fn solutions(asked: &Asked<'_>, set: usize, best: Option<&BestPoint>) -> Value {
         })
     });
     json!({
-        "matching": matching.len(),
+        "matching": matching,
         "spread": spread,
-        "points": solutions.iter().map(point).collect::<Vec<_>>(),
+        "points": points.iter().map(point).collect::<Vec<_>>(),
     })
 }
 

@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use super::{estimate, moments};
-use crate::data_statistics::{CONFIDENCE, Interval, moment_intervals};
-use crate::results::{BestPoint, Moments};
+use crate::data_statistics::{Interval, MomentIntervals};
+use crate::results::{BestPoint, DataSummary};
 
 /// Moments at the best point, and what failures may have done to them.
 pub(super) fn model(best: Option<&BestPoint>) -> Value {
@@ -15,14 +15,10 @@ pub(super) fn model(best: Option<&BestPoint>) -> Value {
 
 /// Moments of the data, and where velocities were measured what they say of themselves and of the
 /// model at its best point.
-pub(super) fn data(
-    of_data: Option<Moments>,
-    velocities: Option<&[f64]>,
-    best: Option<&BestPoint>,
-) -> Value {
-    let mut value = moments(of_data);
-    if let Some(velocities) = velocities {
-        value["interval"] = interval(velocities);
+pub(super) fn data(data: &DataSummary, best: Option<&BestPoint>) -> Value {
+    let mut value = moments(Some(data.moments));
+    if data.count.is_some() {
+        value["interval"] = json!(data.intervals.map(intervals));
         let test = best.and_then(|best| best.kolmogorov);
         let test = test.map(|test| json!({"distance": test.distance, "p_value": test.p_value}));
         value["kolmogorov"] = json!(test);
@@ -30,14 +26,11 @@ pub(super) fn data(
     value
 }
 
-fn interval(velocities: &[f64]) -> Value {
+fn intervals(found: MomentIntervals) -> Value {
     let ends = |interval: Interval| json!([interval.low, interval.high]);
-    let found = moment_intervals(velocities).map(|found| {
-        json!({
-            "mean": ends(found.mean),
-            "coefficient_of_variation": ends(found.coefficient_of_variation),
-            "level": CONFIDENCE,
-        })
-    });
-    json!(found)
+    json!({
+        "mean": ends(found.mean),
+        "coefficient_of_variation": ends(found.coefficient_of_variation),
+        "level": found.level,
+    })
 }

@@ -178,7 +178,11 @@ pub(super) fn fail(
     now: Duration,
     effects: &mut Effects,
 ) {
-    let ending = Ending { status: Status::Failed, reason: Some(failure.to_string()) };
+    let ending = Ending {
+        status: Status::Failed,
+        failure: Some(failure.kind()),
+        reason: Some(failure.to_string()),
+    };
     finish(state, id, ending, now, effects);
 }
 
@@ -352,7 +356,7 @@ fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
 
 /// The end of a job whose client does not want it any more.
 pub(super) fn cancelled() -> Ending {
-    Ending { status: Status::Cancelled, reason: None }
+    Ending { status: Status::Cancelled, failure: None, reason: None }
 }
 
 impl Job {

@@ -92,11 +92,9 @@ impl Identification {
                     .partition(|(group, _)| group.no_variation().is_some());
                 together(&searched, &unsearched)
             }
-            (_, [GroupEnding { status, reason, .. }]) => {
-                Ending { status: *status, reason: reason.clone() }
-            }
+            (_, [GroupEnding { status, reason, .. }]) => Ending::of_search(*status, reason.clone()),
             // Only what has ended is asked how it did.
-            _ => Ending { status: Status::Cancelled, reason: None },
+            _ => Ending::of_search(Status::Cancelled, None),
         }
     }
 
@@ -130,7 +128,7 @@ fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEndi
             let reason = format!(
                 "the searches for {count} of {all} groups {what}; the first is {name:?}{why}"
             );
-            return Ending { status, reason: Some(reason) };
+            return Ending::of_search(status, Some(reason));
         }
     }
     let reason = unsearched.first().map(|(Group { name, .. }, first)| {
@@ -138,5 +136,5 @@ fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEndi
         let why = first.reason.as_deref().unwrap_or_default();
         format!("no search was made for {count} of {all} groups; the first is {name:?}: {why}")
     });
-    Ending { status: Status::Converged, reason }
+    Ending::of_search(Status::Converged, reason)
 }

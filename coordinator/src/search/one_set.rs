@@ -220,7 +220,7 @@ impl OneSet {
         };
         // It was noted before the end.
         let stop = self.stop.unwrap_or(Stop::Settled);
-        let super::Ending { status, reason } = reasons::ending(stop, &evidence, specification);
+        let super::Ending { status, reason, .. } = reasons::ending(stop, &evidence, specification);
         let best = self.best().map(|row| row.number);
         self.ending = Some(GroupEnding { status, reason, best });
     }

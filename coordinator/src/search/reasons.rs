@@ -40,7 +40,7 @@ pub(super) fn ending(
         }
         Stop::Infeasible => (Status::Failed, Some(no_feasible_point(evidence, specification))),
     };
-    Ending { status, reason }
+    Ending::of_search(status, reason)
 }
 
 /// Which realizations of an evaluation failed.

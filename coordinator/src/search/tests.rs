@@ -63,7 +63,7 @@ fn ending(search: &Search) -> Ending {
 fn an_identification_finds_what_made_the_data() {
     let (search, _) = run(&specification(400));
     let ending = ending(&search);
-    assert_eq!(ending, Ending { status: Status::Converged, reason: None });
+    assert_eq!(ending, Ending::of_search(Status::Converged, None));
     let result = search.result(&ending, &Program::this(None));
     let best = result.best.unwrap();
     assert!(best.cost.unwrap() <= 1e-10);
@@ -84,7 +84,7 @@ fn by_newton(max_evaluations: u64) -> JobSpecification {
 fn newton_finds_what_made_the_data() {
     let (search, _) = run(&by_newton(400));
     let ending = ending(&search);
-    assert_eq!(ending, Ending { status: Status::Converged, reason: None });
+    assert_eq!(ending, Ending::of_search(Status::Converged, None));
     let best = search.best().unwrap();
     assert!(best.cost.unwrap() <= 1e-12);
     assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-5, "{best:?}");
@@ -97,7 +97,7 @@ fn newton_says_why_it_settled_above_its_tolerance() {
     let mut job = by_newton(400);
     job.data = Some(Data::Moments { mean: 2000.0, coefficient_of_variation: 0.03 });
     let (search, _) = run(&job);
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     let reason = reason.unwrap();
     assert_eq!(status, Status::Converged);
     assert!(reason.contains("settled at a cost of 1.037e-1"), "{reason}");
@@ -127,7 +127,7 @@ fn velocities_that_are_all_the_same_are_no_use_to_newton() {
     while let Step::Evaluate(_) = search.ask() {
         search.tell([Ok(3900.0); 4].into(), ERRORS);
     }
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("raise [monte_carlo] realizations"));
 }
@@ -212,7 +212,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     while let Step::Evaluate(_) = search.ask() {
         search.tell(failed.clone().into(), ERRORS);
     }
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     let reason = reason.unwrap();
     assert_eq!(status, Status::Failed);
     assert!(reason.contains("among the 3 evaluated"), "{reason}");
@@ -259,7 +259,7 @@ fn a_propagation_is_one_evaluation_at_the_start() {
 
     let mut search = Search::new(Arc::new(propagation));
     search.tell([Err(FailureKind::NotFinite); 4].into(), ERRORS);
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("4 of 4 realizations failed (4 not_finite)"));
     assert_eq!(search.best().unwrap().moments, None);
@@ -286,7 +286,7 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     let mut job = specification(60);
     job.parameters[0] = Range::Fixed(-1.0);
     let search = Search::new(Arc::new(job));
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("inadmissible"));
     assert!(search.result(&ending(&search), &Program::this(None)).best.is_none());

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::results::{Moments, Status};
+use osteon_common::results::{JobFailure, Moments, Status};
 use osteon_common::version::Program;
 use osteon_proto::{specification, v1};
 use prost::Message as _;
@@ -118,22 +118,32 @@ impl SqliteStore {
 
     fn end(&self, job: JobId) -> Result<Option<EndRecord>, StoreError> {
         let sql = "SELECT status, reason, version, ended_ns, evaluations, best_cost, best_mean,
-                   best_coefficient_of_variation, checksum, numerics, commit_id FROM ending WHERE job = ?1";
+                   best_coefficient_of_variation, checksum, failure, numerics, commit_id
+                   FROM ending WHERE job = ?1";
         let read = |row: &Row<'_>| {
             let status: String = row.get(0)?;
             let status = Status::ALL.into_iter().find(|known| known.name() == status);
             let (mean, variation): (Option<f64>, Option<f64>) = (row.get(6)?, row.get(7)?);
             let (reason, checksum): (_, Vec<u8>) = (row.get(1)?, row.get(8)?);
-            let Some(status) = status else {
+            let failure: Option<String> = row.get(9)?;
+            let known =
+                |name: &String| JobFailure::ALL.into_iter().find(|known| known.name() == name);
+            let (Some(status), failed) = (status, failure.as_ref().and_then(known)) else {
                 return Ok(None);
             };
+            // A failure has a kind, and nothing else has one.
+            if failed.is_some() != failure.is_some()
+                || failed.is_some() != (status == Status::Failed)
+            {
+                return Ok(None);
+            }
             let end = EndRecord {
                 job,
-                ending: Ending { status, reason },
+                ending: Ending { status, failure: failed, reason },
                 program: Program {
                     version: row.get(2)?,
-                    numerics: row.get(9)?,
-                    commit: row.get(10)?,
+                    numerics: row.get(10)?,
+                    commit: row.get(11)?,
                 },
                 ended: Duration::from_nanos(row.get(3)?),
                 evaluations: row.get(4)?,
@@ -155,23 +165,14 @@ impl SqliteStore {
 
     /// Gives the room of what was removed back to the disk. What fails here loses nothing.
     fn give_back(&self) -> rusqlite::Result<()> {
-        let mode: i64 =
-            self.connection.pragma_query_value(None, "auto_vacuum", |row| row.get(0))?;
-        if mode == AUTO_VACUUM_INCREMENTAL {
+        {
             let mut vacuum = self.connection.prepare("PRAGMA incremental_vacuum")?;
             let mut rows = vacuum.query([])?;
             while rows.next()?.is_some() {}
-        } else {
-            // A file of an older version: written anew once, from then on it is as above.
-            self.connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
-            self.connection.execute_batch("VACUUM")?;
         }
         self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
     }
 }
-
-/// What `PRAGMA auto_vacuum` says of a file whose free pages can be given back one by one.
-const AUTO_VACUUM_INCREMENTAL: i64 = 2;
 
 impl Store for SqliteStore {
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
@@ -263,7 +264,7 @@ impl Store for SqliteStore {
         let errors = record.estimated_error.map(pack_errors);
         let (job, number, workers) = (record.job, record.number, pack_workers(&record.workers));
         let checksum =
-            evaluation_checksum(job, number, &point, &outcomes, errors.as_deref(), Some(&workers));
+            evaluation_checksum(job, number, &point, &outcomes, errors.as_deref(), &workers);
         let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
                    estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
         let values = params![job.0, number, point, outcomes, checksum, errors, workers];
@@ -280,9 +281,11 @@ impl Store for SqliteStore {
     }
 
     fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
-        let sql = "INSERT OR REPLACE INTO ending (job, status, reason, version, ended_ns, evaluations,
-                   best_cost, best_mean, best_coefficient_of_variation, checksum, numerics, commit_id)
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
+        let sql =
+            "INSERT OR REPLACE INTO ending (job, status, reason, version, ended_ns, evaluations,
+                   best_cost, best_mean, best_coefficient_of_variation, checksum, failure, numerics,
+                   commit_id)
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
         let values = params![
             record.job.0,
             record.ending.status.name(),
@@ -294,6 +297,7 @@ impl Store for SqliteStore {
             record.best_moments.map(|moments| moments.mean),
             record.best_moments.map(|moments| moments.coefficient_of_variation),
             end_checksum(record),
+            record.ending.failure.map(JobFailure::name),
             record.program.numerics,
             record.program.commit,
         ];
@@ -351,11 +355,13 @@ impl Store for SqliteStore {
 
     fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
         let ExpulsionRecord { number, worker, job, reason, at } = record;
-        let sql = "INSERT OR REPLACE INTO expulsion VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+        let sql =
+            "INSERT OR REPLACE INTO expulsion (number, host, process, instance, job, reason, at_ns,
+                   checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
-        let checksum = expulsion_checksum(record);
         let instance = worker.instance().cast_signed();
-        let values = params![number, host, process, job.0, reason, at, checksum, instance];
+        let checksum = expulsion_checksum(record);
+        let values = params![number, host, process, instance, job.0, reason, at, checksum];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
@@ -409,7 +415,11 @@ impl Store for SqliteStore {
 /// served. Nothing is written: a copy of the file may have it.
 fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
     tracing::error!(%error, "a job is shown as failed; the others are served");
-    let ending = Ending { status: Status::Failed, reason: Some(error.to_string()) };
+    let ending = Ending {
+        status: Status::Failed,
+        failure: Some(JobFailure::Store),
+        reason: Some(error.to_string()),
+    };
     let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
     EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }

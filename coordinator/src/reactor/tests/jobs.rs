@@ -147,7 +147,7 @@ fn a_cancelled_job_ends_when_its_end_is_durable() {
     rig.check(answer(1, 1, 0, 2), &[]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     rig.check(cancel(), &["answer 7: Ended Cancelled"]);
-    let refusal = "answer 7: there is no job 9; `osteon jobs` lists those there are";
+    let refusal = "answer 7: there is no job 9";
     rig.check(request(7, Request::Cancel(JobId(9))), &[refusal]);
 }
 

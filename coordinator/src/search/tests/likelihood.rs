@@ -48,7 +48,7 @@ fn a_likelihood_finds_what_made_the_data() {
         let moments = JobSpecification { objective: Objective::Moments, ..job.clone() };
         for (job, sums) in [(job, &mut found), (moments, &mut by_moments)] {
             let search = run_on_speeds(&job);
-            assert_eq!(ending(&search), Ending { status: Status::Converged, reason: None });
+            assert_eq!(ending(&search), Ending::of_search(Status::Converged, None));
             assert!(search.evaluations() < 250, "{}", search.evaluations());
             let best = search.best().unwrap().point;
             sums[0] += (best.0[1] / truth.0[1] - 1.0) / 30.0;
@@ -123,7 +123,7 @@ fn velocities_that_are_all_the_same_have_no_likelihood() {
     while let Step::Evaluate(_) = search.ask() {
         search.tell([Ok(3900.0); 4].into(), ERRORS);
     }
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("every velocity of the first point is the same"));
 }

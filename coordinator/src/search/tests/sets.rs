@@ -118,7 +118,7 @@ fn grouped(means: &[f64]) -> JobSpecification {
 fn each_group_is_identified_by_itself() {
     let means = [3800.0, 3900.0, 4000.0];
     let (search, told) = run(&grouped(&means));
-    assert_eq!(ending(&search), Ending { status: Status::Converged, reason: None });
+    assert_eq!(ending(&search), Ending::of_search(Status::Converged, None));
     let summary = search.summary();
     assert_eq!((summary.best, summary.groups.len()), (None, 3));
     for (k, (group, mean)) in summary.groups.iter().zip(means).enumerate() {
@@ -144,7 +144,7 @@ fn a_group_that_fails_leaves_the_others_what_they_have() {
     let mut few = grouped(&[3800.0, 3850.0]);
     few.search.max_evaluations = 2;
     let (search, _) = run(&few);
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::MaxEvaluations);
     let reason = reason.unwrap();
     assert!(reason.starts_with("the searches for 2 of 2 groups did not converge"), "{reason}");
@@ -175,7 +175,7 @@ fn several_starts_give_several_answers() {
 }
 
 /// Groups of which some have nothing to match.
-fn grouped(groups: &[(&str, &[f64])]) -> JobSpecification {
+fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
     let group = |(name, velocities): &(&str, &[f64])| Group {
         name: (*name).to_owned(),
         velocities: velocities.to_vec(),
@@ -187,7 +187,7 @@ fn grouped(groups: &[(&str, &[f64])]) -> JobSpecification {
 #[test]
 fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
     let (left, right): (&[f64], &[f64]) = (&[3850.0, 3900.0, 3990.0], &[3800.0, 3900.0, 3950.0]);
-    let whole = grouped(&[("left", left), ("right", right)]);
+    let whole = job_of(&[("left", left), ("right", right)]);
     let (known, _) = run(&whole);
     let known = known.result(&ending(&known), &Program::this(None));
     let one: &[f64] = &[3900.0];
@@ -200,7 +200,7 @@ fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
     ] {
         let mut groups = vec![("left", left), ("right", right)];
         groups.insert(place, ("lonely", unsearched));
-        let specification = grouped(&groups);
+        let specification = job_of(&groups);
         let (search, _) = run(&specification);
         let summary = search.summary();
         let found = search.result(&ending(&search), &Program::this(None));

@@ -25,7 +25,7 @@ pub(super) fn evaluation(
     let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
     let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
     let errors = row.get_ref(4)?.as_blob_or_null()?;
-    let workers = row.get_ref(5)?.as_str_or_null()?;
+    let workers = row.get_ref(5)?.as_str()?;
     let intact = checksum == evaluation_checksum(job, number, point, outcomes, errors, workers);
     let unpacked = || {
         let (point, outcomes) = unpack(point).zip(unpack_outcomes(outcomes))?;
@@ -33,7 +33,7 @@ pub(super) fn evaluation(
             Some(packed) => Some(unpack_errors(packed)?),
             None => None,
         };
-        let workers = unpack_workers(workers.unwrap_or_default())?;
+        let workers = unpack_workers(workers)?;
         Some(EvaluationRecord { job, number, point, outcomes, estimated_error, workers })
     };
     Ok((number, intact.then(unpacked).flatten()))
@@ -55,53 +55,44 @@ pub(super) struct JobColumns<'a> {
     pub(super) priority: u32,
 }
 
-/// Older formats had no client and no priority: without either there is no field.
 pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
-    let (job, accepted) = (columns.job.0.to_le_bytes(), columns.accepted_ns.to_le_bytes());
-    let priority = columns.priority.to_le_bytes();
-    let mut fields: Vec<&[u8]> = vec![
-        &job,
+    checksum(&[
+        &columns.job.0.to_le_bytes(),
         columns.request_id.as_bytes(),
-        &accepted,
+        &columns.accepted_ns.to_le_bytes(),
         columns.specification,
         columns.fingerprint.as_bytes(),
-    ];
-    if !columns.client.is_empty() || columns.priority > 0 {
-        fields.extend([columns.client.as_bytes(), &priority]);
-    }
-    checksum(&fields)
+        columns.client.as_bytes(),
+        &columns.priority.to_le_bytes(),
+    ])
 }
 
-/// Older formats had no instance: without one there is no field.
 pub(super) fn expulsion_checksum(record: &ExpulsionRecord) -> Vec<u8> {
     let ExpulsionRecord { number, worker, job, reason, at } = record;
-    let numbers = [*number, job.0, nanoseconds(*at), worker.process().into()];
+    let numbers = [*number, job.0, nanoseconds(*at), worker.process().into(), worker.instance()];
     let numbers = numbers.map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
     fields.extend([worker.host().as_bytes(), reason.as_bytes()]);
-    let instance = worker.instance().to_le_bytes();
-    if worker.instance() != 0 {
-        fields.push(&instance);
-    }
     checksum(&fields)
 }
 
-/// What is absent has no field.
+/// Errors that are absent are an empty field.
 pub(super) fn evaluation_checksum(
     job: JobId,
     number: u64,
     point: &[u8],
     outcomes: &[u8],
     errors: Option<&[u8]>,
-    workers: Option<&str>,
+    workers: &str,
 ) -> Vec<u8> {
-    let (job, number) = (job.0.to_le_bytes(), number.to_le_bytes());
-    let mut fields: Vec<&[u8]> = vec![&job, &number, point, outcomes];
-    match workers {
-        Some(workers) => fields.extend([errors.unwrap_or_default(), workers.as_bytes()]),
-        None => fields.extend(errors),
-    }
-    checksum(&fields)
+    checksum(&[
+        &job.0.to_le_bytes(),
+        &number.to_le_bytes(),
+        point,
+        outcomes,
+        errors.unwrap_or_default(),
+        workers.as_bytes(),
+    ])
 }
 
 pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
@@ -113,13 +104,15 @@ pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
         best_moments.map(|moments| moments.coefficient_of_variation),
     );
     let reason = ending.reason.as_ref().map(|reason| reason.as_bytes().to_vec());
+    let failure = ending.failure.map(|failure| failure.name().as_bytes().to_vec());
     let numbers = [job.0, nanoseconds(*ended), *evaluations].map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
     let numerics = numerics.to_le_bytes();
     fields.extend([ending.status.name().as_bytes(), version.as_bytes(), &numerics]);
     let commit = commit.as_ref().map(|commit| commit.as_bytes().to_vec());
     // What is absent has no field, and a field of one byte says that it is present.
-    let optional = [reason, optional(*best_cost), optional(mean), optional(variation), commit];
+    let optional =
+        [failure, reason, optional(*best_cost), optional(mean), optional(variation), commit];
     for value in &optional {
         fields.push(if value.is_some() { &[1] } else { &[0] });
         fields.extend(value.as_deref());
@@ -174,12 +167,11 @@ fn unpack(point: &[u8]) -> Option<Point> {
     rest.is_empty().then(|| values.try_into().ok().map(Point)).flatten()
 }
 
-/// A line for each worker: its process, a stroke and the number it drew in hexadecimal, if it drew
-/// one, a space, its host.
+/// A line for each worker: its process, a stroke and the number it drew in hexadecimal, a space, its
+/// host.
 pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
-    let line = |worker: &WorkerName| match worker.instance() {
-        0 => format!("{} {}", worker.process(), worker.host()),
-        drawn => format!("{}/{drawn:x} {}", worker.process(), worker.host()),
+    let line = |worker: &WorkerName| {
+        format!("{}/{:x} {}", worker.process(), worker.instance(), worker.host())
     };
     workers.iter().map(line).collect::<Vec<_>>().join("\n")
 }
@@ -187,10 +179,8 @@ pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
 fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
     let worker = |line: &str| {
         let (process, host) = line.split_once(' ')?;
-        let (process, instance) = match process.split_once('/') {
-            Some((process, drawn)) => (process, u64::from_str_radix(drawn, 16).ok()?),
-            None => (process, 0),
-        };
+        let (process, drawn) = process.split_once('/')?;
+        let instance = u64::from_str_radix(drawn, 16).ok()?;
         Some(WorkerName::new(host, process.parse().ok()?, instance))
     };
     packed.split('\n').filter(|line| !line.is_empty()).map(worker).collect()

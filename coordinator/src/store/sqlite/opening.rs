@@ -12,7 +12,7 @@ use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 use super::schema::SCHEMA;
 use crate::store::StoreError;
 
-/// Format that this program writes.
+/// The one format that this program reads and writes.
 pub(super) const FORMAT: i64 = 6;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
@@ -100,7 +100,7 @@ fn mode(path: &Path) -> io::Result<u32> {
     Ok(fs::metadata(path)?.permissions().mode())
 }
 
-/// Opens the file, brings it up to date and sets its modes.
+/// Opens the file and sets its modes.
 pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, StoreError> {
     let refused = |source| refusal(path, source);
     let mut connection = Connection::open(path).map_err(refused)?;
@@ -113,7 +113,7 @@ pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, Sto
     Ok(connection)
 }
 
-/// Refuses what this program did not write, or cannot bring up to date.
+/// Refuses what this program did not write.
 fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     let refused = |source| refusal(path, source);
     let sql = "SELECT count(*), coalesce(sum(name = 'format'), 0) FROM sqlite_schema
@@ -130,13 +130,10 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
-    let path = path.to_owned();
-    if found < FORMAT {
-        Err(StoreError::Older { path, found, known: FORMAT })
-    } else if found > FORMAT {
-        Err(StoreError::Newer { path, found, known: FORMAT })
-    } else {
+    if found == FORMAT {
         Ok(())
+    } else {
+        Err(StoreError::Format { path: path.to_owned(), found, known: FORMAT })
     }
 }
 

@@ -8,23 +8,24 @@ pub(super) const SCHEMA: &str = "
         accepted_ns INTEGER NOT NULL,    -- since the Unix epoch
         specification BLOB NOT NULL,     -- osteon.v1.JobSpecification
         fingerprint TEXT NOT NULL,       -- of the numerics of its evaluations
-        checksum BLOB NOT NULL,
-        client TEXT NOT NULL DEFAULT '',
-        priority INTEGER NOT NULL DEFAULT 0
+        client TEXT NOT NULL,
+        priority INTEGER NOT NULL,
+        checksum BLOB NOT NULL
     );
     CREATE TABLE evaluation (
         job INTEGER NOT NULL REFERENCES job(id),
         number INTEGER NOT NULL,
         point BLOB NOT NULL,             -- seven little-endian f64
         outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
-        checksum BLOB NOT NULL,
         estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
-        workers TEXT,                    -- whose answers are in it: a line each, PROCESS[/INSTANCE] HOST
+        workers TEXT NOT NULL,           -- whose answers are in it: a line each, PROCESS/INSTANCE HOST
+        checksum BLOB NOT NULL,
         PRIMARY KEY (job, number)
     );
     CREATE TABLE ending (
         job INTEGER PRIMARY KEY REFERENCES job(id),
         status TEXT NOT NULL,
+        failure TEXT,                    -- of which kind it is
         reason TEXT,
         version TEXT NOT NULL,           -- of the program
         numerics INTEGER NOT NULL,       -- their revision in it
@@ -47,10 +48,10 @@ pub(super) const SCHEMA: &str = "
         number INTEGER PRIMARY KEY,
         host TEXT NOT NULL,
         process INTEGER NOT NULL,
+        instance INTEGER NOT NULL,       -- the number it drew, as a signed one
         job INTEGER NOT NULL,            -- in which it was found
         reason TEXT NOT NULL,
         at_ns INTEGER NOT NULL,          -- since the Unix epoch
-        checksum BLOB NOT NULL,
-        instance INTEGER NOT NULL DEFAULT 0  -- the number it drew, as a signed one
+        checksum BLOB NOT NULL
     );
 ";

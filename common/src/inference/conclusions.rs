@@ -1,0 +1,107 @@
+//! All that is concluded from one set of data, as results carry it.
+
+use super::{
+    Inference, Profile, Solution, Spreads, first_below_noise, inference, profiles, solutions,
+    spread,
+};
+use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
+use crate::parameters::Point;
+use crate::results::{BestPoint, Evaluation, PointMeaning};
+
+/// What one set of data says, and which points match it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conclusions {
+    /// What is identified; `None` where the derivatives were not measured, or cannot be told.
+    pub inference: Option<Inference>,
+    /// Profiles of the cost, one for each free parameter; none of a likelihood, and none with priors.
+    pub profiles: Vec<Profile>,
+    /// The answers from all starts; `None` of a single start.
+    pub solutions: Option<Solutions>,
+}
+
+/// The answers of searches from several starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solutions {
+    /// The best point of each start that found a feasible one.
+    pub points: Vec<Solution>,
+    /// How many of them match the data as well as the best one, or to the tolerance of the search.
+    pub matching: u64,
+    /// Spreads over these; `None` if there are none.
+    pub spread: Option<Spreads>,
+}
+
+impl Conclusions {
+    /// From set number `set` of the data, given the best evaluation of its search, if one was feasible,
+    /// and all evaluations of the job. Nothing of a propagation.
+    pub fn of(
+        specification: &JobSpecification,
+        set: usize,
+        best: Option<&BestPoint>,
+        history: &[Evaluation],
+    ) -> Self {
+        if specification.kind == JobKind::Propagation {
+            return Self::default();
+        }
+        let several = specification.search.starts > 1;
+        Self {
+            inference: best.and_then(|best| inference(specification, set, best, history)),
+            profiles: best.map(|best| of_moments(specification, set, best)).unwrap_or_default(),
+            solutions: several.then(|| all_starts(specification, set, best, history)),
+        }
+    }
+}
+
+/// The profiles of a cost that is of the moments alone; those of others would be another matter.
+fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
+    match (best.velocity, &specification.data) {
+        (Some(velocity), Some(data)) if is_of_moments(specification) => {
+            profiles(specification, &best.point, velocity.moments, data.moments(set))
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn all_starts(
+    specification: &JobSpecification,
+    set: usize,
+    best: Option<&BestPoint>,
+    history: &[Evaluation],
+) -> Solutions {
+    let points = solutions(set, history);
+    let cost = best.and_then(|best| best.cost).unwrap_or(f64::INFINITY);
+    let most = tolerance(specification).map_or(cost, |tolerance| tolerance.max(cost));
+    let matching: Vec<Point> =
+        points.iter().filter(|one| one.cost <= most).map(|one| one.point).collect();
+    Solutions { points, matching: matching.len() as u64, spread: spread(&matching) }
+}
+
+/// What the best point of a search with this cost is.
+pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
+    match specification.search.method {
+        _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
+            PointMeaning::LeastCost
+        }
+        SearchMethod::Simplex => PointMeaning::SimplexEnd,
+        SearchMethod::Newton => PointMeaning::NearestToStart,
+    }
+}
+
+/// [`first_below_noise`] of a cost that is of the moments alone.
+pub fn below_noise_from(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+    history: &[Evaluation],
+) -> Option<u64> {
+    is_of_moments(specification).then(|| first_below_noise(set, best, history)).flatten()
+}
+
+fn is_of_moments(specification: &JobSpecification) -> bool {
+    specification.objective == Objective::Moments && !specification.has_priors()
+}
+
+/// The cost that is low enough; a likelihood has none.
+fn tolerance(specification: &JobSpecification) -> Option<f64> {
+    let by_moments = specification.objective == Objective::Moments;
+    by_moments.then_some(specification.search.cost_tolerance)
+}

@@ -1,0 +1,237 @@
+//! Enumerations of messages, and what they stand for in `osteon-common`.
+
+use osteon_common::job::{JobKind, Objective, Sampling, SearchMethod};
+use osteon_common::outcome::FailureKind;
+use osteon_common::parameters::Parameter;
+use osteon_common::results::{JobFailure, PointMeaning, Status};
+use osteon_common::settings::{Extremum, Method};
+use osteon_common::violations::Violations;
+
+use crate::malformed::Malformed;
+use crate::v1;
+
+/// A type of `osteon-common` as an enumeration of messages, whose number 0 is unspecified.
+pub struct Choice<T: 'static, M> {
+    all: &'static [T],
+    message: fn(T) -> M,
+    name: fn(&M) -> &'static str,
+}
+
+impl<T: Copy, M: Into<i32>> Choice<T, M> {
+    /// The number that stands for a value.
+    pub fn number(&self, value: T) -> i32 {
+        (self.message)(value).into()
+    }
+
+    /// What a number stands for; `None` if it is unspecified or not known.
+    pub fn value(&self, number: i32) -> Option<T> {
+        self.all.iter().copied().find(|&value| self.number(value) == number)
+    }
+
+    /// What a number stands for.
+    ///
+    /// # Errors
+    /// When it is unspecified, or not known.
+    pub fn required(&self, number: i32, field: &'static str) -> Result<T, Malformed> {
+        self.optional(number, field)?.ok_or(Malformed::Missing { field })
+    }
+
+    /// What a number stands for; `None` if it is unspecified.
+    ///
+    /// # Errors
+    /// When it is not known.
+    pub fn optional(&self, number: i32, field: &'static str) -> Result<Option<T>, Malformed> {
+        match (number, self.value(number)) {
+            (_, Some(value)) => Ok(Some(value)),
+            (0, None) => Ok(None),
+            (_, None) => Err(Malformed::UnknownValue { field, value: number.into() }),
+        }
+    }
+
+    /// What a number of a specification stands for, `default` if it is unspecified; one that is not
+    /// known is added to `violations`.
+    pub fn or_default(
+        &self,
+        number: i32,
+        default: T,
+        field: &str,
+        violations: &mut Violations,
+    ) -> T {
+        match (number, self.value(number)) {
+            (_, Some(value)) => value,
+            (0, None) => default,
+            (_, None) => {
+                violations.add(field, self.refusal(number));
+                default
+            }
+        }
+    }
+
+    /// Why a number is refused.
+    pub fn refusal(&self, number: i32) -> String {
+        let names = self.all.iter().map(|&value| (self.name)(&(self.message)(value)));
+        let names: Vec<&str> = names.collect();
+        format!("is {number}, which is not known; it must be {}", names.join(" or "))
+    }
+}
+
+/// What a job does.
+pub static JOB_KIND: Choice<JobKind, v1::JobKind> = Choice {
+    all: &[JobKind::Identification, JobKind::Propagation],
+    message: |kind| match kind {
+        JobKind::Identification => v1::JobKind::Identification,
+        JobKind::Propagation => v1::JobKind::Propagation,
+    },
+    name: v1::JobKind::as_str_name,
+};
+
+/// The criterion of the first arriving signal.
+pub static EXTREMUM: Choice<Extremum, v1::Extremum> = Choice {
+    all: &Extremum::ALL,
+    message: |extremum| match extremum {
+        Extremum::First => v1::Extremum::First,
+        Extremum::Second => v1::Extremum::Second,
+    },
+    name: v1::Extremum::as_str_name,
+};
+
+/// How waves are computed.
+pub static SOLVER_METHOD: Choice<Method, v1::SolverMethod> = Choice {
+    all: &Method::ALL,
+    message: |method| match method {
+        Method::Exact => v1::SolverMethod::Exact,
+        Method::Hybrid => v1::SolverMethod::Hybrid,
+    },
+    name: v1::SolverMethod::as_str_name,
+};
+
+/// How germs are drawn.
+pub static SAMPLING: Choice<Sampling, v1::Sampling> = Choice {
+    all: &Sampling::ALL,
+    message: |sampling| match sampling {
+        Sampling::MonteCarlo => v1::Sampling::MonteCarlo,
+        Sampling::Sobol => v1::Sampling::Sobol,
+    },
+    name: v1::Sampling::as_str_name,
+};
+
+/// What is minimised.
+pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
+    all: &Objective::ALL,
+    message: |objective| match objective {
+        Objective::Moments => v1::ObjectiveKind::Moments,
+        Objective::Likelihood => v1::ObjectiveKind::Likelihood,
+    },
+    name: v1::ObjectiveKind::as_str_name,
+};
+
+/// How the minimum is searched.
+pub static SEARCH_METHOD: Choice<SearchMethod, v1::SearchMethod> = Choice {
+    all: &SearchMethod::ALL,
+    message: |method| match method {
+        SearchMethod::Simplex => v1::SearchMethod::Simplex,
+        SearchMethod::Newton => v1::SearchMethod::Newton,
+    },
+    name: v1::SearchMethod::as_str_name,
+};
+
+/// One of the seven parameters.
+pub static PARAMETER: Choice<Parameter, v1::Parameter> = Choice {
+    all: &Parameter::ALL,
+    message: |parameter| match parameter {
+        Parameter::Density => v1::Parameter::Density,
+        Parameter::LongitudinalYoungModulus => v1::Parameter::LongitudinalYoungModulus,
+        Parameter::LongitudinalPoissonRatio => v1::Parameter::LongitudinalPoissonRatio,
+        Parameter::LongitudinalShearModulus => v1::Parameter::LongitudinalShearModulus,
+        Parameter::TransverseYoungModulus => v1::Parameter::TransverseYoungModulus,
+        Parameter::TransversePoissonRatio => v1::Parameter::TransversePoissonRatio,
+        Parameter::Dispersion => v1::Parameter::Dispersion,
+    },
+    name: v1::Parameter::as_str_name,
+};
+
+/// Why a realization has no velocity.
+pub static FAILURE_KIND: Choice<FailureKind, v1::FailureKind> = Choice {
+    all: &FailureKind::ALL,
+    message: |kind| match kind {
+        FailureKind::NoArrival => v1::FailureKind::NoArrival,
+        FailureKind::InconsistentArrival => v1::FailureKind::InconsistentArrival,
+        FailureKind::DirectWaveFirst => v1::FailureKind::DirectWaveFirst,
+        FailureKind::NotFinite => v1::FailureKind::NotFinite,
+        FailureKind::NoConvergence => v1::FailureKind::NoConvergence,
+    },
+    name: v1::FailureKind::as_str_name,
+};
+
+/// How a job ended; unspecified while it has not.
+pub static JOB_STATUS: Choice<Status, v1::JobStatus> = Choice {
+    all: &Status::ALL,
+    message: |status| match status {
+        Status::Converged => v1::JobStatus::Converged,
+        Status::MaxEvaluations => v1::JobStatus::MaxEvaluations,
+        Status::Cancelled => v1::JobStatus::Cancelled,
+        Status::Failed => v1::JobStatus::Failed,
+    },
+    name: v1::JobStatus::as_str_name,
+};
+
+/// Why a job failed; unspecified of one that has not.
+pub static JOB_FAILURE: Choice<JobFailure, v1::JobFailureKind> = Choice {
+    all: &JobFailure::ALL,
+    message: |failure| match failure {
+        JobFailure::NoFeasiblePoint => v1::JobFailureKind::NoFeasiblePoint,
+        JobFailure::IntegrityError => v1::JobFailureKind::IntegrityError,
+        JobFailure::LostRealization => v1::JobFailureKind::LostRealization,
+        JobFailure::Store => v1::JobFailureKind::Store,
+    },
+    name: v1::JobFailureKind::as_str_name,
+};
+
+/// What the best point of a search is.
+pub static POINT_MEANING: Choice<PointMeaning, v1::PointMeaning> = Choice {
+    all: &PointMeaning::ALL,
+    message: |meaning| match meaning {
+        PointMeaning::LeastCost => v1::PointMeaning::LeastCost,
+        PointMeaning::SimplexEnd => v1::PointMeaning::SimplexEnd,
+        PointMeaning::NearestToStart => v1::PointMeaning::NearestToStart,
+    },
+    name: v1::PointMeaning::as_str_name,
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_numbers_of_failures_are_their_code_bytes() {
+        for kind in FailureKind::ALL {
+            assert_eq!(FAILURE_KIND.number(kind), i32::from(kind.code()));
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_refused_by_name() {
+        let mut violations = Violations::new();
+        let read = |number, violations: &mut Violations| {
+            SAMPLING.or_default(number, Sampling::Sobol, "monte_carlo.sampling", violations)
+        };
+        assert_eq!(read(0, &mut violations), Sampling::Sobol);
+        assert_eq!(read(1, &mut violations), Sampling::MonteCarlo);
+        assert!(violations.is_empty());
+        read(17, &mut violations);
+        assert_eq!(
+            violations.to_string(),
+            "monte_carlo.sampling: is 17, which is not known; it must be SAMPLING_MONTE_CARLO or \
+             SAMPLING_SOBOL"
+        );
+        let field = "status";
+        assert_eq!(JOB_STATUS.required(0, field), Err(Malformed::Missing { field }));
+        assert_eq!(JOB_STATUS.optional(0, field), Ok(None));
+        let unknown = Malformed::UnknownValue { field, value: 9 };
+        assert_eq!(JOB_STATUS.required(9, field), Err(unknown.clone()));
+        assert_eq!(
+            JOB_STATUS.optional(-1, field),
+            Err(Malformed::UnknownValue { field, value: -1 })
+        );
+    }
+}

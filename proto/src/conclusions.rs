@@ -1,0 +1,287 @@
+//! What the data say, as messages.
+
+use osteon_common::inference::{
+    Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
+    Solution, Solutions, Spread, Spreads,
+};
+use osteon_common::parameters::Parameter;
+
+use crate::choice::PARAMETER;
+use crate::malformed::Malformed;
+use crate::parameter_values::{
+    point_from_message, point_to_message, some_from_message, some_to_message,
+};
+use crate::results::{moments_from_message, moments_to_message};
+use crate::v1;
+
+/// Rows and columns of the elasticity matrix.
+const ROWS: u32 = 6;
+
+/// The fields of a result that hold its conclusions.
+pub(crate) struct Fields {
+    pub(crate) sensitivities: Vec<v1::Sensitivity>,
+    pub(crate) identified: Option<v1::Identified>,
+    pub(crate) profiles: Vec<v1::Profile>,
+    pub(crate) solutions: Option<v1::Solutions>,
+}
+
+/// The same of a message.
+pub(crate) struct FieldsOf<'a> {
+    pub(crate) sensitivities: &'a [v1::Sensitivity],
+    pub(crate) identified: Option<&'a v1::Identified>,
+    pub(crate) profiles: &'a [v1::Profile],
+    pub(crate) solutions: Option<&'a v1::Solutions>,
+}
+
+pub(crate) fn to_message(conclusions: &Conclusions) -> Fields {
+    let Conclusions { inference, profiles, solutions } = conclusions;
+    let sensitivities = inference.iter().flat_map(|found| &found.sensitivities);
+    Fields {
+        sensitivities: sensitivities.map(sensitivity_to_message).collect(),
+        identified: inference.as_ref().map(identified_to_message),
+        profiles: profiles.iter().map(profile_to_message).collect(),
+        solutions: solutions.as_ref().map(solutions_to_message),
+    }
+}
+
+/// # Errors
+/// When a required field is absent, or what belongs together does not fit.
+pub(crate) fn from_message(fields: &FieldsOf<'_>) -> Result<Conclusions, Malformed> {
+    let sensitivities =
+        fields.sensitivities.iter().map(sensitivity_from_message).collect::<Result<Vec<_>, _>>()?;
+    let inference =
+        fields.identified.map(|message| identified_from_message(message, sensitivities));
+    Ok(Conclusions {
+        inference: inference.transpose()?,
+        profiles: fields.profiles.iter().map(profile_from_message).collect::<Result<_, _>>()?,
+        solutions: fields.solutions.map(solutions_from_message).transpose()?,
+    })
+}
+
+fn present<T>(value: Option<T>, field: &'static str) -> Result<T, Malformed> {
+    value.ok_or(Malformed::Missing { field })
+}
+
+fn parameter(number: i32) -> Result<Parameter, Malformed> {
+    PARAMETER.required(number, "parameter")
+}
+
+fn sensitivity_to_message(one: &Sensitivity) -> v1::Sensitivity {
+    v1::Sensitivity {
+        parameter: PARAMETER.number(one.parameter),
+        mean: Some(one.mean),
+        coefficient_of_variation: Some(one.coefficient_of_variation),
+    }
+}
+
+fn sensitivity_from_message(message: &v1::Sensitivity) -> Result<Sensitivity, Malformed> {
+    let variation = message.coefficient_of_variation;
+    Ok(Sensitivity {
+        parameter: parameter(message.parameter)?,
+        mean: present(message.mean, "mean")?,
+        coefficient_of_variation: present(variation, "coefficient_of_variation")?,
+    })
+}
+
+fn identified_to_message(found: &Inference) -> v1::Identified {
+    let quantity = |(parameter, quantity): &(Parameter, Quantity)| v1::ParameterQuantity {
+        parameter: PARAMETER.number(*parameter),
+        quantity: Some(quantity_to_message(quantity)),
+    };
+    let direction = |direction: &Direction| v1::Direction {
+        singular_value: direction.singular_value,
+        components: Some(some_to_message(&found.free, &direction.components)),
+    };
+    let free = found.undetermined.iter().map(|one| some_to_message(&found.free, one));
+    v1::Identified {
+        matched: found.matched,
+        level: found.level,
+        data_noise: found.noise.data.as_ref().map(moments_to_message),
+        sampling_noise: Some(moments_to_message(&found.noise.sampling)),
+        bulk_velocity: Some(quantity_to_message(&found.bulk_velocity)),
+        dispersion: Some(quantity_to_message(&found.dispersion)),
+        parameters: found.parameters.iter().map(quantity).collect(),
+        directions: found.fixed.iter().map(direction).collect(),
+        free_directions: free.collect(),
+    }
+}
+
+fn identified_from_message(
+    message: &v1::Identified,
+    sensitivities: Vec<Sensitivity>,
+) -> Result<Inference, Malformed> {
+    let free: Vec<Parameter> = sensitivities.iter().map(|one| one.parameter).collect();
+    let quantity = |one: &v1::ParameterQuantity| {
+        let found = quantity_from_message(one.quantity.as_ref(), "quantity")?;
+        Ok((parameter(one.parameter)?, found))
+    };
+    let direction = |one: &v1::Direction| {
+        let components = present(one.components.as_ref(), "components")?;
+        let components = some_from_message(&free, components)?;
+        Ok(Direction { singular_value: one.singular_value, components })
+    };
+    let sampling = present(message.sampling_noise.as_ref(), "sampling_noise")?;
+    let undetermined = message.free_directions.iter().map(|one| some_from_message(&free, one));
+    Ok(Inference {
+        matched: message.matched,
+        level: message.level,
+        noise: NoiseErrors {
+            data: message.data_noise.as_ref().map(moments_from_message),
+            sampling: moments_from_message(sampling),
+        },
+        fixed: message.directions.iter().map(direction).collect::<Result<_, Malformed>>()?,
+        undetermined: undetermined.collect::<Result<_, _>>()?,
+        bulk_velocity: quantity_from_message(message.bulk_velocity.as_ref(), "bulk_velocity")?,
+        dispersion: quantity_from_message(message.dispersion.as_ref(), "dispersion")?,
+        parameters: message.parameters.iter().map(quantity).collect::<Result<_, Malformed>>()?,
+        free,
+        sensitivities,
+    })
+}
+
+fn quantity_to_message(quantity: &Quantity) -> v1::Quantity {
+    let interval =
+        |[lower, upper]: [f64; 2]| v1::Interval { lower: Some(lower), upper: Some(upper) };
+    v1::Quantity {
+        value: Some(quantity.value),
+        standard_error: quantity.known.map(|known| known.standard_error),
+        interval: quantity.known.map(|known| interval(known.interval)),
+        free_share: quantity.known.map(|known| known.free_share),
+    }
+}
+
+/// A quantity is known with all that there is of it, or not at all.
+fn quantity_from_message(
+    message: Option<&v1::Quantity>,
+    field: &'static str,
+) -> Result<Quantity, Malformed> {
+    let message = present(message, field)?;
+    let known = match (message.standard_error, &message.interval, message.free_share) {
+        (None, None, None) => None,
+        (standard_error, interval, free_share) => Some(Known {
+            standard_error: present(standard_error, "standard_error")?,
+            interval: interval_from_message(interval.as_ref())?,
+            free_share: present(free_share, "free_share")?,
+        }),
+    };
+    Ok(Quantity { value: present(message.value, "value")?, known })
+}
+
+/// Both ends of an interval.
+pub(crate) fn interval_from_message(message: Option<&v1::Interval>) -> Result<[f64; 2], Malformed> {
+    let message = present(message, "interval")?;
+    Ok([present(message.lower, "lower")?, present(message.upper, "upper")?])
+}
+
+fn profile_to_message(profile: &Profile) -> v1::Profile {
+    v1::Profile {
+        parameter: PARAMETER.number(profile.parameter),
+        values: profile.values.clone(),
+        costs: profile.costs.clone(),
+    }
+}
+
+fn profile_from_message(message: &v1::Profile) -> Result<Profile, Malformed> {
+    let (found, expected) = (message.costs.len(), message.values.len());
+    if found != expected {
+        return Err(Malformed::WrongLength { field: "costs", found, expected });
+    }
+    Ok(Profile {
+        parameter: parameter(message.parameter)?,
+        values: message.values.clone(),
+        costs: message.costs.clone(),
+    })
+}
+
+fn solutions_to_message(solutions: &Solutions) -> v1::Solutions {
+    let Solutions { points, matching, spread } = solutions;
+    let point = |one: &Solution| v1::Solution {
+        start: one.start,
+        point: Some(point_to_message(&one.point)),
+        cost: Some(one.cost),
+        evaluations: one.evaluations,
+    };
+    let parameters = spread.iter().flat_map(|spread| Parameter::ALL.iter().zip(&spread.parameters));
+    let parameters = parameters.map(|(&parameter, spread)| v1::ParameterSpread {
+        parameter: PARAMETER.number(parameter),
+        spread: Some(spread_to_message(spread)),
+    });
+    let entries = spread.iter().flat_map(|spread| &spread.entries);
+    let number = |place: usize| u32::try_from(place + 1).unwrap_or(u32::MAX);
+    let entries = entries.map(|(row, column, spread)| v1::EntrySpread {
+        row: number(*row),
+        column: number(*column),
+        spread: Some(spread_to_message(spread)),
+    });
+    v1::Solutions {
+        points: points.iter().map(point).collect(),
+        matching: *matching,
+        parameters: parameters.collect(),
+        mandel: entries.collect(),
+    }
+}
+
+fn solutions_from_message(message: &v1::Solutions) -> Result<Solutions, Malformed> {
+    let point = |one: &v1::Solution| {
+        Ok(Solution {
+            start: one.start,
+            point: point_from_message(one.point.as_ref())?,
+            cost: present(one.cost, "cost")?,
+            evaluations: one.evaluations,
+        })
+    };
+    let points = message.points.iter().map(point).collect::<Result<Vec<_>, Malformed>>()?;
+    let spread = match (message.parameters.is_empty(), message.mandel.is_empty()) {
+        (true, true) => None,
+        _ => Some(spreads_from_message(message)?),
+    };
+    Ok(Solutions { points, matching: message.matching, spread })
+}
+
+fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
+    let spread = |one: &v1::ParameterSpread| {
+        Ok((parameter(one.parameter)?, spread_from_message(one.spread.as_ref())?))
+    };
+    let found = message.parameters.iter().map(spread).collect::<Result<Vec<_>, Malformed>>()?;
+    if !found.iter().map(|(parameter, _)| *parameter).eq(Parameter::ALL) {
+        let (field, found) = ("parameters", found.len());
+        return Err(Malformed::WrongLength { field, found, expected: Parameter::ALL.len() });
+    }
+    let spreads: Vec<Spread> = found.into_iter().map(|(_, spread)| spread).collect();
+    let parameters = spreads.try_into().map_err(|spreads: Vec<Spread>| Malformed::WrongLength {
+        field: "parameters",
+        found: spreads.len(),
+        expected: Parameter::ALL.len(),
+    })?;
+    let entry = |one: &v1::EntrySpread| {
+        let row = place(one.row, 1, "row")?;
+        Ok((row, place(one.column, one.row, "column")?, spread_from_message(one.spread.as_ref())?))
+    };
+    let entries = message.mandel.iter().map(entry).collect::<Result<_, Malformed>>()?;
+    Ok(Spreads { parameters, entries })
+}
+
+/// A row or column from 0, of a number from `least` to 6.
+fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
+    let within = (least..=ROWS).contains(&number);
+    let allowed = "it must be 1 to 6, and a column at least its row";
+    let refused = Malformed::OutOfRange { field, value: number.into(), allowed };
+    within.then_some(number as usize - 1).ok_or(refused)
+}
+
+fn spread_to_message(spread: &Spread) -> v1::Spread {
+    v1::Spread {
+        smallest: Some(spread.smallest),
+        largest: Some(spread.largest),
+        mean: Some(spread.mean),
+    }
+}
+
+fn spread_from_message(message: Option<&v1::Spread>) -> Result<Spread, Malformed> {
+    let message = present(message, "spread")?;
+    Ok(Spread {
+        smallest: present(message.smallest, "smallest")?,
+        largest: present(message.largest, "largest")?,
+        mean: present(message.mean, "mean")?,
+    })
+}

@@ -1,0 +1,121 @@
+//! The parts of a fetch, as they come, into what a job left.
+
+use osteon_common::limits::{GROUPS_MAX, REALIZATIONS_MAX};
+use osteon_common::outcome::Outcome;
+use osteon_common::results::Evaluation;
+use osteon_proto::malformed::Malformed;
+use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::v1::{self, RealizationBlock};
+use osteon_proto::{realizations, results, specification};
+
+use super::Fetched;
+
+/// The parts that have come.
+#[derive(Debug, Default)]
+pub(super) struct Parts {
+    specification: Option<v1::JobSpecification>,
+    result: Option<v1::JobResult>,
+    history: Vec<Evaluation>,
+    /// At the best point of the job.
+    realizations: Realizations,
+    groups: Vec<(v1::GroupResult, Realizations)>,
+    /// Outcomes of groups that are kept.
+    kept: u64,
+}
+
+/// Outcomes of one point.
+#[derive(Debug, Default)]
+struct Realizations {
+    /// How many have come.
+    count: u64,
+    /// All of them, or none, if there are too many.
+    outcomes: Vec<Outcome>,
+}
+
+impl Parts {
+    /// Takes the next part.
+    pub(super) fn add(&mut self, part: Part) -> Result<(), Malformed> {
+        match part {
+            Part::Specification(specification) => self.specification = Some(specification),
+            Part::Result(result) => self.result = Some(result),
+            Part::History(block) => {
+                for row in &block.rows {
+                    self.history.push(results::evaluation_from_message(row)?);
+                }
+            }
+            Part::Group(group) => {
+                let next = self.groups.len();
+                if group.group as usize != next || next == GROUPS_MAX {
+                    let allowed = "groups must follow each other, at most 1000";
+                    return Err(out_of_range("group", group.group.into(), allowed));
+                }
+                self.groups.push((group, Realizations::default()));
+            }
+            Part::Realizations(block) => self.add_realizations(&block)?,
+        }
+        Ok(())
+    }
+
+    fn add_realizations(&mut self, block: &RealizationBlock) -> Result<(), Malformed> {
+        let (first, outcomes) = realizations::from_message(block)?;
+        let (of_point, keeps) = match (block.group, self.groups.last_mut()) {
+            (None, _) => (&mut self.realizations, true),
+            (Some(group), Some((found, of_group))) if found.group == group => {
+                self.kept += outcomes.len() as u64;
+                (of_group, self.kept <= REALIZATIONS_MAX)
+            }
+            (Some(group), _) => {
+                let allowed = "realizations must follow the result of their group";
+                return Err(out_of_range("group", group.into(), allowed));
+            }
+        };
+        let count = of_point.count + outcomes.len() as u64;
+        if first != of_point.count || count > REALIZATIONS_MAX {
+            let allowed = "blocks of realizations must follow each other";
+            return Err(out_of_range("first", first as f64, allowed));
+        }
+        of_point.count = count;
+        if keeps {
+            of_point.outcomes.extend(outcomes);
+        } else {
+            of_point.outcomes = Vec::new();
+        }
+        Ok(())
+    }
+
+    /// What they make, when all have come.
+    pub(super) fn whole(self) -> Result<Fetched, Malformed> {
+        let specification =
+            self.specification.ok_or(Malformed::Missing { field: "specification" })?;
+        let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
+        let all = result.realizations;
+        let groups = self.groups.into_iter().map(|(group, of_group)| {
+            results::group_from_message(&group, of_group.whole(group.best.is_some(), all)?)
+        });
+        let groups = groups.collect::<Result<_, _>>()?;
+        let outcomes = self.realizations.whole(result.best.is_some(), all)?;
+        Ok(Fetched {
+            specification: specification::from_message(&specification)
+                .map_err(Malformed::InvalidSpecification)?,
+            result: results::from_message(&result, outcomes, groups)?,
+            history: self.history,
+        })
+    }
+}
+
+impl Realizations {
+    /// The outcomes, of which there must be `all` where there is a best point, and none elsewhere.
+    fn whole(self, has_best: bool, all: u64) -> Result<Vec<Outcome>, Malformed> {
+        let expected = if has_best { all } else { 0 };
+        if self.count == expected {
+            return Ok(self.outcomes);
+        }
+        let number = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
+        let (found, expected) = (number(self.count), number(expected));
+        Err(Malformed::WrongLength { field: "realizations", found, expected })
+    }
+}
+
+fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Malformed {
+    Malformed::OutOfRange { field, value, allowed }
+}
