@@ -13,12 +13,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::document::Format;
 use osteon_common::job::{Data, JobKind, JobSpecification};
-use osteon_common::limits::FILE_BYTES_MAX;
-use osteon_common::results::{JobResult, Status};
+use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
+use osteon_common::results::{GroupResult, JobResult, Status};
 use osteon_common::{job_file, results_csv, results_json};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
+use crate::progress::say;
 use crate::request::Request;
 use crate::result_files::{self, Origin, RESULT, ResultFiles};
 use crate::verdict;
@@ -207,6 +208,16 @@ impl Drop for ResultsDirectory {
 /// The realizations at the best point, or at those of the groups.
 fn realizations(fetched: &Fetched) -> String {
     if matches!(fetched.specification.data, Some(Data::Groups(_))) {
+        let groups = fetched.result.groups.iter();
+        let left_out =
+            |group: &&GroupResult| group.best.as_ref().is_some_and(|best| best.outcomes.is_empty());
+        let left_out = groups.filter(left_out).count();
+        if left_out > 0 {
+            say(&format!(
+                "{REALIZATIONS} is without those of the last {left_out} groups: it has at most \
+                 {REALIZATIONS_MAX} rows"
+            ));
+        }
         return results_csv::realizations_of_groups(&fetched.result.groups);
     }
     let best = fetched.result.best.as_ref();

@@ -219,6 +219,50 @@ fn a_job_without_a_group_to_search_is_refused() {
     assert!(!scratch.path("out").exists());
 }
 
+/// The example's velocities are those of the seeds and parameters that their head states. (A better
+/// solver may move them by its accuracy.)
+#[test]
+fn the_examples_velocities_are_drawn_as_their_head_says() {
+    let scratch = Scratch::new();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let csv = read(&examples, "data/groups.csv");
+    let (head, rows): (Vec<&str>, Vec<&str>) = csv.lines().partition(|line| line.starts_with('#'));
+    let rows = table(&rows.join("\n"));
+    let job = read(&examples, "groups.toml");
+    let fixed = job.split("[parameters]").nth(1).unwrap().split("\n\n").next().unwrap();
+    let mut drawn = 0;
+    for line in head {
+        let Some((patient, said)) = line[2..].split_once(": ").filter(|(name, _)| name.len() == 3)
+        else {
+            continue;
+        };
+        let said: Vec<&str> = said.split(", ").collect();
+        let [modulus, dispersion, realizations, seed] = said[..] else { panic!("{line}") };
+        let parameters = fixed.lines().map(|line| match line.split_whitespace().next() {
+            Some("longitudinal_young_modulus") => {
+                format!("longitudinal_young_modulus = {{ fixed = {} }}\n", &modulus[..6])
+            }
+            Some("dispersion") => format!("dispersion = {{ fixed = {dispersion} }}\n"),
+            _ => format!("{line}\n"),
+        });
+        let parameters: String = parameters.collect();
+        let text = format!("[parameters]{parameters}[monte_carlo]\n{realizations}\n{seed}\n");
+        let job = scratch.write(&format!("{patient}.toml"), &text);
+        let out = scratch.path(patient);
+        run(&["propagate", support::text(&job), "--out", support::text(&out)]).succeeded();
+        let expected = table(&read(&out, "realizations.csv"));
+        let measured: Vec<_> = rows.iter().filter(|row| row["patient"] == patient).collect();
+        assert_eq!(measured.len(), expected.len());
+        for (measured, expected) in measured.iter().zip(&expected) {
+            let [measured, expected] =
+                [&measured["velocity"], &expected["velocity"]].map(|v| v.parse::<f64>().unwrap());
+            assert!((measured / expected - 1.0).abs() < 1e-4, "{measured} against {expected}");
+        }
+        drawn += measured.len();
+    }
+    assert_eq!(drawn, rows.len());
+}
+
 #[test]
 fn a_job_of_groups_whose_coordinator_is_killed_loses_nothing() {
     let scratch = Scratch::new();

@@ -8,7 +8,7 @@ use std::path::Path;
 use osteon_common::case::Setup;
 use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
-use osteon_common::inference::{Conclusions, Inference, Known, Quantity, meaning, noise};
+use osteon_common::inference::{Conclusions, Inference, Known, NoiseErrors, Quantity, meaning};
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
@@ -359,10 +359,10 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
         value,
         known: interval.map(|interval| Known { standard_error: 1.0, interval, free_share: 0.0 }),
     };
-    let estimate = result.groups[0].best.as_ref().unwrap().velocity.unwrap();
     let found = |known: bool| Inference {
         matched: known,
-        noise: noise(job.data.as_ref().unwrap(), 0, &estimate),
+        level: 0.95,
+        noise: NoiseErrors { data: None, sampling: moments(5e-4, 0.01) },
         free: vec![Parameter::LongitudinalYoungModulus, Parameter::Dispersion],
         sensitivities: Vec::new(),
         fixed: Vec::new(),

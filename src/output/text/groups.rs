@@ -136,7 +136,7 @@ fn shown(cells: &[Cell]) -> Vec<String> {
     let narrowest = halves.filter(|half| *half > 0.0).fold(f64::INFINITY, f64::min);
     let decimals = (1.0 - narrowest.log10().floor()).clamp(0.0, 9.0);
     let number = |value: f64| {
-        if narrowest.is_finite() {
+        if narrowest.is_finite() && value.abs() < 1e9 {
             format!("{value:.*}", decimals as usize)
         } else {
             significant(value, 5)
