@@ -23,6 +23,8 @@ fn keys(value: &Value) -> String {
 
 fn add_keys(lines: &mut String, path: &str, value: &Value) {
     let kind = match value {
+        // Built outside a repository it is null.
+        Value::Null if path == "commit" => "text",
         Value::Null => "null",
         Value::Bool(_) => "boolean",
         Value::Number(number) if number.is_f64() => "number",
@@ -37,6 +39,13 @@ fn add_keys(lines: &mut String, path: &str, value: &Value) {
     let inside = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
     match value {
         Value::Object(entries) => {
+            let trees: BTreeSet<String> = entries.values().map(tree).collect();
+            if entries.len() >= ALIKE_MIN && trees.len() == 1 {
+                let names: Vec<&str> = entries.keys().map(String::as_str).collect();
+                lines.push_str(&format!("{path}.*: {}\n", names.join(", ")));
+                add_keys(lines, &inside("*"), &entries[names[0]]);
+                return;
+            }
             for (key, value) in entries {
                 add_keys(lines, &inside(key), value);
             }
@@ -50,6 +59,16 @@ fn add_keys(lines: &mut String, path: &str, value: &Value) {
         }
         _ => {}
     }
+}
+
+/// Entries of an object that are shown as one, if they are so many and alike: parameters, say.
+const ALIKE_MIN: usize = 6;
+
+/// What a value holds, and what is below it.
+fn tree(value: &Value) -> String {
+    let mut lines = String::new();
+    add_keys(&mut lines, "*", value);
+    lines
 }
 
 /// One line for each column of a table: its name and what its fields are.
