@@ -11,6 +11,7 @@ use std::time::Duration;
 use osteon_common::results::Status as JobEnd;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
@@ -20,7 +21,7 @@ use osteon_proto::v1::{
     AttachRequest, FetchRequest, GetRequest, JobState, ListExpelledRequest, PruneRequest,
     SubmitRequest, WatchRequest,
 };
-use osteon_proto::{batch, results, specification};
+use osteon_proto::{batch, specification};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;
@@ -63,7 +64,7 @@ async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(String, Jo
     let mut stream = client.fetch(FetchRequest { job: job.to_owned() }).await?.into_inner();
     loop {
         if let Some(Part::Result(result)) = stream.message().await?.unwrap().part {
-            let status = results::status_from_message(result.status).unwrap().unwrap();
+            let status = JOB_STATUS.value(result.status).unwrap();
             return Ok((result.digest, status));
         }
     }

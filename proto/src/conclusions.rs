@@ -263,10 +263,10 @@ fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
 
 /// A row or column from 0, of a number from `least` to 6.
 fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
-    let within = (least..=ROWS).contains(&number);
+    let place = (least..=ROWS).contains(&number).then(|| number as usize - 1);
     let allowed = "it must be 1 to 6, and a column at least its row";
     let refused = Malformed::OutOfRange { field, value: number.into(), allowed };
-    within.then_some(number as usize - 1).ok_or(refused)
+    place.ok_or(refused)
 }
 
 fn spread_to_message(spread: &Spread) -> v1::Spread {

@@ -5,14 +5,22 @@
 
 use std::path::Path;
 
+use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
-use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::outcome::{FailureKind, Outcome, Solved};
+use osteon_common::inference::Conclusions;
+use osteon_common::job::{JobKind, JobSpecification, Sampling};
+use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, Solved};
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::results::{
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
+    JobResult, Moments, PointMeaning, Role, Status as JobEnd,
+};
+use osteon_common::sampling::NominalSampling;
 use osteon_common::{job_file, results_csv, results_json};
 use osteon_fuzz::{bounded, config, damaged, texts};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::v1::fetch_response::Part;
-use osteon_proto::{realizations, results, specification, status, v1};
+use osteon_proto::{parameter_values, realizations, results, specification, status, v1};
 use proptest::prelude::*;
 use prost::Message as _;
 use tonic::{Code, Status};
@@ -105,70 +113,130 @@ fn check_answer(bytes: &[u8]) {
     }
 }
 
-fn moments() -> v1::Moments {
-    v1::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }
-}
+const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 fn row(number: u64) -> v1::EvaluationRow {
     let failures =
-        vec![v1::FailureCount { code: 1, count: 1 }, v1::FailureCount { code: 5, count: 2 }];
+        vec![v1::FailureCount { kind: 1, count: 1 }, v1::FailureCount { kind: 5, count: 2 }];
     v1::EvaluationRow {
         number,
-        point: vec![1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029],
-        moments: Some(moments()),
+        point: Some(parameter_values::point_to_message(&POINT)),
+        moments: Some(v1::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
         cost: Some(f64::INFINITY),
         failures,
         estimated_error: Some(v1::EstimatedError { median: 1e-5, largest: 3e-5 }),
         start: 1,
-        varied: if number == 2 { 7 } else { 0 },
+        varied: (number == 2).then_some(v1::Parameter::Dispersion.into()),
         ..v1::EvaluationRow::default()
     }
 }
 
-fn result() -> v1::JobResult {
-    let job = specification::to_message(&jobs()[0]);
-    let (row, velocity) = (row(0), (Some(moments()), Some(moments())));
-    let (moments, standard_error) = velocity;
-    let best = v1::BestPoint {
-        point: row.point,
-        cost: Some(1e-11),
-        velocity: Some(v1::Estimate { moments, standard_error, controlled: true }),
-        failures: row.failures,
-        estimated_error: row.estimated_error,
-        cost_error: Some(1e-3),
-        failure_bias: Some(v1::Moments { mean: -1.0, coefficient_of_variation: 1e-3 }),
-        kolmogorov: Some(v1::KolmogorovTest { distance: 0.1, p_value: 0.3 }),
+/// An identification of two free parameters from two starts, with all that there can be.
+fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
+    let text =
+        "[data]\nvelocities = [3900.0, 3950.0, 4000.0]\n[search]\nstarts = 2\n[parameters]\n";
+    let ranges = Parameter::ALL.map(|parameter| {
+        let (name, value) = (parameter.name(), POINT.get(parameter));
+        match parameter {
+            Parameter::Density => {
+                format!("{name} = {{ start = 1600.0, bounds = [1500.0, 2000.0] }}")
+            }
+            Parameter::Dispersion => format!("{name} = {{ start = 0.1, bounds = [0.02, 0.3] }}"),
+            _ => format!("{name} = {{ fixed = {value:?} }}"),
+        }
+    });
+    let text = text.to_owned() + &ranges.join("\n");
+    let job = job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap();
+    let moments = |mean, coefficient_of_variation| Moments { mean, coefficient_of_variation };
+    let evaluation = |number: u64, start: u32, varied: Option<Parameter>| {
+        let mut point = POINT;
+        if let Some(parameter) = varied {
+            point.0[parameter as usize] *= 1.0 + 1e-5;
+        }
+        Evaluation {
+            number,
+            role: Role { group: 0, start, varied },
+            point,
+            moments: Some(moments(3950.0 - number as f64, 0.0103 + 1e-6 * number as f64)),
+            cost: Some(1e-11),
+            failures: FailureCounts::default(),
+            estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
+        }
     };
-    v1::JobResult {
-        status: v1::JobStatus::Converged.into(),
+    let history = vec![
+        evaluation(0, 0, None),
+        evaluation(1, 1, None),
+        evaluation(2, 0, Some(Parameter::Density)),
+        evaluation(3, 0, Some(Parameter::Dispersion)),
+    ];
+    let best = BestPoint {
+        point: POINT,
+        meaning: Some(PointMeaning::SimplexEnd),
+        cost: Some(1e-11),
+        cost_error: Some(1e-3),
+        penalty: Some(0.0),
+        below_noise_from: Some(0),
+        velocity: Some(Estimate {
+            moments: moments(3950.0, 0.0103),
+            standard_error: moments(2.0, 1e-4),
+            controlled: true,
+        }),
+        failure_bias: Some(moments(-1.0, 1e-3)),
+        kolmogorov: Some(KolmogorovTest { distance: 0.1, p_value: 0.3 }),
+        failures: FailureCounts::of(&outcomes()),
+        estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
+        outcomes: outcomes(),
+    };
+    let result = JobResult {
+        status: JobEnd::Failed,
+        failure: Some(JobFailure::Store),
+        reason: Some("why".to_owned()),
         digest: "00".repeat(32),
-        best: Some(best.clone()),
-        data: moments,
-        groups: vec![v1::GroupResult {
-            name: "left".to_owned(),
-            status: v1::JobStatus::MaxEvaluations.into(),
-            best: Some(best),
-            data: moments,
-            ..v1::GroupResult::default()
-        }],
-        evaluations: 3,
+        data: job.data.as_ref().map(|data| DataSummary::of(data, 0)),
+        conclusions: Conclusions::of(&job, 0, Some(&best), &history),
+        best: Some(best),
+        groups: Vec::new(),
+        objective: job.objective,
+        search: job.search,
+        evaluations: 2,
         realizations: 4,
         seed: 1,
-        solver: job.solver,
-        picking: job.picking,
-        version: "0.1.0".to_owned(),
-        sampling: "sobol".to_owned(),
+        sampling: Sampling::Sobol,
         scrambles: 2,
-        ..v1::JobResult::default()
-    }
+        control_variate: true,
+        solver: job.setup.solver,
+        nominal: NominalSampling::of(&job.setup),
+        picking: job.setup.picking,
+        version: "0.1.0".to_owned(),
+    };
+    let Conclusions { inference, profiles, solutions } = &result.conclusions;
+    assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));
+    assert_eq!(profiles.len(), 2);
+    assert!(solutions.as_ref().is_some_and(|found| found.spread.is_some()));
+    (job, history, result)
 }
 
-/// Parts of a fetch: a result, its history and its realizations.
+fn result() -> v1::JobResult {
+    results::to_message(&identification().2)
+}
+
+fn group() -> v1::GroupResult {
+    let JobResult { best, data, conclusions, .. } = identification().2;
+    let (name, status) = ("left".to_owned(), JobEnd::MaxEvaluations);
+    let data = data.unwrap();
+    results::group_to_message(
+        7,
+        &GroupResult { name, status, reason: None, best, data, conclusions },
+    )
+}
+
+/// Parts of a fetch: a result, its history, a group and realizations.
 fn fetches() -> Vec<Vec<u8>> {
     let parts = [
         Part::Result(result()),
         Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect(), groups: Vec::new() }),
-        Part::Realizations(realizations::to_message(0, &outcomes())),
+        Part::Group(group()),
+        Part::Realizations(realizations::to_message(Some(7), 0, &outcomes())),
     ];
     parts.map(|part| v1::FetchResponse { part: Some(part) }.encode_to_vec()).to_vec()
 }
@@ -181,25 +249,37 @@ fn check_fetch(bytes: &[u8]) {
         Part::Specification(message) => check_specification(&message.encode_to_vec()),
         Part::Result(message) => check_result(&message),
         Part::History(block) => check_history(&block),
+        Part::Group(message) => check_group(&message),
         Part::Realizations(block) => {
             let Ok((first, outcomes)) = realizations::from_message(&block) else { return };
-            assert_eq!(realizations::to_message(first, &outcomes), block);
+            assert_eq!(realizations::to_message(block.group, first, &outcomes), block);
         }
     });
 }
 
 fn check_result(message: &v1::JobResult) {
-    let Ok(result) = results::from_message(message, outcomes()) else { return };
+    let Ok(result) = results::from_message(message, outcomes(), Vec::new()) else { return };
     let written = results::to_message(&result);
-    let again = results::from_message(&written, outcomes()).unwrap();
+    let again = results::from_message(&written, outcomes(), Vec::new()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    let job = &jobs()[0];
-    let rows: Vec<_> = (0..3).map(|k| results::evaluation_from_message(&row(k)).unwrap()).collect();
-    let identification = results_json::identification(&result, job, &rows);
-    for text in [identification, results_json::propagation(&result, &job.setup)] {
+    for text in [results_json::identification(&result), results_json::propagation(&result)] {
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
+}
+
+fn check_group(message: &v1::GroupResult) {
+    let Ok(found) = results::group_from_message(message, outcomes()) else { return };
+    let written = results::group_to_message(message.group, &found);
+    let again = results::group_from_message(&written, outcomes()).unwrap();
+    let again = results::group_to_message(message.group, &again);
+    assert_eq!(again.encode_to_vec(), written.encode_to_vec());
+    let result = JobResult { groups: vec![found], data: None, ..identification().2 };
+    let text = results_json::identification(&result);
+    serde_json::from_str::<serde_json::Value>(&text).unwrap();
+    // A row after the header; a name may have line breaks of its own.
+    assert!(results_csv::groups(&result).lines().count() > 1);
+    assert_eq!(results_csv::comparison(&result).lines().count(), 1);
 }
 
 fn check_history(block: &v1::HistoryBlock) {
@@ -231,7 +311,8 @@ fn every_seed_is_taken() {
         batch::answer_from_message(&message).unwrap();
         check_answer(&bytes);
     }
-    results::from_message(&result(), outcomes()).unwrap();
+    results::from_message(&result(), outcomes(), Vec::new()).unwrap();
+    results::group_from_message(&group(), outcomes()).unwrap();
     results::evaluation_from_message(&row(0)).unwrap();
     fetches().iter().for_each(|bytes| check_fetch(bytes));
 }
@@ -244,9 +325,8 @@ fn large_and_deep_messages_take_no_more_than_their_share() {
         job.data = Some(v1::Data { velocities: vec![-1.0; count], ..v1::Data::default() });
         check_specification(&job.encode_to_vec());
     }
-    let long = Some("x".repeat(1 << 20));
-    job.picking.as_mut().unwrap().extremum = long.clone();
-    job.solver.as_mut().unwrap().method = long;
+    job.picking.as_mut().unwrap().extremum = i32::MAX;
+    job.solver.as_mut().unwrap().method = i32::MIN;
     check_specification(&job.encode_to_vec());
     // The same fields again and again: the last ones count.
     check_specification(&specifications()[0].repeat(1000));
@@ -260,9 +340,9 @@ fn large_and_deep_messages_take_no_more_than_their_share() {
     }
     check_specification(&nested);
     check_fetch(&nested);
-    let failures = vec![v1::FailureCount { code: 1, count: u64::MAX }; 10_000];
+    let failures = vec![v1::FailureCount { kind: 1, count: u64::MAX }; 10_000];
     for failures in
-        [failures, (1..=5).map(|code| v1::FailureCount { code, count: u64::MAX }).collect()]
+        [failures, (1..=5).map(|kind| v1::FailureCount { kind, count: u64::MAX }).collect()]
     {
         let rows = vec![v1::EvaluationRow { failures, ..row(0) }];
         let part = Some(Part::History(v1::HistoryBlock { rows, groups: Vec::new() }));

@@ -1,5 +1,6 @@
-use osteon_common::job::Sampling;
-use osteon_common::results::JobResult;
+use osteon_common::inference::Conclusions;
+use osteon_common::job::{Objective, Sampling, Search};
+use osteon_common::results::{JobFailure, JobResult};
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::version::Program;
 
@@ -25,10 +26,14 @@ fn specification() -> JobSpecification {
 fn fetched(status: Status) -> Fetched {
     let result = JobResult {
         status,
+        failure: (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint),
         reason: None,
         digest: "00".to_owned(),
         best: None,
         data: None,
+        conclusions: Conclusions::default(),
+        objective: Objective::Moments,
+        search: Search::default(),
         groups: Vec::new(),
         evaluations: 0,
         realizations: 2747,
@@ -37,6 +42,7 @@ fn fetched(status: Status) -> Fetched {
         scrambles: 1,
         control_variate: false,
         solver: SolverSettings::default(),
+        nominal: None,
         picking: Picking::default(),
         program: Program::this(None),
     };

@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_common::version;
-use osteon_proto::v1::{ExpelledWorker, JobState, JobStatus, ListExpelledRequest, WorkerHello};
+use osteon_proto::v1::{
+    ExpelledWorker, JobFailureKind, JobState, JobStatus, ListExpelledRequest, WorkerHello,
+};
 use tonic::{Code, Status};
 
 use crate::api::{Api, specification};
@@ -207,8 +209,10 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
     });
     let failed = api.end(&doomed);
     assert_eq!(failed.status(), JobStatus::Failed);
+    assert_eq!(failed.failure(), JobFailureKind::LostRealization);
     for part in ["realization 33", "osteon simulate", "mandel = ["] {
-        assert!(failed.reason.contains(part), "{part} in {}", failed.reason);
+        let reason = failed.reason.as_deref().unwrap_or_default();
+        assert!(reason.contains(part), "{part} in {reason}");
     }
     assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
     service.kill();

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, mpsc};
 
 use osteon_common::job::JobKind;
 use osteon_proto::batch::Work;
-use osteon_proto::v1::JobState;
 use osteon_proto::v1::fetch_response::Part;
+use osteon_proto::v1::{JobState, ParameterValues};
 
 use crate::api::{Api, specification};
 use crate::peer::{self, Peer, hello};
@@ -89,7 +89,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     assert!(total >= once && total <= once + REALIZATIONS * KILLS as u32, "{total}");
 }
 
-fn points(part: Part) -> Vec<Vec<f64>> {
+fn points(part: Part) -> Vec<Option<ParameterValues>> {
     match part {
         Part::History(block) => block.rows.into_iter().map(|row| row.point).collect(),
         _ => Vec::new(),

@@ -104,7 +104,7 @@ fn what_is_missing_is_named() {
 #[test]
 fn a_path_without_an_evaluation_leaves_a_result() {
     let (record, _, end, _) = ended();
-    let ending = Ending { status: osteon_common::results::Status::Cancelled, reason: None };
+    let ending = Ending::of_search(osteon_common::results::Status::Cancelled, None);
     let end = EndRecord { ending, ..end };
     let mut store = MemoryStore::new();
     store.put_job(&record).unwrap();
@@ -124,41 +124,49 @@ fn with_ended() -> (MemoryStore, JobRecord, EndRecord) {
     (store, record, end)
 }
 
-#[test]
-fn a_record_is_read_at_a_time() {
-    let (mut store, _, end) = with_ended();
-    let mut reading = Reading::new(end.clone());
-    assert_eq!(reading.step(&mut store).unwrap(), None);
-    assert_eq!(reading.step(&mut store).unwrap(), None);
-    let whole = reading.step(&mut store).unwrap();
-    assert_eq!(whole, Some(read(&mut store, &end).unwrap()));
+/// What a reading that is served at once replies.
+fn served<T>(
+    store: &mut MemoryStore,
+    reading: impl FnOnce(Reply<T>) -> Reading,
+) -> Result<T, ReadError> {
+    let (reply, mut read) = oneshot::channel();
+    reading(reply).serve(store);
+    read.try_recv().unwrap()
 }
 
 #[test]
 fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
-    for steps in 0..3 {
-        let (mut store, _, end) = with_ended();
-        let mut reading = Reading::new(end);
-        for _ in 0..steps {
-            assert_eq!(reading.step(&mut store).unwrap(), None);
-        }
-        store.forget_jobs(&[JOB]).unwrap();
-        let error = reading.step(&mut store).unwrap_err();
-        assert!(matches!(error, ReadError::Pruned { job: JOB }), "after {steps}: {error}");
+    let (mut store, record, end) = with_ended();
+    assert_eq!(served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap(), record);
+    let summary = served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap();
+    let best = summary.best.unwrap();
+    let outcomes = served(&mut store, |reply| Reading::Outcomes(JOB, best, reply)).unwrap();
+    assert_eq!(outcomes.len(), 2);
+    let left = Left { end, specification: record.specification, summary };
+    assert_eq!(left.result(Some(outcomes)), read(&mut store, &left.end).unwrap().result);
+
+    store.forget_jobs(&[JOB]).unwrap();
+    let errors = [
+        served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap_err(),
+        served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap_err(),
+        served(&mut store, |reply| Reading::Outcomes(JOB, best, reply)).unwrap_err(),
+    ];
+    for error in errors {
+        assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
     }
 }
 
-/// Two fetches are asked for, then a record is to be put and the job forgotten: neither waits until
-/// all is read.
+/// Many records are to be read, then one is to be put and the job forgotten: neither waits until all are
+/// read.
 #[test]
 fn a_fetch_lets_others_have_the_store_in_between() {
-    let (mut store, record, end) = with_ended();
+    let (mut store, record, _) = with_ended();
     let (sender, mut commands) = mpsc::channel(8);
     let (events, mut done) = mpsc::channel(8);
     let mut fetches = Vec::new();
-    for _ in 0..2 {
+    for _ in 0..3 {
         let (reply, fetched) = oneshot::channel();
-        sender.try_send(Command::Fetch { end: end.clone(), reply }).unwrap();
+        sender.try_send(Command::Fetch(Reading::Summary(JOB, reply))).unwrap();
         fetches.push(fetched);
     }
     let other = JobRecord { job: JobId(2), ..record };
@@ -168,8 +176,10 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     serve(&mut store, &mut commands, &events);
     assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });
     assert!(matches!(done.try_recv().unwrap(), Event::Pruned { outcome: Ok(()), .. }));
-    for mut fetched in fetches {
-        let error = fetched.try_recv().unwrap().unwrap_err();
+    let mut read = fetches.into_iter().map(|mut fetched| fetched.try_recv().unwrap());
+    // One between the two.
+    assert!(read.next().unwrap().is_ok());
+    for error in read.map(Result::unwrap_err) {
         assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
     }
 }

@@ -7,6 +7,7 @@ use osteon_common::job::{
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::realization::Ensemble;
+use osteon_common::results::Moments;
 
 use super::*;
 

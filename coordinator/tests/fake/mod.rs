@@ -8,7 +8,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
-use osteon_common::results::{BestPoint, EstimatedError, JobResult};
+use osteon_common::results::{EstimatedError, JobResult};
 use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::effect::Record;
 use osteon_coordinator::event::{Event, Hello, Request};
@@ -167,12 +167,11 @@ pub(crate) fn left_by(
         let number = number?;
         summary.best_point(specification, number, &told[usize::try_from(number).unwrap()])
     };
-    let of_groups = summary
-        .groups
-        .iter()
-        .map(|group| best(group.best).map(|best| BestPoint { outcomes: Vec::new(), ..best }));
-    let of_groups = of_groups.collect();
-    summary.result(specification, ending, &Program::this(None), best(summary.best), of_groups)
+    let groups = summary.groups.iter().enumerate();
+    let groups =
+        groups.filter_map(|(set, group)| summary.group(specification, set, best(group.best)));
+    let groups = groups.collect();
+    summary.result(specification, ending, &Program::this(None), best(summary.best), groups)
 }
 
 /// All outcomes at one point, with the median and the largest of their estimated errors.

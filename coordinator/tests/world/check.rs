@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::results::{Evaluation, JobResult, Status};
+use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
 use osteon_coordinator::effect::Answer;
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::leftover;
@@ -52,7 +52,6 @@ impl World {
 
     pub(super) fn check_result(&mut self, record: &JobRecord, end: &EndRecord) {
         let left = leftover::read(&mut self.store, end).unwrap();
-        let reason = end.ending.reason.as_deref().unwrap_or_default();
         let seed = record.specification.monte_carlo.seed;
         let lied = self.lies.iter().any(|(_, of)| *of == seed);
         let expected = if end.ending.status == Status::Cancelled {
@@ -60,7 +59,7 @@ impl World {
             assert!(client.unwrap().cancels, "nobody cancelled");
             self.counts.cancelled += 1;
             broken_run(&record.specification, left.history.len(), &end.ending)
-        } else if reason.starts_with("integrity error") {
+        } else if end.ending.failure == Some(JobFailure::IntegrityError) {
             assert!(lied, "nobody lied");
             self.counts.exposed += 1;
             broken_run(&record.specification, left.history.len(), &end.ending)

@@ -3,7 +3,19 @@
 use proptest::prelude::*;
 
 use super::*;
-use osteon_common::parameters::Point;
+use osteon_common::inference::{
+    Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity, Solution, Solutions,
+    Spread, Spreads,
+};
+use osteon_common::job::{Prior, Sampling, SearchMethod};
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::results::{JobFailure, PointMeaning, Status};
+
+/// Any number, with both zeros, infinite ones and numbers that are too small to be normal.
+fn number() -> impl Strategy<Value = f64> {
+    use proptest::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
+    POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE
+}
 
 fn moments() -> impl Strategy<Value = Moments> {
     (1.0..1e4, 0.0..1.0)
@@ -36,7 +48,10 @@ fn point() -> impl Strategy<Value = Point> {
 prop_compose! {
     fn best()(
         point in point(),
+        meaning in proptest::option::of(proptest::sample::select(PointMeaning::ALL.to_vec())),
         cost in cost(),
+        penalty in proptest::option::of(number()),
+        below_noise_from: Option<u64>,
         velocity in proptest::option::of((moments(), moments(), any::<bool>())),
         failures in failures(),
         estimated_error in estimated_error(),
@@ -54,8 +69,11 @@ prop_compose! {
         let outcomes = vec![Ok(3900.0), Err(FailureKind::NoArrival)];
         BestPoint {
             point,
+            meaning,
             cost,
             cost_error,
+            penalty,
+            below_noise_from,
             velocity,
             failure_bias,
             kolmogorov,
@@ -66,16 +84,139 @@ prop_compose! {
     }
 }
 
+fn interval() -> impl Strategy<Value = Interval> {
+    (number(), number()).prop_map(|(low, high)| Interval { low, high })
+}
+
+prop_compose! {
+    fn data()(
+        moments in moments(),
+        count: Option<u64>,
+        intervals in proptest::option::of((interval(), interval(), 0.0..1.0)),
+    ) -> DataSummary {
+        let intervals = intervals.map(|(mean, coefficient_of_variation, level)| {
+            MomentIntervals { mean, coefficient_of_variation, level }
+        });
+        DataSummary { moments, count, intervals }
+    }
+}
+
+prop_compose! {
+    fn quantity()(
+        value in number(),
+        known in proptest::option::of((number(), number(), number(), number())),
+    ) -> Quantity {
+        let known = known.map(|(standard_error, lower, upper, free_share)| {
+            Known { standard_error, interval: [lower, upper], free_share }
+        });
+        Quantity { value, known }
+    }
+}
+
+/// One of the seven in their order, each as likely as not, but at least one.
+fn free() -> impl Strategy<Value = Vec<Parameter>> {
+    proptest::sample::subsequence(Parameter::ALL.to_vec(), 1..=7)
+}
+
+prop_compose! {
+    fn inference()(free in free())(
+        matched in any::<bool>(),
+        level in 0.0..1.0,
+        noise in (proptest::option::of(moments()), moments()),
+        slopes in proptest::collection::vec((number(), number()), free.len()),
+        fixed in proptest::collection::vec(
+            (0.0..10.0, proptest::collection::vec(number(), free.len())), 0..3),
+        undetermined in proptest::collection::vec(
+            proptest::collection::vec(number(), free.len()), 0..3),
+        bulk_velocity in quantity().boxed(),
+        dispersion in quantity().boxed(),
+        parameters in proptest::collection::vec(quantity().boxed(), free.len()),
+        free in Just(free),
+    ) -> Inference {
+        let slopes = free.iter().zip(slopes);
+        let direction = |(singular_value, components)| Direction { singular_value, components };
+        Inference {
+            matched,
+            level,
+            noise: NoiseErrors { data: noise.0, sampling: noise.1 },
+            sensitivities: slopes
+                .map(|(&parameter, (mean, coefficient_of_variation))| {
+                    Sensitivity { parameter, mean, coefficient_of_variation }
+                })
+                .collect(),
+            fixed: fixed.into_iter().map(direction).collect(),
+            undetermined,
+            bulk_velocity,
+            dispersion,
+            parameters: free.iter().copied().zip(parameters).collect(),
+            free,
+        }
+    }
+}
+
+prop_compose! {
+    fn spread()(smallest in number(), largest in number(), mean in number()) -> Spread {
+        Spread { smallest, largest, mean }
+    }
+}
+
+prop_compose! {
+    fn solutions()(
+        points in proptest::collection::vec((any::<u32>(), point(), number(), any::<u64>()), 0..4),
+        matching: u64,
+        spreads in proptest::option::of((
+            proptest::array::uniform7(spread().boxed()),
+            proptest::collection::vec((0_usize..6, 0_usize..6, spread()), 0..21),
+        )),
+    ) -> Solutions {
+        let solution =
+            |(start, point, cost, evaluations)| Solution { start, point, cost, evaluations };
+        let points = points.into_iter().map(solution).collect();
+        let spread = spreads.map(|(parameters, entries)| {
+            let upper = |(i, j, spread): (usize, usize, Spread)| (i.min(j), i.max(j), spread);
+            Spreads { parameters, entries: entries.into_iter().map(upper).collect() }
+        });
+        Solutions { points, matching, spread }
+    }
+}
+
+prop_compose! {
+    fn conclusions()(
+        inference in proptest::option::of(inference().boxed()),
+        profiles in proptest::collection::vec(
+            (0_usize..7, proptest::collection::vec((number(), number()), 0..12)), 0..7),
+        solutions in proptest::option::of(solutions().boxed()),
+    ) -> Conclusions {
+        let profiles = profiles.into_iter().map(|(parameter, pairs)| {
+            let (values, costs) = pairs.into_iter().unzip();
+            Profile { parameter: Parameter::ALL[parameter], values, costs }
+        });
+        Conclusions { inference, profiles: profiles.collect(), solutions }
+    }
+}
+
+prop_compose! {
+    fn search()(
+        method in proptest::sample::select(SearchMethod::ALL.to_vec()),
+        starts: u64,
+        sensitivities: bool,
+        priors in proptest::array::uniform7(proptest::option::of((number(), number()))),
+    ) -> Search {
+        let priors = priors.map(|prior| prior.map(|(value, weight)| Prior { value, weight }));
+        Search { starts, sensitivities, priors, ..Search::by(method) }
+    }
+}
+
 prop_compose! {
     fn group()(
         name in "[a-zβ ]{0,9}",
         status in 0..Status::ALL.len(),
         reason in proptest::option::of("[a-z ]{1,20}"),
-        best in proptest::option::of(best()),
-        data in moments(),
+        best in proptest::option::of(best().boxed()),
+        data in data().boxed(),
+        conclusions in conclusions().boxed(),
     ) -> GroupResult {
-        let best = best.map(|best| BestPoint { outcomes: Vec::new(), ..best });
-        GroupResult { name, status: Status::ALL[status], reason, best, data }
+        GroupResult { name, status: Status::ALL[status], reason, best, data, conclusions }
     }
 }
 
@@ -83,12 +224,13 @@ prop_compose! {
     fn result()(
         status in 0..Status::ALL.len(),
         reason in proptest::option::of("[a-z ]{1,20}"),
-        best in proptest::option::of(best()),
-        data in proptest::option::of(moments()),
-        groups in proptest::collection::vec(group(), 0..3),
-        evaluations: u64,
-        realizations: u64,
-        seed: u64,
+        best in proptest::option::of(best().boxed()),
+        failure in proptest::option::of(proptest::sample::select(JobFailure::ALL.to_vec())),
+        data in proptest::option::of(data().boxed()),
+        conclusions in conclusions().boxed(),
+        groups in proptest::collection::vec(group().boxed(), 0..3),
+        search in search().boxed(),
+        counts in proptest::array::uniform3(any::<u64>()),
         sampling in 0..Sampling::ALL.len(),
         scrambles in 1..=SCRAMBLES_MAX,
         control_variate: bool,
@@ -97,18 +239,23 @@ prop_compose! {
     ) -> JobResult {
         JobResult {
             status: Status::ALL[status],
+            failure,
             reason,
             digest: "0123456789abcdef".repeat(4),
             best,
             data,
+            conclusions,
             groups,
-            evaluations,
-            realizations,
-            seed,
+            objective: Objective::ALL[usize::from(control_variate)],
+            search,
+            evaluations: counts[0],
+            realizations: counts[1],
+            seed: counts[2],
             sampling: Sampling::ALL[sampling],
             scrambles,
             control_variate,
             solver: SolverSettings::default(),
+            nominal: control_variate.then_some(NominalSampling { band: 2e6, period: 1e-4, pairs: 7 }),
             picking: Picking::default(),
             program: Program { version: "0.1.0".to_owned(), numerics, commit },
         }
@@ -117,10 +264,21 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn results_survive_the_wire(result in result()) {
+    fn results_survive_the_wire(result in result().boxed()) {
         let outcomes = result.best.as_ref().map(|best| best.outcomes.clone());
         let message = to_message(&result);
-        prop_assert_eq!(from_message(&message, outcomes.unwrap_or_default()), Ok(result));
+        let read = from_message(&message, outcomes.unwrap_or_default(), result.groups.clone());
+        // Zeros keep their signs, too.
+        prop_assert_eq!(format!("{:?}", read.as_ref().ok()), format!("{:?}", Some(&result)));
+        prop_assert_eq!(read, Ok(result));
+    }
+
+    #[test]
+    fn groups_survive_the_wire(number: u32, group in group().boxed()) {
+        let outcomes = group.best.as_ref().map(|best| best.outcomes.clone());
+        let message = group_to_message(number, &group);
+        prop_assert_eq!(message.group, number);
+        prop_assert_eq!(group_from_message(&message, outcomes.unwrap_or_default()), Ok(group));
     }
 
     #[test]
@@ -145,34 +303,124 @@ proptest! {
 
 #[test]
 fn what_no_coordinator_writes_is_refused() {
-    assert_eq!(status_from_message(9), Err(Malformed::UnknownValue { field: "status", value: 9 }));
-    assert_eq!(kind_from_message(0), Err(Malformed::UnknownValue { field: "kind", value: 0 }));
-    let twice = [v1::FailureCount { code: 1, count: 1 }, v1::FailureCount { code: 1, count: 2 }];
-    assert_eq!(
-        failures_from_message(&twice),
-        Err(Malformed::UnknownValue { field: "code", value: 1 })
-    );
+    let twice = [v1::FailureCount { kind: 1, count: 1 }, v1::FailureCount { kind: 1, count: 2 }];
+    let of_kind = |value| Err(Malformed::UnknownValue { field: "kind", value });
+    assert_eq!(failures_from_message(&twice), of_kind(1));
+    assert_eq!(failures_from_message(&[v1::FailureCount { kind: 6, count: 1 }]), of_kind(6));
     for median in [-1e-9, f64::NAN, f64::INFINITY] {
         let errors = v1::EstimatedError { median, largest: 1.0 };
         assert!(errors_from_message(errors).is_err(), "{median}");
     }
-    let sampling = |name: &str, scrambles| {
-        let sampling = name.to_owned();
-        sampling_from_message(&v1::JobResult { sampling, scrambles, ..Default::default() })
-    };
-    assert_eq!(sampling("", 0), Ok((Sampling::MonteCarlo, 1)));
-    assert_eq!(sampling("sobol", SCRAMBLES_MAX), Ok((Sampling::Sobol, SCRAMBLES_MAX)));
-    assert_eq!(sampling("dice", 1), Err(Malformed::UnknownName { field: "sampling" }));
-    assert!(sampling("sobol", SCRAMBLES_MAX + 1).is_err());
-    let unknown = [v1::FailureCount { code: 6, count: 1 }];
-    assert!(failures_from_message(&unknown).is_err());
-    let many = |count| failures_from_message(&[v1::FailureCount { code: 1, count }]);
+    assert_eq!(scrambles(SCRAMBLES_MAX), Ok(SCRAMBLES_MAX));
+    assert!(scrambles(0).is_err() && scrambles(SCRAMBLES_MAX + 1).is_err());
+    let many = |count| failures_from_message(&[v1::FailureCount { kind: 1, count }]);
     assert_eq!(many(REALIZATIONS_MAX).unwrap().total(), REALIZATIONS_MAX);
     assert!(many(REALIZATIONS_MAX + 1).is_err());
     assert_eq!(
-        from_message(&v1::JobResult::default(), vec![]),
-        Err(Malformed::Missing { field: "solver" })
+        from_message(&v1::JobResult::default(), vec![], vec![]),
+        Err(Malformed::Missing { field: "objective" })
     );
+}
+
+/// A result of an identification with everything there can be.
+fn complete() -> v1::JobResult {
+    let spread = Spread { smallest: 1.0, largest: 3.0, mean: 2.0 };
+    let quantity = Quantity {
+        value: 1.0,
+        known: Some(Known { standard_error: 0.1, interval: [0.8, 1.2], free_share: 0.0 }),
+    };
+    let free = vec![Parameter::Density];
+    let moments = Moments { mean: 1.0, coefficient_of_variation: 0.1 };
+    let conclusions = Conclusions {
+        inference: Some(Inference {
+            matched: true,
+            level: 0.95,
+            noise: NoiseErrors { data: None, sampling: moments },
+            sensitivities: vec![Sensitivity {
+                parameter: Parameter::Density,
+                mean: -0.5,
+                coefficient_of_variation: 0.0,
+            }],
+            fixed: vec![Direction { singular_value: 0.2, components: vec![1.0] }],
+            undetermined: Vec::new(),
+            bulk_velocity: quantity,
+            dispersion: quantity,
+            parameters: vec![(Parameter::Density, quantity)],
+            free,
+        }),
+        profiles: vec![Profile {
+            parameter: Parameter::Density,
+            values: vec![1.0, 2.0],
+            costs: vec![0.0, 1.0],
+        }],
+        solutions: Some(Solutions {
+            points: Vec::new(),
+            matching: 1,
+            spread: Some(Spreads { parameters: [spread; 7], entries: vec![(0, 5, spread)] }),
+        }),
+    };
+    to_message(&JobResult {
+        status: Status::Converged,
+        failure: None,
+        reason: None,
+        digest: String::new(),
+        best: None,
+        data: None,
+        conclusions,
+        groups: Vec::new(),
+        objective: Objective::Moments,
+        search: Search::default(),
+        evaluations: 1,
+        realizations: 1,
+        seed: 1,
+        sampling: Sampling::MonteCarlo,
+        scrambles: 1,
+        control_variate: false,
+        solver: SolverSettings::default(),
+        nominal: None,
+        picking: Picking::default(),
+        version: String::new(),
+    })
+}
+
+#[test]
+fn conclusions_with_a_part_missing_are_refused() {
+    let refused = |change: fn(&mut v1::JobResult)| {
+        let mut message = complete();
+        from_message(&message, vec![], vec![]).unwrap();
+        change(&mut message);
+        match from_message(&message, vec![], vec![]).unwrap_err() {
+            Malformed::Missing { field }
+            | Malformed::WrongLength { field, .. }
+            | Malformed::UnknownValue { field, .. }
+            | Malformed::OutOfRange { field, .. } => field,
+            other => panic!("{other}"),
+        }
+    };
+    fn identified(message: &mut v1::JobResult) -> &mut v1::Identified {
+        message.identified.as_mut().unwrap()
+    }
+    fn solutions(message: &mut v1::JobResult) -> &mut v1::Solutions {
+        message.solutions.as_mut().unwrap()
+    }
+    assert_eq!(refused(|m| m.status = 0), "status");
+    assert_eq!(refused(|m| m.failure = 99), "failure");
+    assert_eq!(refused(|m| m.sensitivities[0].mean = None), "mean");
+    assert_eq!(refused(|m| m.sensitivities[0].parameter = 0), "parameter");
+    // A component of a parameter that nothing else says is free.
+    assert_eq!(refused(|m| m.sensitivities[0].parameter = 7), "dispersion");
+    assert_eq!(refused(|m| identified(m).bulk_velocity = None), "bulk_velocity");
+    assert_eq!(refused(|m| identified(m).sampling_noise = None), "sampling_noise");
+    let of_interval =
+        |m: &mut v1::JobResult| identified(m).dispersion.as_mut().unwrap().interval = None;
+    assert_eq!(refused(of_interval), "interval");
+    assert_eq!(refused(|m| identified(m).directions[0].components = None), "components");
+    assert_eq!(refused(|m| m.profiles[0].costs.truncate(1)), "costs");
+    assert_eq!(refused(|m| solutions(m).parameters.truncate(6)), "parameters");
+    assert_eq!(refused(|m| solutions(m).parameters.swap(0, 1)), "parameters");
+    assert_eq!(refused(|m| solutions(m).mandel[0].row = 7), "row");
+    assert_eq!(refused(|m| solutions(m).mandel[0].column = 0), "column");
+    assert_eq!(refused(|m| solutions(m).mandel[0].spread = None), "spread");
 }
 
 #[test]
@@ -183,7 +431,8 @@ fn the_ending_of_a_group_survives() {
     assert_eq!(group_ending_from_message(&message), Ok(ending));
     let missing = v1::GroupEnding { status: 0, ..message };
     assert_eq!(group_ending_from_message(&missing), Err(Malformed::Missing { field: "status" }));
-    let row = v1::EvaluationRow { point: vec![1.0; 7], varied: 8, ..v1::EvaluationRow::default() };
+    let point = Some(point_to_message(&Point([1.0; 7])));
+    let row = v1::EvaluationRow { point, varied: Some(8), ..v1::EvaluationRow::default() };
     assert_eq!(
         evaluation_from_message(&row),
         Err(Malformed::UnknownValue { field: "varied", value: 8 })

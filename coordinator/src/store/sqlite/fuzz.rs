@@ -45,7 +45,7 @@ fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     columns[column] = damage.to_vec();
     let [point, outcomes, errors, workers] = &columns;
     // No checksum is over what is no text.
-    let text = std::str::from_utf8(workers).ok();
+    let text = std::str::from_utf8(workers).unwrap_or_default();
     let checksum = evaluation_checksum(JOB, 2, point, outcomes, Some(errors), text);
     let sql = "UPDATE evaluation SET point = ?1, outcomes = ?2, estimated_error = ?3,
                workers = CAST(?4 AS TEXT), checksum = ?5 WHERE job = 1 AND number = 2";
