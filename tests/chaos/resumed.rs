@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, mpsc};
 
 use osteon_common::job::JobKind;
 use osteon_proto::batch::Work;
+use osteon_proto::parameter_values::point_to_message;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{JobState, ParameterValues};
 
@@ -73,13 +74,14 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     assert_eq!(api.end(&id).digest, digest);
     runtime.shutdown_background();
 
-    let points: Vec<Vec<f64>> = api.parts(&id).into_iter().flat_map(points).collect();
+    let points: Vec<Option<ParameterValues>> =
+        api.parts(&id).into_iter().flat_map(points).collect();
     // Two more measure derivatives.
     let evaluations = EVALUATIONS + 2;
     assert_eq!(points.len(), evaluations as usize);
     let computed = computed.lock().unwrap();
     for (life, work) in computed.iter().filter(|(life, _)| *life > 0) {
-        let number = points.iter().position(|point| *point == work.point.0).unwrap();
+        let number = points.iter().position(|point| *point == Some(point_to_message(&work.point))).unwrap();
         let known = stored[life - 1];
         assert!(number >= known, "seed {SEED}: {number} of {known} stored again in life {life}");
     }

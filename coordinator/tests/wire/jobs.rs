@@ -1,0 +1,38 @@
+//! Identifications with all that a result may have.
+
+use osteon_common::job::{Data, Group, JobSpecification, Objective, Prior, Search};
+
+use crate::fake;
+
+/// Velocities around a mean (m/s), evenly over a width (m/s).
+fn velocities(mean: f64, width: f64, count: u32) -> Vec<f64> {
+    (0..count).map(|k| mean + width * (f64::from(k) / f64::from(count - 1) - 0.5)).collect()
+}
+
+/// The name of each, and what is to be computed.
+pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
+    let plain = fake::identification(300, 60, 7);
+    let search = Search { sensitivities: true, ..plain.search };
+    let measured = Data::Velocities(velocities(3900.0, 360.0, 40));
+    let group = |name: &str, mean, width| Group {
+        name: name.to_owned(),
+        velocities: velocities(mean, width, 25),
+    };
+    let groups = vec![group("left", 3900.0, 360.0), group("right, \"distal\"", 3800.0, 420.0)];
+    let mut priors = [None; 7];
+    priors[0] = Some(Prior { value: 1650.0, weight: 1e-3 });
+    let several = JobSpecification {
+        data: Some(measured.clone()),
+        search: Search { starts: 3, ..search },
+        ..plain.clone()
+    };
+    let likelihood = JobSpecification {
+        data: Some(measured),
+        objective: Objective::Likelihood,
+        search,
+        ..plain.clone()
+    };
+    let drawn = JobSpecification { search: Search { priors, ..search }, ..plain.clone() };
+    let grouped = JobSpecification { data: Some(Data::Groups(groups)), search, ..plain };
+    [("several", several), ("likelihood", likelihood), ("drawn", drawn), ("grouped", grouped)]
+}
