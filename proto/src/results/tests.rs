@@ -379,7 +379,7 @@ fn complete() -> v1::JobResult {
         solver: SolverSettings::default(),
         nominal: None,
         picking: Picking::default(),
-        version: String::new(),
+        program: Program::this(None),
     })
 }
 
