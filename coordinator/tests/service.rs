@@ -4,6 +4,7 @@
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
+mod wire;
 
 use std::time::Duration;
 
@@ -128,6 +129,7 @@ async fn check_leftover(
             Part::Specification(_) => panic!("a second specification"),
             Part::Result(message) => result = Some(message),
             Part::History(block) => rows += block.rows.len() as u64,
+            Part::Group(_) => panic!("the result of a group"),
             Part::Realizations(block) => {
                 let (first, block) = realizations::from_message(block).unwrap();
                 assert_eq!(first, outcomes.len() as u64);
@@ -135,7 +137,7 @@ async fn check_leftover(
             }
         }
     }
-    let result = results::from_message(result.unwrap(), outcomes).unwrap();
+    let result = results::from_message(result.unwrap(), outcomes, Vec::new()).unwrap();
     assert_eq!(result, fake::plain_run(expected));
     assert_eq!(rows, result.evaluations);
 }

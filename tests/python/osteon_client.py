@@ -40,6 +40,38 @@ def propagation(realizations, seed):
     )
 
 
+def identification(groups, realizations, seed):
+    """Stiffness along the bone and dispersion of each group of velocities, m/s, by its name."""
+
+    def fixed(value):
+        return specification_pb2.ParameterRange(fixed=value)
+
+    def free(start, lower, upper):
+        between = specification_pb2.FreeRange(start=start, lower=lower, upper=upper)
+        return specification_pb2.ParameterRange(free=between)
+
+    return specification_pb2.JobSpecification(
+        kind=specification_pb2.JOB_KIND_IDENTIFICATION,
+        data=specification_pb2.Data(
+            groups=[
+                specification_pb2.VelocityGroup(name=name, velocities=velocities)
+                for name, velocities in groups.items()
+            ]
+        ),
+        parameters=specification_pb2.Parameters(
+            density=fixed(1598.8),
+            longitudinal_young_modulus=free(18e9, lower=12e9, upper=25e9),
+            longitudinal_poisson_ratio=fixed(0.3816),
+            longitudinal_shear_modulus=fixed(4.795e9),
+            transverse_young_modulus=fixed(9.8254e9),
+            transverse_poisson_ratio=fixed(0.4495),
+            dispersion=free(0.1, lower=0.02, upper=0.3),
+        ),
+        monte_carlo=specification_pb2.MonteCarlo(realizations=realizations, seed=seed),
+        search=specification_pb2.Search(method=specification_pb2.SEARCH_METHOD_NEWTON),
+    )
+
+
 def submit(jobs, specification, request_id):
     """Submits a job; its identifier. The same `request_id` again gives the same job."""
     request = jobs_pb2.SubmitRequest(specification=specification, request_id=request_id)
@@ -65,17 +97,37 @@ def watch(jobs, job, show, patience=10.0):
 
 
 def fetch(jobs, job):
-    """The result of an ended job, and the velocities at its best point, m/s, NaN on failure."""
-    result, velocities = None, array.array("d")
+    """The result of an ended job, those of its groups in their order, and the velocities at the best
+    points, m/s, NaN on failure: by the number of the group, None where there are no groups."""
+    result, groups, velocities = None, [], {}
     for response in jobs.Fetch(jobs_pb2.FetchRequest(job=job)):
         part = response.WhichOneof("part")
         if part == "result":
             result = response.result
+        elif part == "group":
+            groups.append(response.group)
         elif part == "realizations":
             block = response.realizations
+            group = block.group if block.HasField("group") else None
+            of_point = velocities.setdefault(group, array.array("d"))
             for code, velocity in zip(block.codes, block.velocities):
-                velocities.append(velocity if code == 0 else float("nan"))
-    return result, velocities
+                of_point.append(velocity if code == 0 else float("nan"))
+    return result, groups, velocities
+
+
+def known(found):
+    """What the data of a result or of a group fix, by name: value, and both ends of its interval."""
+    quantities = {
+        "bulk_velocity": found.identified.bulk_velocity,
+        "dispersion": found.identified.dispersion,
+    }
+    for one in found.identified.parameters:
+        quantities[specification_pb2.Parameter.Name(one.parameter)] = one.quantity
+    return {
+        name: (quantity.value, quantity.interval.lower, quantity.interval.upper)
+        for name, quantity in quantities.items()
+        if quantity.HasField("interval")
+    }
 
 
 def every_job(jobs, page_size=100):

@@ -12,8 +12,18 @@ from grpc_reflection.v1alpha.proto_reflection_descriptor_database import (
     ProtoReflectionDescriptorDatabase,
 )
 
-from osteon.v1 import jobs_pb2, jobs_pb2_grpc, specification_pb2
-from osteon_client import details, every_job, fetch, propagation, submit, violations, watch
+from osteon.v1 import jobs_pb2, jobs_pb2_grpc, results_pb2, specification_pb2
+from osteon_client import (
+    details,
+    every_job,
+    fetch,
+    identification,
+    known,
+    propagation,
+    submit,
+    violations,
+    watch,
+)
 from service import Service, osteon
 
 # Of anything that must come, s.
@@ -31,6 +41,23 @@ dispersion                 = { fixed = 0.1029 }
 [monte_carlo]
 realizations = 60
 seed = 7
+"""
+
+
+GROUPS_JOB_FILE = """
+[parameters]
+density                    = { fixed = 1598.8 }
+longitudinal_young_modulus = { start = 18e9, bounds = [12e9, 25e9] }
+longitudinal_poisson_ratio = { fixed = 0.3816 }
+longitudinal_shear_modulus = { fixed = 4.795e9 }
+transverse_young_modulus   = { fixed = 9.8254e9 }
+transverse_poisson_ratio   = { fixed = 0.4495 }
+dispersion                 = { start = 0.1, bounds = [0.02, 0.3] }
+[monte_carlo]
+realizations = 60
+seed = 7
+[search]
+method = "newton"
 """
 
 
@@ -61,9 +88,11 @@ class Computing(unittest.TestCase):
         seen = []
         last = watch(jobs, job, seen.append)
         self.assertEqual(last.state, jobs_pb2.JOB_STATE_ENDED)
-        self.assertEqual(last.status, jobs_pb2.JOB_STATUS_CONVERGED)
+        self.assertEqual(last.status, results_pb2.JOB_STATUS_CONVERGED)
         self.assertIs(last, seen[-1])
-        result, velocities = fetch(jobs, job)
+        result, groups, velocities = fetch(jobs, job)
+        self.assertEqual((len(groups), list(velocities)), (0, [None]))
+        velocities = velocities[None]
 
         file = service.directory / "job.toml"
         file.write_text(JOB_FILE)
@@ -79,12 +108,56 @@ class Computing(unittest.TestCase):
         self.assertAlmostEqual(mean / result.best.velocity.moments.mean, 1.0, delta=1e-12)
 
 
+    def test_groups_are_identified_with_their_uncertainty(self):
+        service = Service()
+        self.addCleanup(service.stop)
+        service.worker()
+        jobs = service.jobs("submit")
+        data = {"left": spread(3900.0, 360.0), "right": spread(3850.0, 400.0)}
+        job = submit(jobs, identification(data, 60, seed=7), "")
+        last = watch(jobs, job, lambda snapshot: None)
+        self.assertEqual(last.status, results_pb2.JOB_STATUS_CONVERGED, last.reason)
+        result, groups, velocities = fetch(jobs, job)
+        self.assertFalse(result.HasField("best") or result.HasField("identified"))
+        self.assertEqual([group.name for group in groups], list(data))
+
+        # The same by osteon itself.
+        file = service.directory / "groups.toml"
+        lists = [f"{name} = {values}\n" for name, values in data.items()]
+        file.write_text("[data.groups]\n" + "".join(lists) + GROUPS_JOB_FILE)
+        expected = json.loads(osteon("identify", file, "--json"))
+        self.assertEqual(result.digest, expected["digest"])
+        for number, (group, wanted) in enumerate(zip(groups, expected["groups"], strict=True)):
+            found = known(group)
+            identified = wanted["identified"]
+            for name in ["bulk_velocity", "dispersion"]:
+                value, lower, upper = found[name]
+                self.assertEqual(value, identified[name]["value"])
+                self.assertEqual([lower, upper], identified[name]["interval"])
+                self.assertLess(lower, value)
+                self.assertLess(value, upper)
+            young = identified["parameters"]["longitudinal_young_modulus"]
+            value, lower, upper = found["PARAMETER_LONGITUDINAL_YOUNG_MODULUS"]
+            self.assertEqual([lower, upper], young["interval"])
+            self.assertEqual(group.data.count, 25)
+            self.assertEqual(group.data.intervals.mean.lower, wanted["data"]["interval"]["mean"][0])
+            self.assertEqual(len(velocities[number]), 60)
+            successes = [velocity for velocity in velocities[number] if not math.isnan(velocity)]
+            mean = statistics.fmean(successes)
+            self.assertAlmostEqual(mean / group.best.velocity.moments.mean, 1.0, delta=1e-12)
+
+
+def spread(mean, width, count=25):
+    """So many velocities, m/s, evenly over a width."""
+    return [mean + width * (k / (count - 1) - 0.5) for k in range(count)]
+
+
 class Refusals(WithService):
     def test_a_wrong_specification_is_refused_whole_with_every_field(self):
         wrong = propagation(0, seed=7)
         wrong.layers.coupling.density = -1.0
         wrong.probe.receivers.count = 2
-        wrong.solver.method = "magic"
+        wrong.solver.method = 17
         jobs = self.service.jobs("submit")
         error = self.refused(grpc.StatusCode.INVALID_ARGUMENT, submit, jobs, wrong, "")
         found = violations(error)
@@ -99,6 +172,14 @@ class Refusals(WithService):
         )
         self.assertIn("-1", found["layers.coupling.density"])
         self.assertIn("3 to 64", found["probe.receivers.count"])
+        self.assertIn("SOLVER_METHOD_EXACT or SOLVER_METHOD_HYBRID", found["solver.method"])
+        wrong = propagation(60, seed=7)
+        wrong.parameters.ClearField("density")
+        wrong.parameters.dispersion.free.start = 0.1
+        error = self.refused(grpc.StatusCode.INVALID_ARGUMENT, submit, jobs, wrong, "")
+        found = violations(error)
+        self.assertEqual(sorted(found), ["parameters.density", "parameters.dispersion.free"])
+        self.assertIn("`free` with `start`, `lower` and `upper`", found["parameters.density"])
 
     def test_a_wrong_request_is_refused_with_its_field(self):
         jobs = self.service.jobs("submit")
@@ -170,9 +251,9 @@ class Waiting(WithService):
         self.refused(code, fetch, self.jobs, self.job)
         for _ in range(2):
             snapshot = self.jobs.Cancel(jobs_pb2.CancelRequest(job=self.job)).snapshot
-            self.assertEqual(snapshot.status, jobs_pb2.JOB_STATUS_CANCELLED)
+            self.assertEqual(snapshot.status, results_pb2.JOB_STATUS_CANCELLED)
         last = watch(self.jobs, self.job, lambda snapshot: None)
-        self.assertEqual(last.status, jobs_pb2.JOB_STATUS_CANCELLED)
+        self.assertEqual(last.status, results_pb2.JOB_STATUS_CANCELLED)
 
     def test_a_stream_that_is_taken_up_again_repeats_nothing(self):
         first = next(self.jobs.Watch(jobs_pb2.WatchRequest(job=self.job), timeout=DEADLINE)).snapshot

@@ -1,0 +1,120 @@
+//! What a client that knows nothing but the wire gets of an identification.
+
+use osteon_common::outcome::Outcome;
+use osteon_common::results::JobResult;
+use osteon_common::{results_csv, results_json};
+use osteon_proto::v1::{GroupResult, HistoryBlock, JobResult as ResultMessage};
+
+use super::*;
+
+mod jobs;
+
+/// The parts of a fetch, in their order.
+struct Parts {
+    result: ResultMessage,
+    history: Vec<HistoryBlock>,
+    groups: Vec<GroupResult>,
+    /// By the number of their group.
+    realizations: Vec<(Option<u32>, Vec<Outcome>)>,
+}
+
+/// Runs a job, and fetches it.
+async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut client = client(&coordinator).await;
+    let worker = tokio::spawn(work(channel(&coordinator).await, usize::MAX));
+    let id = submit(&mut client, job, "").await.unwrap();
+    watch(&mut client, &id).await;
+    let mut parts = fetch(&mut client, &id).await.unwrap().into_iter();
+    coordinator.shutdown().await;
+    worker.await.unwrap().unwrap_err();
+    assert!(matches!(parts.next(), Some(Part::Specification(_))));
+    let Some(Part::Result(result)) = parts.next() else { panic!("no result") };
+    let (history, groups, realizations) = (Vec::new(), Vec::new(), Vec::new());
+    let mut left = Parts { result, history, groups, realizations };
+    for part in parts {
+        match part {
+            Part::History(block) => left.history.push(block),
+            Part::Group(group) => left.groups.push(group),
+            Part::Realizations(block) => {
+                let (_, outcomes) = realizations::from_message(&block).unwrap();
+                left.realizations.push((block.group, outcomes));
+            }
+            Part::Specification(_) | Part::Result(_) => panic!("two of one kind"),
+        }
+    }
+    left
+}
+
+/// The result that a client makes of the parts.
+fn result(parts: &Parts) -> JobResult {
+    let of = |group: Option<u32>| {
+        let found = parts.realizations.iter().find(|(of, _)| *of == group);
+        found.map(|(_, outcomes)| outcomes.clone()).unwrap_or_default()
+    };
+    let groups = parts
+        .groups
+        .iter()
+        .map(|group| results::group_from_message(group, of(Some(group.group))).unwrap());
+    results::from_message(&parts.result, of(None), groups.collect()).unwrap()
+}
+
+/// The files are those that clients used to compute by themselves from evaluations and data.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_result_needs_no_more_than_the_wire() {
+    for (name, job) in jobs::jobs() {
+        let result = result(&fetched(&job).await);
+        let expected = match name {
+            "several" => include_str!("several.json"),
+            "likelihood" => include_str!("likelihood.json"),
+            "drawn" => include_str!("drawn.json"),
+            "grouped" => include_str!("grouped.json"),
+            other => panic!("{other} has no file"),
+        };
+        assert_eq!(results_json::identification(&result), expected, "{name}");
+        if name == "grouped" {
+            let tables = results_csv::groups(&result) + &results_csv::comparison(&result);
+            assert_eq!(tables, include_str!("grouped.csv"));
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn messages_hold_the_uncertainty() {
+    let [(_, several), .., (_, grouped)] = jobs::jobs();
+    let Parts { result, history, realizations, .. } = fetched(&several).await;
+    assert_eq!(result.sensitivities.len(), 7);
+    let identified = result.identified.unwrap();
+    let bulk = identified.bulk_velocity.unwrap();
+    let interval = bulk.interval.unwrap();
+    assert!(interval.lower < bulk.value && bulk.value < interval.upper, "{bulk:?}");
+    assert!(bulk.standard_error.unwrap() > 0.0);
+    assert_eq!((identified.directions.len(), identified.free_directions.len()), (2, 5));
+    assert_eq!(result.profiles.len(), 7);
+    let solutions = result.solutions.unwrap();
+    assert_eq!((solutions.points.len(), solutions.mandel.len()), (3, 21));
+    let data = result.data.unwrap();
+    assert_eq!(data.count, Some(40));
+    let of_mean = data.intervals.unwrap().mean.unwrap();
+    assert!(of_mean.lower < Some(3900.0) && Some(3900.0) < of_mean.upper, "{of_mean:?}");
+    let best = result.best.unwrap();
+    assert_ne!(best.meaning(), osteon_proto::v1::PointMeaning::Unspecified);
+    let varied = history.iter().flat_map(|block| &block.rows).filter(|row| row.varied.is_some());
+    assert_eq!(varied.count(), 7);
+    assert!(realizations.iter().all(|(group, outcomes)| group.is_none() && outcomes.len() == 300));
+
+    let Parts { result, groups, realizations, .. } = fetched(&grouped).await;
+    assert!(result.best.is_none() && result.data.is_none() && result.identified.is_none());
+    let names: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names, ["left", "right, \"distal\""]);
+    let whose: Vec<Option<u32>> = realizations.iter().map(|(group, _)| *group).collect();
+    assert_eq!(whose, [Some(0), Some(1)]);
+    for (group, (_, outcomes)) in groups.iter().zip(&realizations) {
+        assert!(group.identified.as_ref().unwrap().dispersion.unwrap().interval.is_some());
+        let velocities: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.ok()).collect();
+        let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
+        let found = group.best.as_ref().unwrap().velocity.unwrap().moments.unwrap().mean;
+        // Both sum in double precision, in another order.
+        assert!((mean / found - 1.0).abs() < 1e-12, "{mean}, {found}");
+    }
+}
