@@ -38,10 +38,14 @@ fn known(name: &str, modulus: f64) -> Value {
 fn a_table_of_groups_shows_intervals_and_reasons() {
     let mut outlier = known("P02", 2.5e10);
     outlier["reason"] = json!("settled at a cost of 7.644e-1, above cost_tolerance 1e-12");
-    let nothing = json!({ "value": 4256.31, "interval": null });
-    outlier["identified"] = json!({
-        "matched": false, "bulk_velocity": nothing, "dispersion": nothing, "parameters": {},
+    let unknown = |value: f64| json!({ "value": value, "interval": null });
+    let nothing = json!({
+        "matched": false,
+        "bulk_velocity": unknown(4256.31),
+        "dispersion": unknown(0.3),
+        "parameters": { "longitudinal_young_modulus": null, "dispersion": null },
     });
+    outlier["identified"] = nothing.clone();
     let lonely = json!({
         "name": "P03",
         "status": "failed",
@@ -50,7 +54,7 @@ fn a_table_of_groups_shows_intervals_and_reasons() {
         "data": { "mean": 3911.5, "coefficient_of_variation": 0.0, "interval": null, "count": 1 },
     });
     let mut unmatched = known("P04", 2e10);
-    unmatched["identified"]["matched"] = json!(false);
+    unmatched["identified"] = nothing;
     insta::assert_snapshot!(table(&[known("P01", 1.7717e10), outlier, lonely, unmatched]));
 }
 
