@@ -1,7 +1,5 @@
 //! Every help text, as a user sees it.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
-
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;

@@ -1,7 +1,7 @@
 //! What other programs read: the keys of every JSON file and the columns of every table, their order
 //! and their types. A change here is one of the result schema.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
