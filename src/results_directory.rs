@@ -11,7 +11,6 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
-use osteon_common::document::Format;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
 use osteon_common::results::{GroupResult, JobResult, Status};
@@ -242,14 +241,7 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 
 /// Refuses a directory whose job is not `specification`, and says where they differ.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    // A version that did not know a key did what is its default.
-    let directory = path.parent().unwrap_or(Path::new(""));
-    // Only that of an identification has data.
-    let complete = [JobKind::Identification, JobKind::Propagation]
-        .into_iter()
-        .find_map(|kind| job_file::parse(stored, Format::Toml, directory, kind).ok())
-        .map_or_else(|| stored.to_owned(), |there| job_file::to_toml(&there));
-    match difference(&complete, &job_file::to_toml(specification)) {
+    match difference(stored, &job_file::to_toml(specification)) {
         None => Ok(()),
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \

@@ -21,7 +21,7 @@ fn nothing_is_said_before_it_is_durable() {
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
     let fetch = || request(8, Request::Fetch(JobId(1)));
-    rig.check(fetch(), &["answer 8: job 1 has not ended; wait for it with `osteon watch 1`"]);
+    rig.check(fetch(), &["answer 8: job 1 has not ended"]);
     rig.check(stored(1, RecordKey::End), &["publish 1"]);
     rig.check(fetch(), &["answer 8: ended 1"]);
     assert!(rig.state.is_idle());
@@ -119,7 +119,7 @@ fn an_end_that_is_not_durable_is_none() {
         rig.check(store_failed(1, RecordKey::End), &[]);
         rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     }
-    let refusal = "answer 8: job 1 has not ended; wait for it with `osteon watch 1`";
+    let refusal = "answer 8: job 1 has not ended";
     rig.check(request(8, Request::Fetch(JobId(1))), &[refusal]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
