@@ -6,9 +6,11 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use osteon_proto::endpoint::Endpoint;
 
+use crate::program;
+
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
-#[command(name = "osteon", version, max_term_width = 80)]
+#[command(name = "osteon", version = program::version_line(), max_term_width = 80)]
 pub(crate) struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -86,7 +88,8 @@ pub(crate) struct RunArguments {
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
     pub(crate) case: PathBuf,
-    /// Write the pressure traces here, as traces.csv (by the exact method, whatever the case asks for)
+    /// Write the case, the result and the pressure traces here (traces.csv, by the exact method,
+    /// whatever the case asks for); a directory belongs to one case
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
@@ -114,6 +117,9 @@ pub(crate) struct DrawArguments {
     /// Draw at the best point of DIR/result.json instead of the fixed/start point
     #[arg(long, value_name = "DIR")]
     pub(crate) at: Option<PathBuf>,
+    /// With --at: draw at the best point of this group of the data
+    #[arg(long, value_name = "NAME", requires = "at")]
+    pub(crate) group: Option<String>,
 }
 
 /// Of `coordinator`.

@@ -17,6 +17,7 @@ use tempfile::TempDir;
 
 use crate::embedded::workers::Workers;
 use crate::ending::Failure;
+use crate::program;
 
 /// Longest directory of temporary files that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;
@@ -92,7 +93,7 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
         }
     };
     let store_patience = Some(Duration::from_secs(STORE_PATIENCE_S));
-    let config = Config { store_patience, ..Config::default() };
+    let config = Config { store_patience, commit: program::COMMIT, ..Config::default() };
     osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
 }
 

@@ -15,11 +15,15 @@ mod fuzz;
 mod instruction_set;
 mod new_files;
 mod output;
+mod program;
 mod progress;
 mod request;
 mod resolved;
+mod result_files;
 mod results_directory;
 mod signals;
+mod simulation_directory;
+mod unsearched_groups;
 mod verdict;
 mod warnings;
 

@@ -1,6 +1,6 @@
 //! What goes to stdout: one trait, one implementation for people and one for programs.
 
-mod json;
+pub(crate) mod json;
 mod text;
 
 use std::io::{self, Write};

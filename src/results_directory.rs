@@ -6,23 +6,26 @@
 //! cancelled job.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{BufWriter, IntoInnerError, Write};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use osteon_common::job::{Data, JobKind, JobSpecification};
-use osteon_common::limits::FILE_BYTES_MAX;
-use osteon_common::results::Status;
+use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
+use osteon_common::results::{GroupResult, JobResult, Status};
 use osteon_common::{job_file, results_csv, results_json, user_file, visible};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
+use crate::progress::say;
 use crate::request::Request;
+use crate::result_files::{self, Origin, RESULT, ResultFiles};
 use crate::verdict;
 
-const JOB: &str = "job.toml";
-const RESULT: &str = "result.json";
+/// The file of the job that a directory belongs to.
+pub(crate) const JOB: &str = "job.toml";
+/// The file of the case that a directory belongs to.
+pub(crate) const CASE: &str = "case.toml";
 const HISTORY: &str = "history.csv";
 const REALIZATIONS: &str = "realizations.csv";
 const GROUPS: &str = "groups.csv";
@@ -69,9 +72,16 @@ impl ResultsDirectory {
         let result = given(&path.join(RESULT))?;
         match given(&job)? {
             Some(stored) => same_job(&job, &stored, specification)?,
-            None if result.is_some() => {
+            None if result.is_some() && !path.join(CASE).exists() => {
                 return Err(Failure::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: whose result it is cannot be told; \
+                     choose another --out directory",
+                    visible::path(path)
+                )));
+            }
+            None if path.join(CASE).exists() => {
+                return Err(Failure::bad_input(anyhow!(
+                    "{} holds the results of a simulation, not of a job; \
                      choose another --out directory",
                     visible::path(path)
                 )));
@@ -136,7 +146,7 @@ impl ResultsDirectory {
         }
         let request = Request::new();
         let text = format!("{}\n{}\n", request.id, request.client);
-        write(&path, &text).map_err(Failure::Failed)?;
+        result_files::write(&path, &text).map_err(Failure::Failed)?;
         Ok(request)
     }
 
@@ -149,7 +159,8 @@ impl ResultsDirectory {
 
     /// Writes `job.toml`: from now on the directory belongs to this specification.
     pub(crate) fn write_job(&self, specification: &JobSpecification) -> Result<(), Failure> {
-        write(&self.path.join(JOB), &job_file::to_toml(specification)).map_err(Failure::Failed)
+        let text = job_file::to_toml(specification);
+        result_files::write(&self.path.join(JOB), &text).map_err(Failure::Failed)
     }
 
     /// Writes all that an ended job left, `result.json` last; its text.
@@ -160,21 +171,22 @@ impl ResultsDirectory {
     ) -> Result<String, Failure> {
         let text = result_json(kind, fetched);
         let write_all = || -> anyhow::Result<()> {
-            remove_if_there(&self.path.join(RESULT))?;
-            write(&self.path.join(JOB), &job_file::to_toml(&fetched.specification))?;
+            let mut files = ResultFiles::begin(&self.path)?;
+            files.write(JOB, &job_file::to_toml(&fetched.specification))?;
             if kind == JobKind::Identification {
                 let history = results_csv::history(&fetched.specification, &fetched.history);
-                write(&self.path.join(HISTORY), &history)?;
+                files.write(HISTORY, &history)?;
             }
             if matches!(fetched.specification.data, Some(Data::Groups(_))) {
-                write(&self.path.join(GROUPS), &results_csv::groups(&fetched.result))?;
-                let comparison = results_csv::comparison(&fetched.result);
-                write(&self.path.join(COMPARISON), &comparison)?;
+                let Fetched { result, history, .. } = fetched;
+                let groups = results_csv::groups(&fetched.specification, result, history);
+                files.write(GROUPS, &groups)?;
+                files.write(COMPARISON, &results_csv::comparison(result))?;
             }
-            let outcomes = fetched.result.best.as_ref().map(|best| best.outcomes.as_slice());
-            let realizations = results_csv::realizations(outcomes.unwrap_or_default());
-            write(&self.path.join(REALIZATIONS), &realizations)?;
-            write(&self.path.join(RESULT), &text)
+            files.write(REALIZATIONS, &realizations(fetched))?;
+            let JobResult { program, digest, seed, .. } = &fetched.result;
+            let (digest, seed) = (Some(digest.as_str()), Some(*seed));
+            files.finish(&text, &Origin { kind: kind.name(), program, digest, seed })
         };
         write_all().map_err(Failure::Failed)?;
         if fetched.result.status != Status::Cancelled {
@@ -212,6 +224,25 @@ fn given(path: &Path) -> Result<Option<String>, Failure> {
         Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
         Err(error) => Failure::Failed(error),
     })
+}
+
+/// The realizations at the best point, or at those of the groups.
+fn realizations(fetched: &Fetched) -> String {
+    if matches!(fetched.specification.data, Some(Data::Groups(_))) {
+        let groups = fetched.result.groups.iter();
+        let left_out =
+            |group: &&GroupResult| group.best.as_ref().is_some_and(|best| best.outcomes.is_empty());
+        let left_out = groups.filter(left_out).count();
+        if left_out > 0 {
+            say(&format!(
+                "{REALIZATIONS} is without those of the last {left_out} groups: it has at most \
+                 {REALIZATIONS_MAX} rows"
+            ));
+        }
+        return results_csv::realizations_of_groups(&fetched.result.groups);
+    }
+    let best = fetched.result.best.as_ref();
+    results_csv::realizations(best.map(|best| best.outcomes.as_slice()).unwrap_or_default())
 }
 
 /// Whether `file` is what stands at `path`.
@@ -256,37 +287,6 @@ pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
     Some(format!("line {}: `{}` there, `{}` here", line + 1, shown(there), shown(here)))
 }
 
-/// Writes `text` to `path` so that a reader sees either what was there before, or all of it.
-pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    write_by(path, |file| file.write_all(text.as_bytes()))
-}
-
-/// The same for what `print` writes piece by piece.
-pub(crate) fn write_by(
-    path: &Path,
-    print: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> anyhow::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(user_file::create(&part)?);
-        print(&mut file)?;
-        file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
-        fs::rename(&part, path)
-    };
-    write().with_context(|| format!("cannot write {}", visible::path(path)))
-}
-
-fn remove_if_there(path: &Path) -> anyhow::Result<()> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// The text of `result.json` in `directory`.
 ///
 /// # Errors
@@ -298,7 +298,7 @@ pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
-fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
+pub(crate) fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
     let cannot = || format!("cannot read {}", visible::path(path));
     let read = match user_file::read(path, FILE_BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

@@ -4,6 +4,9 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
+use std::process::Command;
+
+use osteon_common::version::{NUMERICS_REVISION, RESULT_SCHEMA};
 use support::run;
 
 #[test]
@@ -45,7 +48,25 @@ fn help_of_every_command() {
 }
 
 #[test]
-fn the_version_is_the_packages() {
-    let expected = format!("osteon {}\n", env!("CARGO_PKG_VERSION"));
-    assert_eq!(run(&["--version"]).succeeded(), expected);
+fn the_version_names_the_commit_that_is_checked_out() {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git")
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .args(arguments)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())?;
+        Some(String::from_utf8(output.stdout).unwrap().trim().to_owned())
+    };
+    let given = option_env!("OSTEON_COMMIT").map(str::to_owned);
+    let commit = given.or_else(|| git(&["rev-parse", "HEAD"]));
+    let commit = commit.unwrap_or_else(|| "unknown".to_owned());
+    let printed = run(&["--version"]);
+    let rest = printed
+        .succeeded()
+        .strip_prefix(&format!("osteon {} (commit {commit}", env!("CARGO_PKG_VERSION")));
+    // What the tree says now it said when the program was built: cargo has looked at it.
+    let rest = rest.unwrap_or_else(|| panic!("{printed:?} at {commit}"));
+    let rest = rest.strip_prefix("-dirty").unwrap_or(rest);
+    assert_eq!(rest, format!(", numerics {NUMERICS_REVISION}, result schema {RESULT_SCHEMA})\n"));
 }

@@ -95,7 +95,8 @@ fn a_finished_directory_is_shown_again_and_another_job_refused() {
         let entries = fs::read_dir(directory).unwrap();
         entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
     };
-    let expected = ["history.csv", "job.toml", "realizations.csv", "result.json"];
+    let expected =
+        ["history.csv", "job.toml", "provenance.json", "realizations.csv", "result.json"];
     let listed: BTreeSet<String> = names(&out);
     assert_eq!(listed, expected.map(str::to_owned).into());
 

@@ -1,5 +1,7 @@
 //! The specification of a job: everything that its result depends on.
 
+use thiserror::Error;
+
 use crate::case::Setup;
 use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
@@ -15,12 +17,23 @@ pub enum JobKind {
     Propagation,
 }
 
+impl JobKind {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Identification => "identification",
+            Self::Propagation => "propagation",
+        }
+    }
+}
+
 /// What is known of the measured velocities.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {
     /// The velocities themselves, m/s, each finite and above 0, at least two.
     Velocities(Vec<f64>),
-    /// Several sets of them: each group is identified by itself, in this order.
+    /// Several sets of them: each group is identified by itself, in this order; at least one of them
+    /// has two velocities that differ.
     Groups(Vec<Group>),
     /// Their mean, m/s, and coefficient of variation.
     Moments {
@@ -36,11 +49,50 @@ pub enum Data {
 pub struct Group {
     /// Its name, unlike all others'; not empty, no control characters.
     pub name: String,
-    /// m/s, as those of [`Data::Velocities`].
+    /// m/s, each finite and above 0, at least one.
     pub velocities: Vec<f64>,
 }
 
+/// Why velocities have no coefficient of variation that a model could match.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum NoVariation {
+    /// There is one.
+    #[error("only one velocity: {NEEDS_TWO}")]
+    OneVelocity,
+    /// All are the same.
+    #[error("all {count} velocities are {velocity:?} m/s: {NEEDS_TWO}")]
+    AllEqual {
+        /// How many there are.
+        count: usize,
+        /// The velocity, m/s.
+        velocity: f64,
+    },
+}
+
+const NEEDS_TWO: &str = "a coefficient of variation needs at least two different ones";
+
+impl Group {
+    /// Why no search can be made for this group; `None` if one can.
+    pub fn no_variation(&self) -> Option<NoVariation> {
+        match self.velocities.as_slice() {
+            [_] => Some(NoVariation::OneVelocity),
+            [velocity, others @ ..] if others.iter().all(|other| other == velocity) => {
+                Some(NoVariation::AllEqual { count: self.velocities.len(), velocity: *velocity })
+            }
+            _ => None,
+        }
+    }
+}
+
 impl Data {
+    /// The groups; none where the data are not grouped.
+    pub fn groups(&self) -> &[Group] {
+        match self {
+            Self::Groups(groups) => groups,
+            Self::Velocities(_) | Self::Moments { .. } => &[],
+        }
+    }
+
     /// How many sets of data there are, each to be identified by itself.
     pub fn sets(&self) -> usize {
         match self {
@@ -49,13 +101,15 @@ impl Data {
         }
     }
 
+    /// How many of these a search can be made for.
+    pub fn searched(&self) -> usize {
+        let unsearched = self.groups().iter().filter(|group| group.no_variation().is_some());
+        self.sets() - unsearched.count()
+    }
+
     /// Name of each group; none where the data are not grouped.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        let groups: &[Group] = match self {
-            Self::Groups(groups) => groups,
-            Self::Velocities(_) | Self::Moments { .. } => &[],
-        };
-        groups.iter().map(|group| group.name.as_str())
+        self.groups().iter().map(|group| group.name.as_str())
     }
 
     /// The velocities of a set, by its number; `None` where only their moments are known.
@@ -349,7 +403,7 @@ impl JobSpecification {
         let Search { max_evaluations, starts, sensitivities, .. } = self.search;
         let free = self.parameters.iter().filter(|range| matches!(range, Range::Free { .. }));
         let measured = if sensitivities { free.count() as u64 } else { 0 };
-        let sets = self.data.as_ref().map_or(1, Data::sets) as u64;
+        let sets = self.data.as_ref().map_or(1, Data::searched) as u64;
         starts.saturating_mul(max_evaluations).saturating_add(measured).saturating_mul(sets)
     }
 

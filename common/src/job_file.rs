@@ -3,11 +3,11 @@
 mod data_section;
 mod run_sections;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::slice;
 
 use crate::check;
-use crate::document::{self, Format};
+use crate::document::{self, Format, Node, Value};
 use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::job::{JobKind, JobSpecification, Range};
 use crate::limits;
@@ -47,6 +47,28 @@ pub fn read_with_warnings(
     let directory = path.parent().unwrap_or(Path::new(""));
     parse_with_warnings(&text, format, directory, kind)
         .map_err(|content| FileError::Content { path: path.to_owned(), content })
+}
+
+/// The file of measured velocities that the job file at `path` names, if it names one.
+///
+/// # Errors
+/// When the file cannot be read, or is malformed.
+pub fn velocities_file(path: &Path) -> Result<Option<PathBuf>, FileError> {
+    let (text, format) = file_error::read(path, BOUND)?;
+    let root = document::parse(file_error::without_byte_order_mark(&text), format).map_err(
+        |malformed| FileError::Content { path: path.to_owned(), content: malformed.into() },
+    )?;
+    let entry = |node: &Node, key: &str| match &node.value {
+        Value::Table(entries) => {
+            entries.iter().find(|(name, _)| name == key).map(|(_, node)| node.clone())
+        }
+        _ => None,
+    };
+    let named = entry(&root, "data").and_then(|data| entry(&data, "velocities"));
+    Ok(match named.map(|node| node.value) {
+        Some(Value::Text(name)) => Some(path.parent().unwrap_or(Path::new("")).join(name)),
+        _ => None,
+    })
 }
 
 /// Reads and validates the text of a job file that lies in `directory`; as [`read`].

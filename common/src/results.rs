@@ -7,6 +7,7 @@ use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
+use crate::version::Program;
 
 /// How a job ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -276,8 +277,8 @@ pub struct JobResult {
     pub nominal: Option<NominalSampling>,
     /// Criterion that was used.
     pub picking: Picking,
-    /// Version of the program that computed it.
-    pub version: String,
+    /// The program that computed it.
+    pub program: Program,
 }
 
 /// The best point of a job, with its realizations.

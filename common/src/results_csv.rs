@@ -2,11 +2,12 @@
 
 use std::fmt::{self, Write as _};
 
+use crate::data_statistics::Interval;
 use crate::inference::{Known, Quantity};
-use crate::job::{Data, JobSpecification};
+use crate::job::{Data, JobSpecification, Range};
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
-use crate::results::{Evaluation, GroupResult, JobResult};
+use crate::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
 
 /// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
 /// number and its moments; with groups or several starts, also which of them it was for.
@@ -80,33 +81,110 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
 /// Most groups of which each is compared with each other; more are compared with the first.
 const COMPARED_MAX: usize = 200;
 
-/// The text of `groups.csv`: one row per group, with what is identified of it (m/s; dimensionless) and
-/// the ends of its confidence intervals, empty where they are unknown.
-pub fn groups(result: &JobResult) -> String {
-    let quantities = ["bulk_velocity", "dispersion"];
-    let columns = quantities.map(|name| format!("{name},{name}_lower,{name}_upper"));
-    let parameters = Parameter::ALL.map(|parameter| format!("best_{}", parameter.name()));
-    let columns = [columns.join(","), parameters.join(",")].join(",");
-    let mut out = format!("group,velocities,status,cost,{columns}\n");
-    for group in &result.groups {
-        let cost = group.best.as_ref().and_then(|best| best.cost);
+/// The text of `groups.csv`: one row per group, with what was measured and what is identified of it (m/s,
+/// kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty where they are unknown.
+pub fn groups(
+    specification: &JobSpecification,
+    result: &JobResult,
+    history: &[Evaluation],
+) -> String {
+    let free = |name: &Parameter| matches!(specification.range(*name), Range::Free { .. });
+    // The dispersion has its columns whether it is free or not.
+    let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
+    let free: Vec<Parameter> = elastic.filter(free).collect();
+    let mut out = header(&free);
+    for (set, group) in result.groups.iter().enumerate() {
+        let best = group.best.as_ref();
         let mut fields = vec![
             field(&group.name),
             group.data.count.unwrap_or(0).to_string(),
             group.status.name().to_owned(),
-            number(cost),
+            number(best.and_then(|best| best.cost)),
         ];
         for quantity in quantities_of(group) {
-            let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
             fields.push(number(quantity.map(|quantity| quantity.value)));
-            fields.extend([0, 1].map(|end| number(interval.map(|ends| ends[end]))));
+            let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
+            fields.extend(ends(interval));
         }
-        let point = group.best.as_ref().map(|best| best.point);
-        fields.extend(Parameter::ALL.map(|name| number(point.map(|point| point.get(name)))));
+        fields.extend(Parameter::ALL.map(|name| number(best.map(|best| best.point.get(name)))));
+        fields.extend(free.iter().flat_map(|&name| identified(name, group)));
+        fields.extend(measured(group));
+        fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
+        let of_group = |row: &&Evaluation| row.role.group as usize == set;
+        let searched = history.iter().filter(|row| row.role.varied.is_none());
+        fields.push(searched.filter(of_group).count().to_string());
+        fields.push(field(reason(group)));
         out.push_str(&fields.join(","));
         out.push('\n');
     }
     out
+}
+
+/// The header of `groups.csv`, given the free parameters of the mean model.
+fn header(free: &[Parameter]) -> String {
+    let with_interval =
+        |name: &str| [name.to_owned(), format!("{name}_lower"), format!("{name}_upper")];
+    let single = |name: &str| vec![name.to_owned()];
+    let columns = ["group", "velocities", "status", "cost"].into_iter().flat_map(single);
+    let columns =
+        columns.chain(["bulk_velocity", "dispersion"].into_iter().flat_map(with_interval));
+    let columns = columns.chain(Parameter::ALL.map(|name| format!("best_{}", name.name())));
+    let columns = columns.chain(free.iter().flat_map(|name| with_interval(name.name())));
+    let data = ["data_mean", "data_coefficient_of_variation"];
+    let columns = columns.chain(data.into_iter().flat_map(with_interval));
+    let last = ["kolmogorov_distance", "kolmogorov_p_value", "failures", "evaluations", "reason"];
+    let columns: Vec<String> = columns.chain(last.into_iter().flat_map(single)).collect();
+    columns.join(",") + "\n"
+}
+
+/// A free parameter with the ends of its interval, where the data fix it.
+fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
+    let found = group.conclusions.inference.as_ref();
+    let of = found.and_then(|found| found.parameters.iter().find(|(known, _)| *known == name));
+    let quantity = of.map(|(_, quantity)| *quantity).filter(|quantity| quantity.known.is_some());
+    let [lower, upper] =
+        ends(quantity.and_then(|quantity| quantity.known).map(|known| known.interval));
+    [number(quantity.map(|quantity| quantity.value)), lower, upper]
+}
+
+/// Moments of a group's data with their intervals, and the test against the model's law.
+fn measured(group: &GroupResult) -> [String; 8] {
+    let DataSummary { moments, intervals, .. } = group.data;
+    let both = |interval: Option<Interval>| ends(interval.map(|found| [found.low, found.high]));
+    let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));
+    let [variation_lower, variation_upper] =
+        both(intervals.map(|found| found.coefficient_of_variation));
+    let test = group.best.as_ref().and_then(|best| best.kolmogorov);
+    [
+        number(Some(moments.mean)),
+        mean_lower,
+        mean_upper,
+        number(Some(moments.coefficient_of_variation)),
+        variation_lower,
+        variation_upper,
+        number(test.map(|test| test.distance)),
+        number(test.map(|test| test.p_value)),
+    ]
+}
+
+/// Why a group did not converge, or why it has no intervals; empty where there is nothing to say.
+fn reason(group: &GroupResult) -> &str {
+    let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
+    let unknown = match (&group.best, &group.conclusions.inference) {
+        (None, _) => "no point was feasible",
+        (Some(_), None) => "the derivatives are not known: no intervals",
+        (Some(_), Some(found)) if !found.matched => {
+            "the model does not match the data within their noise: no intervals"
+        }
+        _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
+        _ => "",
+    };
+    told.unwrap_or(unknown)
+}
+
+/// Both ends of an interval.
+fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
+    [0, 1].map(|end| number(interval.map(|ends| ends[end])))
 }
 
 /// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
@@ -160,18 +238,38 @@ fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 
+/// The text of `realizations.csv` of groups: the rows of each group after those of the one before, at
+/// its best point.
+pub fn realizations_of_groups(groups: &[GroupResult]) -> String {
+    let mut out = "index,velocity,failure,group\n".to_owned();
+    for group in groups {
+        let outcomes = group.best.as_ref().map(|best| best.outcomes.as_slice());
+        let name = field(&group.name);
+        for (index, outcome) in outcomes.unwrap_or_default().iter().enumerate() {
+            out.push_str(&realization(index, outcome));
+            out.push_str(&format!(",{name}\n"));
+        }
+    }
+    out
+}
+
 /// The text of `realizations.csv`: one row per index; the velocity (m/s) is empty where there is
 /// a failure, and the failure where there is a velocity.
 pub fn realizations(outcomes: &[Outcome]) -> String {
     let mut out = "index,velocity,failure\n".to_owned();
     for (index, outcome) in outcomes.iter().enumerate() {
-        // Writing to a string does not fail.
-        let _infallible = match outcome {
-            Ok(velocity) => writeln!(out, "{index},{velocity:?},"),
-            Err(kind) => writeln!(out, "{index},,{}", kind.name()),
-        };
+        out.push_str(&realization(index, outcome));
+        out.push('\n');
     }
     out
+}
+
+/// A row without what comes behind its failure.
+fn realization(index: usize, outcome: &Outcome) -> String {
+    match outcome {
+        Ok(velocity) => format!("{index},{velocity:?},"),
+        Err(kind) => format!("{index},,{}", kind.name()),
+    }
 }
 
 #[cfg(test)]

@@ -6,11 +6,13 @@
 use serde_json::{Map, Value, json};
 use thiserror::Error;
 
+use crate::job::JobKind;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EstimatedError, JobResult, Moments};
 use crate::sampling::NominalSampling;
-use crate::settings::{Method, SolverSettings};
+use crate::settings::{Method, Picking, SolverSettings};
+use crate::version::{Program, RESULT_SCHEMA};
 
 mod found;
 mod measured;
@@ -21,6 +23,14 @@ pub enum ResultError {
     /// It is no JSON.
     #[error("not valid JSON: {0}")]
     Malformed(serde_json::Error),
+    /// There is no group of this name.
+    #[error("there is no group {name:?}; the groups are {}", listed(.names))]
+    NoGroup {
+        /// The name.
+        name: String,
+        /// Those there are.
+        names: Vec<String>,
+    },
     /// A number of the point is not there: another kind of file, or the job found no point.
     #[error(
         "`{key}` is {found}; it must be a number (the result of an identification that found a point)"
@@ -38,6 +48,7 @@ pub fn identification(result: &JobResult) -> String {
     let best = result.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    head(&mut put, JobKind::Identification.name());
     put("status", json!(result.status.name()));
     if let Some(failure) = result.failure {
         put("failure", json!(failure.name()));
@@ -64,10 +75,9 @@ pub fn identification(result: &JobResult) -> String {
         let group = |group| found::group(result.objective, group);
         put("groups", result.groups.iter().map(group).collect());
     }
-    let picking = &result.picking;
     put("solver", solver_of(result));
-    put("picking", json!({"extremum": picking.extremum.name(), "threshold": picking.threshold}));
-    put("version", json!(result.version));
+    put("picking", picking(&result.picking));
+    program(&mut put, &result.program);
     text(object)
 }
 
@@ -76,13 +86,36 @@ pub fn propagation(result: &JobResult) -> String {
     let best = result.best.as_ref();
     let mut object = Map::new();
     let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    head(&mut put, JobKind::Propagation.name());
     put("realizations", json!(result.realizations));
+    put("seed", json!(result.seed));
     sampling(&mut put, result);
+    found::model(&mut put, best);
     put("failures", failures(best.map(|best| best.failures)));
     put("velocity", measured::model(best));
     put("solver", solver_of(result));
+    put("picking", picking(&result.picking));
     put("digest", json!(result.digest));
+    program(&mut put, &result.program);
     text(object)
+}
+
+/// What every result in JSON begins with: the revision of its keys, and of what it is the result.
+pub fn head(put: &mut impl FnMut(&str, Value) -> Option<Value>, kind: &str) {
+    put("schema", json!(RESULT_SCHEMA));
+    put("kind", json!(kind));
+}
+
+/// What every result in JSON ends with: the program that computed it.
+pub fn program(put: &mut impl FnMut(&str, Value) -> Option<Value>, program: &Program) {
+    put("version", json!(program.version));
+    put("numerics", json!(program.numerics));
+    put("commit", json!(program.commit));
+}
+
+/// The criterion of a first arrival.
+pub fn picking(picking: &Picking) -> Value {
+    json!({"extremum": picking.extremum.name(), "threshold": picking.threshold})
 }
 
 fn solver_of(result: &JobResult) -> Value {
@@ -126,7 +159,41 @@ pub fn solver(
 /// # Errors
 /// When the text is no JSON, or holds no point.
 pub fn best_point(text: &str) -> Result<Point, ResultError> {
+    point_of(&serde_json::from_str(text).map_err(ResultError::Malformed)?)
+}
+
+/// The best point of the group `name` in the text of an identification's `result.json`.
+///
+/// # Errors
+/// When the text is no JSON, or holds no such group, or no point of it.
+pub fn best_point_of_group(text: &str, name: &str) -> Result<Point, ResultError> {
     let result: Value = serde_json::from_str(text).map_err(ResultError::Malformed)?;
+    let groups = result.get("groups").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    match groups.iter().find(|group| group["name"] == name) {
+        Some(group) => point_of(group),
+        None => Err(ResultError::NoGroup { name: name.to_owned(), names: names(groups) }),
+    }
+}
+
+/// Names of the groups in the text of an identification's `result.json`; none where there are none.
+///
+/// # Errors
+/// When the text is no JSON.
+pub fn group_names(text: &str) -> Result<Vec<String>, ResultError> {
+    let result: Value = serde_json::from_str(text).map_err(ResultError::Malformed)?;
+    Ok(result
+        .get("groups")
+        .and_then(Value::as_array)
+        .map(|groups| names(groups))
+        .unwrap_or_default())
+}
+
+fn names(groups: &[Value]) -> Vec<String> {
+    groups.iter().filter_map(|group| group["name"].as_str()).map(str::to_owned).collect()
+}
+
+/// The best point in the object of a job, or of a group.
+fn point_of(result: &Value) -> Result<Point, ResultError> {
     let mut point = Point([0.0; 7]);
     for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
         let name = parameter.name();
@@ -143,6 +210,19 @@ pub fn best_point(text: &str) -> Result<Point, ResultError> {
         };
     }
     Ok(point)
+}
+
+/// Most groups that a message lists.
+const LISTED_MAX: usize = 20;
+
+/// Names in a message.
+pub fn listed(names: &[String]) -> String {
+    let mut shown: Vec<String> =
+        names.iter().take(LISTED_MAX).map(|name| format!("{name:?}")).collect();
+    if names.len() > LISTED_MAX {
+        shown.push(format!("and {} more", names.len() - LISTED_MAX));
+    }
+    if shown.is_empty() { "none".to_owned() } else { shown.join(", ") }
 }
 
 fn kind(found: Option<&Value>) -> &'static str {

@@ -91,6 +91,11 @@ enum Problem {
     RepeatedColumn { column: String },
     #[error("{column} is empty; it must name the group of the velocity")]
     NoGroup { column: String },
+    #[error(
+        "no group of the column `{column}` has two velocities that differ; a coefficient of variation \
+         needs at least two different ones"
+    )]
+    NoVariation { column: String },
     #[error("has more than {} groups", limits::GROUPS_MAX)]
     TooManyGroups,
     #[error("the number of fields is {found}; the header has {expected}")]
@@ -139,7 +144,12 @@ pub(crate) fn read_groups(
     path: &Path,
     column: &str,
 ) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
-    measured(path, Some(column))
+    let measured = measured(path, Some(column))?;
+    if measured.data.iter().all(|group| group.no_variation().is_some()) {
+        let problem = Problem::NoVariation { column: shortened(column) };
+        return Err(vec![CsvError { path: path.to_owned(), line: None, problem }]);
+    }
+    Ok(measured)
 }
 
 /// The velocities by the names in `column`; all in a group without name if there is no column.

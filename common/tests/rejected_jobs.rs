@@ -278,6 +278,8 @@ fn data() {
             (given, "groups = [3900.0, 4000.0]"),
             (given, "groups = { a = [3900.0, 4000.0], b = 3900.0, \"c d\" = [3900.0, \"x\"] }"),
             (given, "groups = { a = [3900.0], b = [3900.0, -1.0], \"\" = [3900.0, 4000.0] }"),
+            (given, "groups = { a = [3900.0], b = [3950.0, 3950.0] }"),
+            (given, "groups = { a = [], b = [3900.0, 4000.0] }"),
             (given, "groups = { \"a\\tb\" = [3900.0, 4000.0] }"),
             (given, "group = \"site\""),
             (given, "velocities = [3900.0, 4000.0]\ngroup = \"site\""),

@@ -2,23 +2,25 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
-use osteon_common::inference::{Conclusions, meaning};
+use osteon_common::inference::{Conclusions, Inference, Known, NoiseErrors, Quantity, meaning};
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, Objective, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, JobFailure, JobResult, Moments,
-    Role, Status,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
+    JobResult, Moments, Role, Status,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Method, Picking, SolverSettings};
+use osteon_common::version::Program;
 use osteon_common::{job_file, results_csv, results_json};
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -69,7 +71,11 @@ fn result() -> JobResult {
         solver: SolverSettings::default(),
         nominal: NominalSampling::of(&Setup::default()),
         picking: Picking::default(),
-        version: "0.1.0".to_owned(),
+        program: Program {
+            version: "0.1.0".to_owned(),
+            numerics: 4,
+            commit: Some("c0ffee".to_owned()),
+        },
     }
 }
 
@@ -235,6 +241,8 @@ fn the_best_point_is_read_back_to_the_bit() {
         result.best.as_mut().unwrap().point = point;
         let read = results_json::best_point(&identified(&result)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
+        let read = results_json::best_point(&results_json::propagation(&result)).unwrap();
+        assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
     }
 }
 
@@ -248,7 +256,6 @@ fn a_result_without_a_point_gives_none() {
     check("[]", "`parameters.density` is missing; it must be a number");
     check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
     check(&identified(&failed()), "`parameters.density` is null;");
-    check(&results_json::propagation(&result()), "`parameters.density` is missing;");
     let text = identified(&result());
     check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
 }
@@ -312,4 +319,141 @@ fn realizations() {
         "index,velocity,failure\n0,3908.25,\n1,,direct_wave_first\n2,3333.3333333333335,\n3,,no_arrival\n"
     );
     assert_eq!(results_csv::realizations(&[]), "index,velocity,failure\n");
+}
+
+fn group(name: &str, status: Status, best: Option<BestPoint>) -> GroupResult {
+    let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
+    let data = DataSummary::of(&Data::Velocities(velocities), 0);
+    let (name, conclusions) = (name.to_owned(), Conclusions::default());
+    GroupResult { name, status, reason: None, best, data, conclusions }
+}
+
+/// Every row of a table by the names of its columns.
+fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let row = |line: &str| {
+        // The last column, which may hold a comma, is in quotes then.
+        let fields = line.splitn(names.len(), ',').map(|field| field.trim_matches('"').to_owned());
+        names.iter().map(|name| (*name).to_owned()).zip(fields).collect()
+    };
+    lines.map(row).collect()
+}
+
+/// What a group's data say where e_L and δ are free; without intervals where they are not `known`.
+fn found(known: bool) -> Inference {
+    let quantity = |value: f64, interval: [f64; 2]| {
+        let known = known.then_some(Known { standard_error: 1.0, interval, free_share: 0.0 });
+        Quantity { value, known }
+    };
+    let modulus = quantity(17.717e9, [17e9, 18.5e9]);
+    Inference {
+        matched: known,
+        level: 0.95,
+        noise: NoiseErrors { data: None, sampling: moments(5e-4, 0.01) },
+        free: vec![Parameter::LongitudinalYoungModulus, Parameter::Dispersion],
+        sensitivities: Vec::new(),
+        fixed: Vec::new(),
+        undetermined: Vec::new(),
+        bulk_velocity: quantity(3960.5, [3950.25, 3970.75]),
+        dispersion: quantity(0.1029, [0.1, 0.11]),
+        parameters: vec![(Parameter::LongitudinalYoungModulus, modulus)],
+    }
+}
+
+/// Group a is known, b does not match, c has no point.
+fn grouped() -> (JobSpecification, JobResult, Vec<Evaluation>) {
+    let mut job = specification();
+    job.parameters[Parameter::LongitudinalYoungModulus as usize] =
+        Range::Free { start: 18e9, lower: 12e9, upper: 25e9 };
+    let best = result().best.unwrap();
+    let mut a = group("a", Status::Converged, Some(best.clone()));
+    let mut b = group("b", Status::Converged, Some(best));
+    let mut c = group("c", Status::Failed, None);
+    (a.conclusions.inference, b.conclusions.inference) = (Some(found(true)), Some(found(false)));
+    b.reason = Some("settled at a cost of 7.644e-1, above cost_tolerance 1e-12".to_owned());
+    c.reason = Some("only one velocity, and no more".to_owned());
+    let row = |group, varied| Evaluation {
+        number: 0,
+        role: Role { group, start: 0, varied },
+        point: POINT,
+        moments: None,
+        cost: None,
+        failures: FailureCounts::default(),
+        estimated_error: None,
+    };
+    let varied = Some(Parameter::Dispersion);
+    let history = vec![row(0, None), row(0, None), row(0, varied), row(1, None)];
+    (job, JobResult { best: None, data: None, groups: vec![a, b, c], ..result() }, history)
+}
+
+#[test]
+fn a_group_has_its_intervals_its_data_and_a_reason() {
+    let (job, mut result, history) = grouped();
+    let text = results_csv::groups(&job, &result, &history);
+    let rows = rows(&text);
+    for (group, column, value) in [
+        (0, "longitudinal_young_modulus", "17717000000.0"),
+        (0, "longitudinal_young_modulus_lower", "17000000000.0"),
+        (0, "longitudinal_young_modulus_upper", "18500000000.0"),
+        (0, "dispersion_lower", "0.1"),
+        (0, "data_mean", "3918.75"),
+        (0, "data_mean_lower", "3862.5"),
+        (0, "data_mean_upper", "3962.5"),
+        (0, "data_coefficient_of_variation", "0.013812207396880999"),
+        (0, "kolmogorov_distance", "0.25"),
+        (0, "kolmogorov_p_value", "0.75"),
+        (0, "failures", "2"),
+        (0, "evaluations", "2"),
+        (0, "reason", ""),
+        (1, "longitudinal_young_modulus", ""),
+        (1, "longitudinal_young_modulus_lower", ""),
+        (1, "best_longitudinal_young_modulus", "17717000000.0"),
+        (1, "evaluations", "1"),
+        (1, "reason", "settled at a cost of 7.644e-1, above cost_tolerance 1e-12"),
+        (2, "best_density", ""),
+        (2, "evaluations", "0"),
+        (2, "reason", "only one velocity, and no more"),
+    ] {
+        assert_eq!(rows[group][column], value, "{column} of group {group}: {text}");
+    }
+    assert!(text.ends_with(",\"only one velocity, and no more\"\n"), "{text}");
+    // Where nothing else is said, a blank is explained.
+    result.groups[1].reason = None;
+    let text = results_csv::groups(&job, &result, &history);
+    assert!(text.contains(",the model does not match the data within their noise: no intervals\n"));
+}
+
+#[test]
+fn realizations_of_groups_follow_each_other() {
+    let best = result().best.unwrap();
+    let groups = [
+        group("left", Status::Converged, Some(best.clone())),
+        group("none", Status::Failed, None),
+        group(
+            "right, \"distal\"",
+            Status::Converged,
+            Some(BestPoint { outcomes: vec![Ok(3900.5)], ..best }),
+        ),
+    ];
+    assert_eq!(
+        results_csv::realizations_of_groups(&groups),
+        "index,velocity,failure,group\n0,3908.25,,left\n1,,direct_wave_first,left\n\
+         2,3333.3333333333335,,left\n3,,no_arrival,left\n0,3900.5,,\"right, \"\"distal\"\"\"\n"
+    );
+}
+
+#[test]
+fn the_best_point_of_a_group_is_found_by_its_name() {
+    let best = result().best.unwrap();
+    let mut result = JobResult { best: None, data: None, ..result() };
+    result.groups =
+        vec![group("left", Status::Converged, Some(best)), group("none", Status::Failed, None)];
+    let text = results_json::identification(&result);
+    assert_eq!(results_json::group_names(&text).unwrap(), ["left", "none"]);
+    assert_eq!(results_json::best_point_of_group(&text, "left").unwrap(), POINT);
+    let refused = |name| results_json::best_point_of_group(&text, name).unwrap_err().to_string();
+    assert!(refused("none").starts_with("`parameters.density` is null;"));
+    assert_eq!(refused("right"), "there is no group \"right\"; the groups are \"left\", \"none\"");
+    assert!(results_json::group_names(&identified(&failed())).unwrap().is_empty());
 }

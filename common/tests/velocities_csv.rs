@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 
 use osteon_common::document::Format;
-use osteon_common::job::{Data, Group, JobKind};
+use osteon_common::job::{Data, Group, JobKind, NoVariation};
 use osteon_common::job_file;
 use osteon_common::plausible::Warning;
 
@@ -73,6 +73,15 @@ fn groups_stand_in_the_order_in_which_they_begin() {
 }
 
 #[test]
+fn a_group_of_one_velocity_is_a_group() {
+    let read = read_as(b"bone,velocity\na,1\na,2\nb,3\nc,4\nc,4\n", "group = \"bone\"");
+    let Ok(Some(Data::Groups(groups))) = read else { panic!("{read:?}") };
+    let unsearched: Vec<_> = groups.iter().map(Group::no_variation).collect();
+    let equal = NoVariation::AllEqual { count: 2, velocity: 4.0 };
+    assert_eq!(unsearched, [None, Some(NoVariation::OneVelocity), Some(equal)]);
+}
+
+#[test]
 fn groups_that_are_refused() {
     let check = |text: &str, expected: &str| {
         let message = read_as(text.as_bytes(), "group = \"bone\"").unwrap_err();
@@ -81,7 +90,8 @@ fn groups_that_are_refused() {
     check("site,velocity\na,1\na,2\n", "no column `bone`; the header has `site`, `velocity`");
     check("bone,velocity,bone\na,1,b\n", "the header has the column `bone` twice");
     check("bone,velocity\na,1\n,2\n", "line 3: bone is empty; it must name the group");
-    check("bone,velocity\na,1\na,2\nb,3\n", "data.groups.b: contains only one velocity;");
+    let none = "no group of the column `bone` has two velocities that differ";
+    check("bone,velocity\na,1\nb,3\nb,3\n", none);
     let many: String = (0..1001).map(|i| format!("g{i},1\n")).collect();
     check(&format!("bone,velocity\n{many}"), "has more than 1000 groups");
 }

@@ -12,6 +12,8 @@ pub const AUDIT_FRACTION: f64 = 0.01;
 /// Settings of a coordinator. None of them changes a bit of any result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
+    /// The commit that the program was built from, which results name; `None` if nobody knows.
+    pub commit: Option<&'static str>,
     /// How often both sides of a worker's stream give a sign of life.
     pub heartbeat: Duration,
     /// A lease ends after this long without a message.
@@ -51,6 +53,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
+            commit: None,
             heartbeat: Duration::from_secs(2),
             expiry: Duration::from_secs(10),
             answer_timeout: Duration::from_secs(600),

@@ -105,8 +105,8 @@ impl Left {
     /// say.
     pub(crate) fn result(&self, outcomes: Option<Arc<[Outcome]>>) -> JobResult {
         let best = self.best_point(self.best(), outcomes);
-        let EndRecord { ending, version, .. } = &self.end;
-        self.summary.result(&self.specification, ending, version, best, Vec::new())
+        let EndRecord { ending, program, .. } = &self.end;
+        self.summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
     /// What was found for a group, given the outcomes of its best evaluation. Computes what its data say.

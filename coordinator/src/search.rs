@@ -18,6 +18,7 @@ use osteon_common::results::{
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::statistics::{self, Verdict, likelihood_error};
+use osteon_common::version::Program;
 use thiserror::Error;
 
 use self::identification::Identification;
@@ -272,9 +273,9 @@ impl Search {
         }
     }
 
-    /// What the job leaves, given how it ended, computed by `version` of the program. Of groups,
+    /// What the job leaves, given how it ended, computed by `program`. Of groups,
     /// whose outcomes are in the store only, nothing is known here.
-    pub fn result(&self, ending: &Ending, version: &str) -> JobResult {
+    pub fn result(&self, ending: &Ending, program: &Program) -> JobResult {
         let summary = self.summary();
         let outcomes = match &self.plan {
             Plan::Identification(identification) => identification.best_outcomes(),
@@ -283,7 +284,7 @@ impl Search {
         let best = summary.best.zip(outcomes).and_then(|(number, outcomes)| {
             summary.best_point(&self.specification, number, outcomes)
         });
-        summary.result(&self.specification, ending, version, best, Vec::new())
+        summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
     /// Whether the data are groups.
@@ -345,13 +346,13 @@ impl Summary {
         Some(best)
     }
 
-    /// What a job with this path leaves, given how it ended, the version of the program that
-    /// computed it, its best point, or what was found for its groups.
+    /// What a job with this path leaves, given how it ended, the program that computed it, its best
+    /// point, or what was found for its groups.
     pub fn result(
         &self,
         specification: &JobSpecification,
         ending: &Ending,
-        version: &str,
+        program: &Program,
         best: Option<BestPoint>,
         groups: Vec<GroupResult>,
     ) -> JobResult {
@@ -380,7 +381,7 @@ impl Summary {
             solver: specification.setup.solver,
             nominal: NominalSampling::of(&specification.setup),
             picking: specification.setup.picking,
-            version: version.to_owned(),
+            program: program.clone(),
         }
     }
 

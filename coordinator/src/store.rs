@@ -13,6 +13,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, Evaluation, Moments};
+use osteon_common::version::Program;
 use thiserror::Error;
 
 use crate::ids::JobId;
@@ -80,8 +81,8 @@ pub struct EndRecord {
     pub job: JobId,
     /// How it ended.
     pub ending: Ending,
-    /// Version of the program that computed it.
-    pub version: String,
+    /// The program that computed it.
+    pub program: Program,
     /// When, since the Unix epoch.
     pub ended: Duration,
     /// Complete evaluations.
@@ -97,6 +98,7 @@ impl EndRecord {
     pub fn new(
         job: JobId,
         ending: Ending,
+        program: Program,
         ended: Duration,
         evaluations: u64,
         best: Option<&Evaluation>,
@@ -104,7 +106,7 @@ impl EndRecord {
         Self {
             job,
             ending,
-            version: osteon_common::version::VERSION.to_owned(),
+            program,
             ended,
             evaluations,
             best_cost: best.and_then(|row| row.cost),

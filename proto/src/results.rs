@@ -11,6 +11,7 @@ use osteon_common::results::{
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
+use osteon_common::version::Program;
 use osteon_common::violations::Violations;
 
 use crate::choice::{
@@ -49,7 +50,9 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         solver: Some(setup::solver_to_message(&result.solver)),
         nominal_sampling: result.nominal.map(nominal_to_message),
         picking: Some(setup::picking_to_message(&result.picking)),
-        version: result.version.clone(),
+        version: result.program.version.clone(),
+        numerics: result.program.numerics,
+        commit: result.program.commit.clone(),
     }
 }
 
@@ -84,7 +87,7 @@ pub fn from_message(
         solver,
         nominal: message.nominal_sampling.map(nominal_from_message),
         picking,
-        version: message.version.clone(),
+        program: program_from_message(message),
     })
 }
 
@@ -222,6 +225,14 @@ fn best_from_message(
         estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
         outcomes,
     })
+}
+
+fn program_from_message(message: &v1::JobResult) -> Program {
+    Program {
+        version: message.version.clone(),
+        numerics: message.numerics,
+        commit: message.commit.clone(),
+    }
 }
 
 fn conclusions_from_message(message: &v1::JobResult) -> Result<Conclusions, Malformed> {

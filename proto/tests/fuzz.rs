@@ -16,6 +16,7 @@ use osteon_common::results::{
     JobResult, Moments, PointMeaning, Role, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
+use osteon_common::version::Program;
 use osteon_common::{job_file, results_csv, results_json};
 use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::batch::{self, Work};
@@ -207,7 +208,7 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         solver: job.setup.solver,
         nominal: NominalSampling::of(&job.setup),
         picking: job.setup.picking,
-        version: "0.1.0".to_owned(),
+        program: Program::this(Some("c0ffee")),
     };
     let Conclusions { inference, profiles, solutions } = &result.conclusions;
     assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));
@@ -278,7 +279,8 @@ fn check_group(message: &v1::GroupResult) {
     let text = results_json::identification(&result);
     serde_json::from_str::<serde_json::Value>(&text).unwrap();
     // A row after the header; a name may have line breaks of its own.
-    assert!(results_csv::groups(&result).lines().count() > 1);
+    let (job, history, _) = identification();
+    assert!(results_csv::groups(&job, &result, &history).lines().count() > 1);
     assert_eq!(results_csv::comparison(&result).lines().count(), 1);
 }
 

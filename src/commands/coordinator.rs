@@ -10,8 +10,9 @@ use crate::arguments::CoordinatorArguments;
 use crate::door::Door;
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
+use crate::program;
 use crate::resolved::Format;
-use crate::results_directory;
+use crate::result_files;
 use crate::signals;
 
 /// Signs of life while a lease lasts: some may come late.
@@ -40,13 +41,14 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
         keep_ended: arguments.keep_ended,
         heartbeat: arguments.lease / HEARTBEATS_PER_LEASE,
         expiry: arguments.lease,
+        commit: program::COMMIT,
         ..Config::default()
     };
     let coordinator = osteon_coordinator::start(listener, Box::new(store), config)
         .await
         .map_err(Failure::failed)?;
     let address_file = directory.join("address");
-    results_directory::write(&address_file, &format!("{}\n", coordinator.url()))
+    result_files::write(&address_file, &format!("{}\n", coordinator.url()))
         .map_err(Failure::Failed)?;
     let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {

@@ -28,7 +28,8 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
     }
     let point = match &arguments.at {
         Some(directory) => {
-            let point = best_point(directory).map_err(Failure::BadInput)?;
+            let group = arguments.group.as_deref();
+            let point = best_point(directory, group).map_err(Failure::BadInput)?;
             same_job(directory, &arguments.job, &specification).map_err(Failure::BadInput)?;
             point
         }
@@ -66,8 +67,19 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
     }
 }
 
-fn best_point(directory: &Path) -> anyhow::Result<Point> {
+/// The best point of the result in `directory`, or that of one of its groups.
+fn best_point(directory: &Path, group: Option<&str>) -> anyhow::Result<Point> {
     let text = results_directory::result_of(directory)?;
-    let path = directory.join("result.json");
-    results_json::best_point(&text).with_context(|| path.display().to_string())
+    let read = || {
+        let names = results_json::group_names(&text)?;
+        match group {
+            None if names.is_empty() => Ok(results_json::best_point(&text)?),
+            None => Err(anyhow!(
+                "the result is one of groups; name one of them by --group: {}",
+                results_json::listed(&names)
+            )),
+            Some(name) => Ok(results_json::best_point_of_group(&text, name)?),
+        }
+    };
+    read().with_context(|| directory.join("result.json").display().to_string())
 }

@@ -17,7 +17,7 @@ use crate::output;
 use crate::request::Request;
 use crate::resolved::Format;
 use crate::results_directory::{self, ResultsDirectory};
-use crate::{verdict, warnings};
+use crate::{unsearched_groups, verdict, warnings};
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -43,6 +43,7 @@ pub(super) async fn submit(
     let Submission { job, kind, request, priority } = submission;
     let (specification, warnings) =
         job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
+    unsearched_groups::warn(job, &specification);
     warnings::say_of_job(&specification, &warnings).await;
     let mut client = Client::connect(coordinator).await?;
     let id = client.submit(&specification, request, priority).await?;

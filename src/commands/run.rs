@@ -20,12 +20,13 @@ use crate::request::Request;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
-use crate::{verdict, warnings};
+use crate::{unsearched_groups, verdict, warnings};
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let (specification, warnings) =
         job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
+    unsearched_groups::warn(&run.job, &specification);
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
     }

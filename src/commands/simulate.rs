@@ -1,7 +1,6 @@
 //! `simulate`: one deterministic case.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
 
 use osteon_common::case::Case;
 use osteon_common::case_file;
@@ -13,20 +12,22 @@ use crate::arguments::SimulateArguments;
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownSimulation};
 use crate::resolved;
-use crate::results_directory;
+use crate::simulation_directory::{Simulated, TRACES};
 use crate::warnings;
 
-/// Solves the case, writes the traces if they are wanted, prints.
+/// Solves the case, writes its files if they are wanted, prints.
 pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
     let format = resolved::format(arguments.json);
     let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
+    let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
+    let setup = case.setup;
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = solved.await.map_err(Failure::failed)??;
     let shown = ShownSimulation {
-        setup: &case.setup,
+        setup: &setup,
         arrival: &solved.arrival,
-        traces: solved.traces.as_deref(),
+        traces: traces.as_deref(),
         check: solved.check.as_ref(),
     };
     output::stdout(format).simulation(&shown).map_err(stdout_failure)?;
@@ -36,26 +37,32 @@ pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<E
 
 struct Solved {
     arrival: Result<Arrival, osteon_solver::Failure>,
-    /// The file of the traces.
-    traces: Option<PathBuf>,
     check: Option<Check>,
 }
 
 fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved, Failure> {
     let solver = Solver::with_isa(&case.setup, isa);
+    let SimulateArguments { duration, time_step, .. } = *arguments;
+    let simulated = Simulated { case, duration, time_step };
     let traces = match &arguments.out {
         Some(directory) => {
-            let traces = solver
-                .traces(&case.bone, arguments.duration, arguments.time_step)
-                .map_err(trace_failure)?;
-            let positions = case.setup.probe.receivers.positions();
-            Some(write(directory, &traces, positions)?)
+            simulated.refuse_other(directory)?;
+            let traces = solver.traces(&case.bone, duration, time_step).map_err(trace_failure)?;
+            Some((directory, traces))
         }
         None => None,
     };
     let arrival = solver.arrival(&case.bone, &mut Workspace::default());
+    if let Some((directory, traces)) = traces {
+        // A check is of the solvers; what is kept is the same with one and without.
+        let shown =
+            ShownSimulation { setup: &case.setup, arrival: &arrival, traces: None, check: None };
+        let positions = case.setup.probe.receivers.positions();
+        let print = |file: &mut dyn Write| csv(&traces, positions, file);
+        simulated.write(directory, &output::json::simulation(&shown), print)?;
+    }
     let check = arguments.check.then(|| Check::of(case, isa));
-    Ok(Solved { arrival, traces, check })
+    Ok(Solved { arrival, check })
 }
 
 fn trace_failure(error: TraceError) -> Failure {
@@ -65,22 +72,6 @@ fn trace_failure(error: TraceError) -> Failure {
         }
         TraceError::NotFinite => Failure::failed(error),
     }
-}
-
-fn write(
-    directory: &Path,
-    traces: &Traces,
-    positions: impl Iterator<Item = f64>,
-) -> Result<PathBuf, Failure> {
-    results_directory::make_directory(directory)?;
-    let path = directory.join("traces.csv");
-    results_directory::write_by(&path, |file| csv(traces, positions, file)).map_err(|error| {
-        match error.downcast::<io::Error>() {
-            Ok(error) => Failure::unusable_path(error, format!("cannot write {}", path.display())),
-            Err(error) => Failure::Failed(error),
-        }
-    })?;
-    Ok(path)
 }
 
 /// `time`, then one column per receiver headed by its x1.

@@ -2,14 +2,15 @@
 
 use std::io::{self, Write};
 
-use osteon_common::version;
+use osteon_common::results_json;
 use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::output::text::{kind_name, state_name, status_name};
+use crate::program;
 
 /// Output for programs.
 pub(crate) struct JsonOutput<'a> {
@@ -33,29 +34,7 @@ impl Output for JsonOutput<'_> {
     }
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
-        let setup = simulation.setup;
-        let arrival = simulation.arrival;
-        let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
-            let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
-            json!({ "x1": x1, "time": time })
-        });
-        let receivers: Vec<Value> = receivers.collect();
-        let mut value = json!({
-            "velocity": arrival.as_ref().ok().map(|arrival| arrival.velocity),
-            "failure": arrival.as_ref().err().map(|failure| failure.kind.name()),
-            "detail": arrival.as_ref().err().map(|failure| failure.detail.as_str()),
-            "receivers": receivers,
-            "picking": {
-                "extremum": setup.picking.extremum.name(),
-                "threshold": setup.picking.threshold,
-            },
-            "solver": solver_value(setup, arrival.as_ref().ok()),
-            "version": version::VERSION,
-        });
-        if let Some(check) = simulation.check {
-            value["check"] = check.solutions().into_iter().map(solution_value).collect();
-        }
-        self.value(&value)
+        self.value(&simulation_value(simulation))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
@@ -78,6 +57,34 @@ impl Output for JsonOutput<'_> {
         self.writer.write_all(text.as_bytes())?;
         self.writer.flush()
     }
+}
+
+/// The object of a simulation.
+fn simulation_value(simulation: &ShownSimulation<'_>) -> Value {
+    let ShownSimulation { setup, arrival, .. } = *simulation;
+    let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
+        let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
+        json!({ "x1": x1, "time": time })
+    });
+    let mut object = Map::new();
+    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+    results_json::head(&mut put, "simulation");
+    put("velocity", json!(arrival.as_ref().ok().map(|arrival| arrival.velocity)));
+    put("failure", json!(arrival.as_ref().err().map(|failure| failure.kind.name())));
+    put("detail", json!(arrival.as_ref().err().map(|failure| failure.detail.as_str())));
+    put("receivers", receivers.collect());
+    put("picking", results_json::picking(&setup.picking));
+    put("solver", solver_value(setup, arrival.as_ref().ok()));
+    if let Some(check) = simulation.check {
+        put("check", check.solutions().into_iter().map(solution_value).collect());
+    }
+    results_json::program(&mut put, &program::this());
+    Value::Object(object)
+}
+
+/// The text of the object of a simulation, with a final newline.
+pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
+    format!("{:#}\n", simulation_value(simulation))
 }
 
 /// The object `solver` of one solution, with what came out and how it differs from the refined one.

@@ -9,7 +9,7 @@ use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::results::{Evaluation, JobResult};
-use osteon_common::version;
+use osteon_common::version::Program;
 use osteon_coordinator::search::{Search, Step};
 use osteon_solver::{Isa, Solver, Workspace};
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ pub(crate) fn identify(
                 search.tell(found, None);
             }
             Step::Done(ending) => {
-                let result = search.result(&ending, version::VERSION);
+                let result = search.result(&ending, &Program::this(None));
                 return Ok((result, search.history().to_vec()));
             }
         }

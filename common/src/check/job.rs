@@ -141,7 +141,8 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
         return;
     }
     let mut names = BTreeSet::new();
-    for (set, Group { name, velocities: measured }) in groups.iter().enumerate() {
+    for (set, group) in groups.iter().enumerate() {
+        let Group { name, velocities: measured } = group;
         let field = entry_path(FIELD, name);
         if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
@@ -159,8 +160,42 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");
         }
-        velocities(&field, measured, (origin, set), violations);
+        match group.no_variation() {
+            // The job is run for the others.
+            Some(_) if !each_velocity(&field, measured, violations) => {}
+            Some(_) => impossible(&field, measured, (origin, set), violations),
+            None => velocities(&field, measured, (origin, set), violations),
+        }
     }
+    if !violations.touches("data") && groups.iter().all(|group| group.no_variation().is_some()) {
+        violations.add(
+            FIELD,
+            format!("none of the {count} has two velocities that differ, which {MOMENTS_NEED}"),
+        );
+    }
+}
+
+/// Checks velocities one by one, and how many there are. Whether nothing is wrong with them.
+fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> bool {
+    if known_wrong(field, violations) {
+        return false;
+    }
+    let count = measured.len();
+    if count > limits::DATA_VELOCITIES_MAX {
+        let max = limits::DATA_VELOCITIES_MAX;
+        violations.add(field, format!("has {count} velocities; at most {max}"));
+        return false;
+    }
+    let refused =
+        measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
+    for (refusals, (index, &velocity)) in refused.enumerate() {
+        if refusals == REFUSED_MAX {
+            violations.add_more(field, "more velocities out of range are not listed");
+            return false;
+        }
+        violations.add(element_path(field, index), VELOCITY.refusal(velocity));
+    }
+    !violations.touches(field)
 }
 
 /// Checks the velocities of one set, which has a number in the file that they come from.
@@ -170,27 +205,10 @@ fn velocities(
     (origin, set): (Option<&Origin>, usize),
     violations: &mut Violations,
 ) {
-    if known_wrong(field, violations) {
+    if !each_velocity(field, measured, violations) {
         return;
     }
     let count = measured.len();
-    if count > limits::DATA_VELOCITIES_MAX {
-        let max = limits::DATA_VELOCITIES_MAX;
-        violations.add(field, format!("has {count} velocities; at most {max}"));
-        return;
-    }
-    let refused =
-        measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
-    for (refusals, (index, &velocity)) in refused.enumerate() {
-        if refusals == REFUSED_MAX {
-            violations.add_more(field, "more velocities out of range are not listed");
-            return;
-        }
-        violations.add(element_path(field, index), VELOCITY.refusal(velocity));
-    }
-    if violations.touches(field) {
-        return;
-    }
     if count < VELOCITIES_MIN {
         let contains = if count == 0 { "no velocity" } else { "only one velocity" };
         violations
@@ -243,7 +261,7 @@ fn impossible(
         .filter_map(|(index, &velocity)| Some((index, no_velocity(velocity)?)));
     for (refusals, (index, refusal)) in refused.enumerate() {
         if refusals == REFUSED_MAX {
-            violations.add(field, "has more velocities to refuse, not listed here");
+            violations.add_more(field, "more velocities out of range are not listed");
             return;
         }
         let (element, place) = (element_path(field, index), Origin::place(origin, set, index));

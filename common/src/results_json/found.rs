@@ -17,14 +17,19 @@ pub(super) fn point(
     objective: Objective,
     best: Option<&BestPoint>,
 ) {
-    let point = best.map(|best| best.point);
     put("cost", json!(best.and_then(|best| best.cost)));
     if objective == Objective::Likelihood {
         put("cost_standard_error", json!(best.and_then(|best| best.cost_error)));
     }
+    model(put, best);
+    put("velocity", measured::model(best));
+}
+
+/// Mean model and dispersion of the best point.
+pub(super) fn model(put: &mut impl FnMut(&str, Value) -> Option<Value>, best: Option<&BestPoint>) {
+    let point = best.map(|best| best.point);
     put("parameters", mean_model(point.as_ref()));
     put("dispersion", json!(point.map(|point| point.dispersion())));
-    put("velocity", measured::model(best));
 }
 
 /// What was found for a group.

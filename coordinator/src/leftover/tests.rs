@@ -7,6 +7,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings};
 use osteon_common::outcome::Outcome;
 use osteon_common::results::EstimatedError;
+use osteon_common::version::Program;
 
 use tokio::sync::{mpsc, oneshot};
 
@@ -66,7 +67,7 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         client: String::new(),
         priority: 0,
     };
-    let end = EndRecord::new(JOB, ending, Duration::ZERO, 8, search.best());
+    let end = EndRecord::new(JOB, ending, Program::this(None), Duration::ZERO, 8, search.best());
     let best = search.best().unwrap().number as usize;
     assert!((1..8).contains(&best), "a search that finds nothing tests nothing");
     (record, search, end, records.swap_remove(best))
@@ -80,7 +81,7 @@ fn the_summary_and_the_best_evaluation_are_enough() {
     store.put_evaluation(&best, false).unwrap();
     store.finish_job(&end, &search.summary()).unwrap();
     let left = read(&mut store, &end).unwrap();
-    assert_eq!(left.result, search.result(&end.ending, &end.version));
+    assert_eq!(left.result, search.result(&end.ending, &end.program));
     assert_eq!(left.history, search.history());
 }
 
@@ -110,7 +111,7 @@ fn a_path_without_an_evaluation_leaves_a_result() {
     let search = Search::new(record.specification.clone());
     store.finish_job(&end, &crate::search::Summary::empty()).unwrap();
     let left = read(&mut store, &end).unwrap();
-    assert_eq!(left.result, search.result(&end.ending, &end.version));
+    assert_eq!(left.result, search.result(&end.ending, &end.program));
 }
 
 /// A store with an ended job.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::Status;
+use osteon_common::version::Program;
 
 use super::{Effects, ahead, batches, expulsion, reread};
 use crate::effect::{Answer, Effect, Record, Refusal};
@@ -293,7 +294,8 @@ pub(super) fn finish(
     let search = &job.search;
     // Of groups none is the job's.
     let best = search.best().filter(|_| !search.is_grouped());
-    let record = EndRecord::new(id, ending, now, search.evaluations(), best);
+    let program = Program::this(state.config.commit);
+    let record = EndRecord::new(id, ending, program, now, search.evaluations(), best);
     let summary = Arc::new(search.summary());
     effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use osteon_common::job::{Data, JobSpecification};
+use osteon_common::job::{Data, Group, JobSpecification};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 use osteon_common::results::{Evaluation, GroupEnding, Status};
@@ -86,8 +86,11 @@ impl Identification {
         let endings = self.endings();
         match (&specification.data, endings.as_slice()) {
             (Some(Data::Groups(groups)), endings) => {
-                let names = groups.iter().map(|group| group.name.as_str());
-                together(&names.zip(endings).collect::<Vec<_>>())
+                let (unsearched, searched): (Vec<_>, Vec<_>) = groups
+                    .iter()
+                    .zip(endings)
+                    .partition(|(group, _)| group.no_variation().is_some());
+                together(&searched, &unsearched)
             }
             (_, [GroupEnding { status, reason, .. }]) => Ending::of_search(*status, reason.clone()),
             // Only what has ended is asked how it did.
@@ -109,23 +112,29 @@ impl Identification {
     }
 }
 
-/// How the searches for groups ended, given the name of each.
-fn together(groups: &[(&str, &GroupEnding)]) -> Ending {
+/// How the searches for groups ended together. Those for which none could be made are told of, and
+/// decide nothing.
+fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEnding)]) -> Ending {
     for (status, what) in [(Status::Failed, "failed"), (Status::MaxEvaluations, "did not converge")]
     {
         let of_status: Vec<_> =
             groups.iter().filter(|(_, ending)| ending.status == status).collect();
-        if let Some((name, first)) = of_status.first() {
+        if let Some((Group { name, .. }, first)) = of_status.first() {
             let why = first.reason.as_ref().map_or_else(
                 || ", which reached its limit of evaluations".to_owned(),
                 |reason| format!(": {reason}"),
             );
-            let (count, all) = (of_status.len(), groups.len());
+            let (count, all) = (of_status.len(), groups.len() + unsearched.len());
             let reason = format!(
                 "the searches for {count} of {all} groups {what}; the first is {name:?}{why}"
             );
             return Ending::of_search(status, Some(reason));
         }
     }
-    Ending::of_search(Status::Converged, None)
+    let reason = unsearched.first().map(|(Group { name, .. }, first)| {
+        let (count, all) = (unsearched.len(), groups.len() + unsearched.len());
+        let why = first.reason.as_deref().unwrap_or_default();
+        format!("no search was made for {count} of {all} groups; the first is {name:?}: {why}")
+    });
+    Ending::of_search(Status::Converged, reason)
 }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use osteon_common::ensemble::Germs;
-use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{Evaluation, GroupEnding, Moments, Role};
+use osteon_common::results::{Evaluation, GroupEnding, Moments, Role, Status};
 use osteon_common::statistics::{Verdict, likelihood_cost};
 
 use super::method::Method;
@@ -67,7 +67,10 @@ impl OneSet {
             differences: Vec::new(),
             ending: None,
         };
-        search.settle(specification);
+        match given.and_then(|given| given.groups().get(set)?.no_variation()) {
+            Some(why) => search.ending = Some(unsearched(why)),
+            None => search.settle(specification),
+        }
         search
     }
 
@@ -221,6 +224,11 @@ impl OneSet {
         let best = self.best().map(|row| row.number);
         self.ending = Some(GroupEnding { status, reason, best });
     }
+}
+
+/// How the search for a group ends that has nothing to match.
+fn unsearched(why: NoVariation) -> GroupEnding {
+    GroupEnding { status: Status::Failed, reason: Some(why.to_string()), best: None }
 }
 
 /// The velocities of a set of data, where they are known.

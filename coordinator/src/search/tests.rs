@@ -66,7 +66,7 @@ fn an_identification_finds_what_made_the_data() {
     let (search, _) = run(&specification(400));
     let ending = ending(&search);
     assert_eq!(ending, Ending::of_search(Status::Converged, None));
-    let result = search.result(&ending, "1");
+    let result = search.result(&ending, &Program::this(None));
     let best = result.best.unwrap();
     assert!(best.cost.unwrap() <= 1e-10);
     assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-4, "{best:?}");
@@ -142,7 +142,7 @@ fn the_best_evaluated_point_is_returned_and_not_the_last() {
         let costs: Vec<f64> = searched.map(|row| row.cost.unwrap()).collect();
         let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
         let first = costs.iter().position(|cost| *cost == lowest).unwrap();
-        let best = search.result(&ending(&search), "1").best.unwrap();
+        let best = search.result(&ending(&search), &Program::this(None)).best.unwrap();
         assert_eq!((best.point, best.cost), (told[first].0, Some(lowest)));
         assert_eq!(search.best().unwrap().number, first as u64);
     }
@@ -177,8 +177,8 @@ fn replay_of_any_part(specification: &JobSpecification) {
         }
         assert_eq!(search.ask(), full.ask());
         assert_eq!(search.history(), full.history());
-        let (ending, version) = (ending(&full), "1");
-        assert_eq!(search.result(&ending, version), full.result(&ending, version));
+        let (ending, program) = (ending(&full), Program::this(None));
+        assert_eq!(search.result(&ending, &program), full.result(&ending, &program));
     }
 }
 
@@ -203,7 +203,7 @@ fn the_digest_follows_the_order_of_the_path() {
             digest.add_evaluation(point, outcomes);
         }
     }
-    assert_eq!(search.result(&ending(&search), "1").digest, digest.finish());
+    assert_eq!(search.result(&ending(&search), &Program::this(None)).digest, digest.finish());
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
     // What failed everywhere has no best point, nothing that data could have determined.
     assert_eq!(search.best(), None);
-    assert_eq!(search.result(&ending(&search), "1").best, None);
+    assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn a_propagation_is_one_evaluation_at_the_start() {
     let (search, told) = run(&propagation);
     assert_eq!(told.len(), 1);
     assert_eq!(told[0].0, propagation.start());
-    let result = search.result(&ending(&search), "1");
+    let result = search.result(&ending(&search), &Program::this(None));
     assert_eq!((result.status, result.data), (Status::Converged, None));
     let best = result.best.unwrap();
     assert_eq!((best.cost, best.estimated_error), (None, ERRORS));
@@ -291,7 +291,7 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("inadmissible"));
-    assert!(search.result(&ending(&search), "1").best.is_none());
+    assert!(search.result(&ending(&search), &Program::this(None)).best.is_none());
 }
 
 /// Velocities that the control variate explains wholly: their moments are the law's whatever the
@@ -328,9 +328,9 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
         search.tell(explained(&asked, &point), ERRORS);
         again.retell(point, explained(&asked, &point), ERRORS).unwrap();
     }
-    let result = search.result(&ending(&search), "1");
+    let result = search.result(&ending(&search), &Program::this(None));
     assert_eq!(result.status, Status::Converged);
-    assert_eq!(result, again.result(&ending(&again), "1"));
+    assert_eq!(result, again.result(&ending(&again), &Program::this(None)));
     assert_eq!((result.sampling, result.scrambles), (Sampling::Sobol, 2));
     let best = result.best.unwrap();
     assert!(best.velocity.unwrap().controlled);

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::{JobFailure, Moments, Status};
+use osteon_common::version::Program;
 use osteon_proto::{specification, v1};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
@@ -141,7 +142,8 @@ impl SqliteStore {
 
     fn end(&self, job: JobId) -> Result<Option<EndRecord>, StoreError> {
         let sql = "SELECT status, reason, version, ended_ns, evaluations, best_cost, best_mean,
-                   best_coefficient_of_variation, checksum, failure FROM ending WHERE job = ?1";
+                   best_coefficient_of_variation, checksum, failure, numerics, commit_id
+                   FROM ending WHERE job = ?1";
         let read = |row: &Row<'_>| {
             let status: String = row.get(0)?;
             let status = Status::ALL.into_iter().find(|known| known.name() == status);
@@ -162,7 +164,11 @@ impl SqliteStore {
             let end = EndRecord {
                 job,
                 ending: Ending { status, failure: failed, reason },
-                version: row.get(2)?,
+                program: Program {
+                    version: row.get(2)?,
+                    numerics: row.get(10)?,
+                    commit: row.get(11)?,
+                },
                 ended: Duration::from_nanos(row.get(3)?),
                 evaluations: row.get(4)?,
                 best_cost: row.get(5)?,
@@ -305,13 +311,14 @@ impl Store for SqliteStore {
     fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
         let sql =
             "INSERT OR REPLACE INTO ending (job, status, reason, version, ended_ns, evaluations,
-                   best_cost, best_mean, best_coefficient_of_variation, checksum, failure)
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
+                   best_cost, best_mean, best_coefficient_of_variation, checksum, failure, numerics,
+                   commit_id)
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
         let values = params![
             record.job.0,
             record.ending.status.name(),
             record.ending.reason,
-            record.version,
+            record.program.version,
             nanoseconds(record.ended),
             record.evaluations,
             record.best_cost,
@@ -319,6 +326,8 @@ impl Store for SqliteStore {
             record.best_moments.map(|moments| moments.coefficient_of_variation),
             end_checksum(record),
             record.ending.failure.map(JobFailure::name),
+            record.program.numerics,
+            record.program.commit,
         ];
         let finish = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
@@ -457,8 +466,8 @@ fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
         failure: Some(JobFailure::Store),
         reason: Some(error.to_string()),
     };
-    let version = "unknown".to_owned();
-    EndRecord { version, ..EndRecord::new(record.job, ending, record.accepted, 0, None) }
+    let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
+    EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }
 
 /// The job of a row, and its identifier; `None` if it is damaged.

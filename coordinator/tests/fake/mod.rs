@@ -9,7 +9,7 @@ use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective,
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, JobResult};
-use osteon_common::version::{self, VERSION};
+use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::effect::Record;
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, WorkerId};
@@ -171,7 +171,7 @@ pub(crate) fn left_by(
     let groups =
         groups.filter_map(|(set, group)| summary.group(specification, set, best(group.best)));
     let groups = groups.collect();
-    summary.result(specification, ending, VERSION, best(summary.best), groups)
+    summary.result(specification, ending, &Program::this(None), best(summary.best), groups)
 }
 
 /// All outcomes at one point, with the median and the largest of their estimated errors.

@@ -235,6 +235,8 @@ prop_compose! {
         sampling in 0..Sampling::ALL.len(),
         scrambles in 1..=SCRAMBLES_MAX,
         control_variate: bool,
+        numerics: u32,
+        commit in proptest::option::of("[0-9a-f]{1,40}"),
     ) -> JobResult {
         JobResult {
             status: Status::ALL[status],
@@ -256,7 +258,7 @@ prop_compose! {
             solver: SolverSettings::default(),
             nominal: control_variate.then_some(NominalSampling { band: 2e6, period: 1e-4, pairs: 7 }),
             picking: Picking::default(),
-            version: "0.1.0".to_owned(),
+            program: Program { version: "0.1.0".to_owned(), numerics, commit },
         }
     }
 }
@@ -375,7 +377,7 @@ fn complete() -> v1::JobResult {
         solver: SolverSettings::default(),
         nominal: None,
         picking: Picking::default(),
-        version: String::new(),
+        program: Program::this(None),
     })
 }
 

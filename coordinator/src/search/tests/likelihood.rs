@@ -65,7 +65,7 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let job = by_likelihood(&truth, 5, 100);
     let search = run_on_speeds(&job);
-    let best = search.result(&ending(&search), "1").best.unwrap();
+    let best = search.result(&ending(&search), &Program::this(None)).best.unwrap();
     // ln(107 √(2πe)) = 6.09, by a sample of 100.
     assert!((5.9..6.3).contains(&best.cost.unwrap()), "{:?}", best.cost);
     assert!((1e-5..0.05).contains(&best.cost_error.unwrap()), "{:?}", best.cost_error);
@@ -78,7 +78,10 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     for row in search.history() {
         again.retell(row.point, speeds(&job.monte_carlo, &row.point), ERRORS).unwrap();
     }
-    assert_eq!(again.result(&ending(&again), "1"), search.result(&ending(&search), "1"));
+    assert_eq!(
+        again.result(&ending(&again), &Program::this(None)),
+        search.result(&ending(&search), &Program::this(None))
+    );
 }
 
 /// From far away only the floor of the density tells where the data are.

@@ -55,7 +55,10 @@ fn without_derivatives_the_search_ends_with_the_method() {
     let mut specification = specification(400);
     specification.search.sensitivities = false;
     let (search, _) = run(&specification);
-    assert_eq!(search.result(&ending(&search), "1").evaluations, search.history().len() as u64);
+    assert_eq!(
+        search.result(&ending(&search), &Program::this(None)).evaluations,
+        search.history().len() as u64
+    );
 }
 
 /// Three parameters are free and two moments are given: of the points that match them, about, the
@@ -126,7 +129,7 @@ fn each_group_is_identified_by_itself() {
     // All begin at the start of the job.
     let firsts = (0..3).map(|k| summary.history.iter().find(|row| row.role.group == k).unwrap());
     assert!(firsts.into_iter().all(|row| row.point == told[0].0));
-    assert_eq!(search.result(&ending(&search), "1").best, None);
+    assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
 }
 
 #[test]
@@ -169,4 +172,51 @@ fn several_starts_give_several_answers() {
     assert_eq!(search.best().unwrap().number, starts[0].1.number);
     let again = run(&specification).0;
     assert_eq!(search.summary(), again.summary());
+}
+
+/// Groups of which some have nothing to match.
+fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
+    let group = |(name, velocities): &(&str, &[f64])| Group {
+        name: (*name).to_owned(),
+        velocities: velocities.to_vec(),
+    };
+    let data = Some(Data::Groups(groups.iter().map(group).collect()));
+    JobSpecification { data, ..specification(400) }
+}
+
+#[test]
+fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
+    let (left, right): (&[f64], &[f64]) = (&[3850.0, 3900.0, 3990.0], &[3800.0, 3900.0, 3950.0]);
+    let whole = job_of(&[("left", left), ("right", right)]);
+    let (known, _) = run(&whole);
+    let known = known.result(&ending(&known), &Program::this(None));
+    let one: &[f64] = &[3900.0];
+    let same: &[f64] = &[3950.0, 3950.0, 3950.0];
+    for (place, unsearched, expected) in [
+        (0, one, "only one velocity: a coefficient of variation needs at least two different ones"),
+        (1, one, "only one velocity: "),
+        (2, one, "only one velocity: "),
+        (1, same, "all 3 velocities are 3950.0 m/s: a coefficient of variation needs"),
+    ] {
+        let mut groups = vec![("left", left), ("right", right)];
+        groups.insert(place, ("lonely", unsearched));
+        let specification = job_of(&groups);
+        let (search, _) = run(&specification);
+        let summary = search.summary();
+        let found = search.result(&ending(&search), &Program::this(None));
+        assert_eq!((&found.digest, found.evaluations), (&known.digest, known.evaluations));
+        assert_eq!(specification.evaluations_max(), whole.evaluations_max());
+        // Each evaluation is for the group whose number it has.
+        let place = u32::try_from(place).unwrap();
+        assert!(search.history().iter().all(|row| row.role.group != place));
+        assert_eq!(summary.groups.len(), 3);
+        let GroupEnding { status, reason, best } = &summary.groups[place as usize];
+        assert_eq!((*status, *best), (Status::Failed, None));
+        assert!(reason.as_ref().unwrap().starts_with(expected), "{reason:?}");
+        // The others say how the job ended.
+        assert_eq!(found.status, known.status);
+        let told = "no search was made for 1 of 3 groups; the first is \"lonely\": ";
+        let reason = found.reason.unwrap();
+        assert!(reason.contains(told) && reason.contains(expected), "{reason}");
+    }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::Point;
 use osteon_common::results::EstimatedError;
+use osteon_common::version::Program;
 use rusqlite::Row;
 
 use crate::ids::JobId;
@@ -95,7 +96,8 @@ pub(super) fn evaluation_checksum(
 }
 
 pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
-    let EndRecord { job, ending, version, ended, evaluations, best_cost, best_moments } = end;
+    let EndRecord { job, ending, program, ended, evaluations, best_cost, best_moments } = end;
+    let Program { version, numerics, commit } = program;
     let optional = |value: Option<f64>| value.map(|value| value.to_le_bytes().to_vec());
     let (mean, variation) = (
         best_moments.map(|moments| moments.mean),
@@ -105,9 +107,12 @@ pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
     let failure = ending.failure.map(|failure| failure.name().as_bytes().to_vec());
     let numbers = [job.0, nanoseconds(*ended), *evaluations].map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();
-    fields.extend([ending.status.name().as_bytes(), version.as_bytes()]);
+    let numerics = numerics.to_le_bytes();
+    fields.extend([ending.status.name().as_bytes(), version.as_bytes(), &numerics]);
+    let commit = commit.as_ref().map(|commit| commit.as_bytes().to_vec());
     // What is absent has no field, and a field of one byte says that it is present.
-    let optional = [failure, reason, optional(*best_cost), optional(mean), optional(variation)];
+    let optional =
+        [failure, reason, optional(*best_cost), optional(mean), optional(variation), commit];
     for value in &optional {
         fields.push(if value.is_some() { &[1] } else { &[0] });
         fields.extend(value.as_deref());

@@ -27,7 +27,9 @@ pub(super) const SCHEMA: &str = "
         status TEXT NOT NULL,
         failure TEXT,                    -- of which kind it is
         reason TEXT,
-        version TEXT NOT NULL,
+        version TEXT NOT NULL,           -- of the program
+        numerics INTEGER NOT NULL,       -- their revision in it
+        commit_id TEXT,                  -- that it was built from
         ended_ns INTEGER NOT NULL,
         evaluations INTEGER NOT NULL,
         best_cost REAL,

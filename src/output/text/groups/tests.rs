@@ -1,0 +1,76 @@
+use serde_json::json;
+
+use super::*;
+
+fn quantity(value: f64, interval: [f64; 2]) -> Value {
+    json!({ "value": value, "interval": interval })
+}
+
+/// A group with two free parameters, both known.
+fn known(name: &str, modulus: f64) -> Value {
+    json!({
+        "name": name,
+        "status": "converged",
+        "cost": 3.2145e-13,
+        "data": {
+            "mean": 3906.2514,
+            "coefficient_of_variation": 0.027134,
+            "interval": {
+                "mean": [3895.21, 3916.64],
+                "coefficient_of_variation": [0.02512, 0.02934],
+            },
+            "count": 62,
+        },
+        "sensitivities": { "longitudinal_young_modulus": {}, "dispersion": {} },
+        "identified": {
+            "matched": true,
+            "bulk_velocity": quantity(3974.19, [3958.24, 3990.2]),
+            "dispersion": quantity(0.0961, [0.0882, 0.1046]),
+            "parameters": {
+                "longitudinal_young_modulus": quantity(modulus, [modulus - 3e8, modulus + 3e8]),
+                "dispersion": quantity(0.0961, [0.0882, 0.1046]),
+            },
+        },
+    })
+}
+
+#[test]
+fn a_table_of_groups_shows_intervals_and_reasons() {
+    let mut outlier = known("P02", 2.5e10);
+    outlier["reason"] = json!("settled at a cost of 7.644e-1, above cost_tolerance 1e-12");
+    let unknown = |value: f64| json!({ "value": value, "interval": null });
+    let nothing = json!({
+        "matched": false,
+        "bulk_velocity": unknown(4256.31),
+        "dispersion": unknown(0.3),
+        "parameters": { "longitudinal_young_modulus": null, "dispersion": null },
+    });
+    outlier["identified"] = nothing.clone();
+    let lonely = json!({
+        "name": "P03",
+        "status": "failed",
+        "reason": "only one velocity: a coefficient of variation needs at least two different ones",
+        "cost": null,
+        "data": { "mean": 3911.5, "coefficient_of_variation": 0.0, "interval": null, "count": 1 },
+    });
+    let mut unmatched = known("P04", 2e10);
+    unmatched["identified"] = nothing;
+    insta::assert_snapshot!(table(&[known("P01", 1.7717e10), outlier, lonely, unmatched]));
+}
+
+#[test]
+fn what_the_data_cannot_say_is_told_once() {
+    let with = |names: &[&str]| {
+        let mut group = known("P01", 2e10);
+        let free = names.iter().map(|name| ((*name).to_owned(), json!({}))).collect();
+        group["sensitivities"] = Value::Object(free);
+        table(&[group.clone(), group])
+    };
+    let seven = Parameter::ALL.map(Parameter::name);
+    let text = with(&seven);
+    assert_eq!(text.matches("Two moments cannot determine seven parameters.").count(), 1, "{text}");
+    assert!(text.contains("Only √(c1111/ρ) and the dispersion are constrained"), "{text}");
+    assert!(with(&seven[..3]).contains("three parameters. Only √(c1111/ρ) is"));
+    assert!(!with(&["longitudinal_young_modulus", "dispersion"]).contains("cannot determine"));
+    assert!(!with(&["longitudinal_young_modulus"]).contains("cannot determine"));
+}

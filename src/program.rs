@@ -1,0 +1,24 @@
+//! What this program is, for people and for results.
+
+use std::sync::LazyLock;
+
+use osteon_common::version::{NUMERICS_REVISION, Program, RESULT_SCHEMA, VERSION};
+
+/// The commit that it was built from; `None` if it was built outside a repository.
+pub(crate) const COMMIT: Option<&str> = option_env!("OSTEON_BUILD_COMMIT");
+
+/// This program.
+pub(crate) fn this() -> Program {
+    Program::this(COMMIT)
+}
+
+/// What `--version` prints behind the name.
+pub(crate) fn version_line() -> &'static str {
+    static LINE: LazyLock<String> = LazyLock::new(|| {
+        let commit = COMMIT.unwrap_or("unknown");
+        format!(
+            "{VERSION} (commit {commit}, numerics {NUMERICS_REVISION}, result schema {RESULT_SCHEMA})"
+        )
+    });
+    &LINE
+}

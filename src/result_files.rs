@@ -1,0 +1,138 @@
+//! The files of a results directory as they are written: each by rename, and at the end
+//! `provenance.json`, which says of all of them what made them.
+
+use std::fs;
+use std::io::{self, BufWriter, IntoInnerError, Write};
+use std::path::Path;
+
+use anyhow::Context as _;
+use osteon_common::version::{Program, RESULT_SCHEMA};
+use osteon_common::{user_file, visible};
+use serde_json::{Value, json};
+
+/// The file of a result, written last: a directory with it is complete.
+pub(crate) const RESULT: &str = "result.json";
+/// The file that says what made the others.
+pub(crate) const PROVENANCE: &str = "provenance.json";
+
+/// What made the files of a directory.
+pub(crate) struct Origin<'a> {
+    /// What was computed: `kind` of the result.
+    pub(crate) kind: &'a str,
+    /// The program that computed the result.
+    pub(crate) program: &'a Program,
+    /// Digest of the result, if it has one.
+    pub(crate) digest: Option<&'a str>,
+    /// Seed of the germs, if there were any.
+    pub(crate) seed: Option<u64>,
+}
+
+/// Files that are written to a directory one after the other.
+pub(crate) struct ResultFiles<'a> {
+    directory: &'a Path,
+    written: Vec<Value>,
+}
+
+impl<'a> ResultFiles<'a> {
+    /// From now on the directory has no complete result, until [`finish`](Self::finish).
+    pub(crate) fn begin(directory: &'a Path) -> anyhow::Result<Self> {
+        for name in [RESULT, PROVENANCE] {
+            remove_if_there(&directory.join(name))?;
+        }
+        Ok(Self { directory, written: Vec::new() })
+    }
+
+    /// Writes a file.
+    pub(crate) fn write(&mut self, name: &str, text: &str) -> anyhow::Result<()> {
+        self.write_by(name, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// The same of what `print` writes piece by piece.
+    pub(crate) fn write_by(
+        &mut self,
+        name: &str,
+        print: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> anyhow::Result<()> {
+        let mut hash = blake3::Hasher::new();
+        write_by(&self.directory.join(name), |file| print(&mut Hashing { file, hash: &mut hash }))?;
+        self.note(name, &hash);
+        Ok(())
+    }
+
+    /// Writes `provenance.json`, then the result.
+    pub(crate) fn finish(mut self, result: &str, origin: &Origin<'_>) -> anyhow::Result<()> {
+        let mut hash = blake3::Hasher::new();
+        hash.update(result.as_bytes());
+        self.note(RESULT, &hash);
+        let Program { version, numerics, commit } = origin.program;
+        let provenance = json!({
+            "schema": RESULT_SCHEMA,
+            "kind": origin.kind,
+            "program": "osteon",
+            "version": version,
+            "numerics": numerics,
+            "commit": commit,
+            "digest": origin.digest,
+            "seed": origin.seed,
+            "files": self.written,
+        });
+        write(&self.directory.join(PROVENANCE), &format!("{provenance:#}\n"))?;
+        write(&self.directory.join(RESULT), result)
+    }
+
+    fn note(&mut self, name: &str, hash: &blake3::Hasher) {
+        self.written.push(json!({
+            "name": name,
+            "blake3": hash.finalize().to_hex().as_str(),
+            "bytes": hash.count(),
+        }));
+    }
+}
+
+/// Takes the hash of what is written.
+struct Hashing<'a> {
+    file: &'a mut dyn Write,
+    hash: &'a mut blake3::Hasher,
+}
+
+impl Write for Hashing<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.hash.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Writes `text` to `path` so that a reader sees either what was there before, or all of it.
+pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    write_by(path, |file| file.write_all(text.as_bytes()))
+}
+
+fn write_by(
+    path: &Path,
+    print: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> anyhow::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let write = || -> io::Result<()> {
+        let mut file = BufWriter::new(user_file::create(&part)?);
+        print(&mut file)?;
+        file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
+        fs::rename(&part, path)
+    };
+    write().with_context(|| format!("cannot write {}", visible::path(path)))
+}
+
+fn remove_if_there(path: &Path) -> anyhow::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))
+        }
+        _ => Ok(()),
+    }
+}

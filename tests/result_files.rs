@@ -1,0 +1,284 @@
+//! What other programs read: the keys of every JSON file and the columns of every table, their order
+//! and their types. A change here is one of the result schema.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
+use support::{Scratch, job, run, text};
+
+/// One line for each key below `value`: its path and what it holds.
+fn keys(value: &Value) -> String {
+    let mut lines = String::new();
+    add_keys(&mut lines, "", value);
+    lines
+}
+
+fn add_keys(lines: &mut String, path: &str, value: &Value) {
+    let kind = match value {
+        // Built outside a repository it is null.
+        Value::Null if path == "commit" => "text",
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+        Value::Number(number) if number.is_f64() => "number",
+        Value::Number(_) => "integer",
+        Value::String(_) => "text",
+        Value::Array(_) => "list",
+        Value::Object(_) => "object",
+    };
+    if !path.is_empty() {
+        lines.push_str(&format!("{path}: {kind}\n"));
+    }
+    let inside = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match value {
+        Value::Object(entries) => {
+            let trees: BTreeSet<String> = entries.values().map(tree).collect();
+            if entries.len() >= ALIKE_MIN && trees.len() == 1 {
+                let names: Vec<&str> = entries.keys().map(String::as_str).collect();
+                lines.push_str(&format!("{path}.*: {}\n", names.join(", ")));
+                add_keys(lines, &inside("*"), &entries[names[0]]);
+                return;
+            }
+            for (key, value) in entries {
+                add_keys(lines, &inside(key), value);
+            }
+        }
+        // The elements of a list are alike: the one with most keys stands for all.
+        Value::Array(elements) => {
+            let fullest = elements.iter().max_by_key(|element| keys(element).lines().count());
+            if let Some(element) = fullest {
+                add_keys(lines, &format!("{path}[]"), element);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Entries of an object that are shown as one, if they are so many and alike: parameters, say.
+const ALIKE_MIN: usize = 6;
+
+/// What a value holds, and what is below it.
+fn tree(value: &Value) -> String {
+    let mut lines = String::new();
+    add_keys(&mut lines, "*", value);
+    lines
+}
+
+/// One line for each column of a table: its name and what its fields are.
+fn columns(table: &str) -> String {
+    let mut lines = table.lines();
+    let names = fields(lines.next().unwrap());
+    let rows: Vec<Vec<String>> = lines.map(fields).collect();
+    let kind = |column: usize| {
+        let kinds: BTreeSet<&str> = rows.iter().map(|row| kind(&row[column])).collect();
+        let mut kinds: Vec<&str> = kinds.into_iter().collect();
+        // Where some are whole and some are not, they are numbers.
+        if kinds.contains(&"number") {
+            kinds.retain(|kind| *kind != "integer");
+        }
+        kinds.join(" or ")
+    };
+    let line = |(at, name): (usize, &String)| format!("{name}: {}\n", kind(at));
+    names.iter().enumerate().map(line).collect()
+}
+
+fn kind(field: &str) -> &'static str {
+    if field.is_empty() {
+        "empty"
+    } else if field.parse::<u64>().is_ok() {
+        "integer"
+    } else if field.parse::<f64>().is_ok() {
+        "number"
+    } else {
+        "text"
+    }
+}
+
+fn fields(line: &str) -> Vec<String> {
+    let mut fields = vec![String::new()];
+    let mut quoted = false;
+    for character in line.chars() {
+        match character {
+            '"' => quoted = !quoted,
+            ',' if !quoted => fields.push(String::new()),
+            _ => fields.last_mut().unwrap().push(character),
+        }
+    }
+    fields
+}
+
+fn read(directory: &Path, name: &str) -> String {
+    fs::read_to_string(directory.join(name)).unwrap()
+}
+
+fn json(directory: &Path, name: &str) -> Value {
+    serde_json::from_str(&read(directory, name)).unwrap()
+}
+
+/// The directories of one run of each kind.
+struct Runs {
+    _scratch: Scratch,
+    identified: PathBuf,
+    grouped: PathBuf,
+    propagated: PathBuf,
+    simulated: PathBuf,
+}
+
+const DATA: &str = "[data]\nmean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+
+impl Runs {
+    fn new() -> Self {
+        let scratch = Scratch::new();
+        let velocities = [3820.5, 3850.25, 3885.0, 3906.0, 3930.5, 3960.0, 3995.75];
+        let search = |data: &str, search: &str| {
+            let text = job(32, 30).replace(DATA, data);
+            text.replace("[search]\n", &format!("[search]\nmethod = \"newton\"\n{search}"))
+        };
+        let run_job = |name: &str, command: &str, text: &str| {
+            let job = scratch.write(&format!("{name}.toml"), text);
+            let out = scratch.path(name);
+            run(&[command, support::text(&job), "--out", support::text(&out)]).succeeded();
+            out
+        };
+        let measured = format!("[data]\nvelocities = {velocities:?}\n");
+        let identified = run_job("identified", "identify", &search(&measured, "starts = 2\n"));
+        let groups = format!(
+            "[data.groups]\nlonely = [3900.0]\nleft = {velocities:?}\nright = [3800.0, 3900.0, 3950.0]\n"
+        );
+        let grouped = run_job("grouped", "identify", &search(&groups, "starts = 2\n"));
+        let propagated = run_job("propagated", "propagate", &job(8, 1));
+        let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cases/D.toml");
+        let simulated = scratch.path("simulated");
+        let step = ["--duration", "2e-6", "--time-step", "1e-6"];
+        run(&[&["simulate", text(&case), "--out", text(&simulated)], &step[..]].concat())
+            .succeeded();
+        Self { identified, grouped, propagated, simulated, _scratch: scratch }
+    }
+
+    fn all(&self) -> [&Path; 4] {
+        [&self.identified, &self.grouped, &self.propagated, &self.simulated]
+    }
+}
+
+/// Every file in the document of results, with the keys or columns that its table lists.
+fn documented(heading: &str) -> Vec<String> {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
+    let page = fs::read_to_string(page).unwrap();
+    let mut sections = page.split("\n## ").flat_map(|chapter| chapter.split("\n### "));
+    let section = sections.find(|section| section.lines().next() == Some(heading));
+    let section = section.unwrap_or_else(|| panic!("no section {heading:?}"));
+    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    let first = rows.filter_map(|line| line.split('|').nth(1));
+    first
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>())
+        .collect()
+}
+
+fn names(value: &Value) -> Vec<String> {
+    value.as_object().map(Map::keys).unwrap().cloned().collect()
+}
+
+fn header(directory: &Path, name: &str) -> Vec<String> {
+    fields(read(directory, name).lines().next().unwrap())
+}
+
+#[test]
+fn keys_and_columns_are_those_that_other_programs_know() {
+    let runs = Runs::new();
+    let mut text = String::new();
+    for directory in runs.all() {
+        let mut files: Vec<_> = fs::read_dir(directory).unwrap().map(Result::unwrap).collect();
+        files.sort_by_key(|entry| entry.file_name());
+        for file in files {
+            let name = file.file_name().into_string().unwrap();
+            let shown = if name.ends_with(".json") {
+                keys(&json(directory, &name))
+            } else if name.ends_with(".csv") {
+                columns(&read(directory, &name))
+            } else {
+                continue;
+            };
+            let of = directory.file_name().unwrap().to_str().unwrap();
+            text.push_str(&format!("==== {of}/{name}\n{shown}\n"));
+        }
+    }
+    insta::assert_snapshot!(text);
+    documented_is_real(&runs);
+    provenance_tells_of_every_file(&runs);
+}
+
+fn documented_is_real(runs: &Runs) {
+    let group = |value: &Value| value["groups"][1].clone();
+    let (one, many) = (json(&runs.identified, "result.json"), json(&runs.grouped, "result.json"));
+    let propagated = json(&runs.propagated, "result.json");
+    let simulated = json(&runs.simulated, "result.json");
+    let mut whole = names(&one);
+    whole.extend(names(&many));
+    for (heading, real) in [
+        ("`result.json` of `identify`", whole),
+        ("`groups` of a result", names(&group(&many))),
+        ("`identified` of a result", names(&one["identified"])),
+        ("`result.json` of `propagate`", names(&propagated)),
+        ("`result.json` of `simulate`", names(&simulated)),
+        ("`provenance.json`", names(&json(&runs.grouped, "provenance.json"))),
+        ("`history.csv`", header(&runs.grouped, "history.csv")),
+        ("`realizations.csv`", header(&runs.grouped, "realizations.csv")),
+        ("`groups.csv`", header(&runs.grouped, "groups.csv")),
+        ("`comparison.csv`", header(&runs.grouped, "comparison.csv")),
+    ] {
+        let (told, real): (BTreeSet<String>, BTreeSet<String>) =
+            (documented(heading).into_iter().collect(), real.into_iter().collect());
+        // What only some runs have, and columns that are named after the free parameters.
+        let told: BTreeSet<_> = told
+            .into_iter()
+            .flat_map(|name| match name.as_str() {
+                "NAME" => vec!["longitudinal_young_modulus".to_owned()],
+                "NAME_lower" => vec!["longitudinal_young_modulus_lower".to_owned()],
+                "NAME_upper" => vec!["longitudinal_young_modulus_upper".to_owned()],
+                "reason" | "check" | "cost_standard_error" | "failure" if !real.contains(&name) => {
+                    Vec::new()
+                }
+                _ => vec![name],
+            })
+            .collect();
+        let missing: Vec<_> = real.difference(&told).collect();
+        let unreal: Vec<_> = told.difference(&real).collect();
+        assert!(
+            missing.is_empty() && unreal.is_empty(),
+            "{heading}: not in docs/results.md {missing:?}, only there {unreal:?}"
+        );
+    }
+}
+
+fn provenance_tells_of_every_file(runs: &Runs) {
+    for directory in runs.all() {
+        let (result, provenance) =
+            (json(directory, "result.json"), json(directory, "provenance.json"));
+        for key in ["schema", "kind", "version", "numerics", "commit"] {
+            assert_eq!(provenance[key], result[key], "{key}");
+        }
+        for key in ["digest", "seed"] {
+            let expected = result.get(key).unwrap_or(&Value::Null);
+            assert_eq!(provenance[key], *expected, "{key}");
+        }
+        let mut listed = BTreeSet::from(["provenance.json".to_owned()]);
+        for file in provenance["files"].as_array().unwrap() {
+            let name = file["name"].as_str().unwrap();
+            let bytes = fs::read(directory.join(name)).unwrap();
+            assert_eq!(file["bytes"], bytes.len(), "{name}");
+            assert_eq!(file["blake3"], blake3::hash(&bytes).to_hex().as_str(), "{name}");
+            listed.insert(name.to_owned());
+        }
+        let there = fs::read_dir(directory).unwrap().map(Result::unwrap);
+        let there: BTreeSet<String> =
+            there.map(|entry| entry.file_name().into_string().unwrap()).collect();
+        assert_eq!(listed, there);
+    }
+}
