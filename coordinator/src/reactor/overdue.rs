@@ -183,7 +183,9 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
     let rank = |(worker, taker): &(&Worker, WorkerId)| {
         let doubtful = worker.missed.count > 0 || !worker.proven;
-        (doubtful, is_of_holder(state, id, worker), dispatch::held(state, worker), *taker)
+        let on_probation = !state.is_sound(worker);
+        let of_holder = is_of_holder(state, id, worker);
+        (on_probation, doubtful, of_holder, dispatch::held(state, worker), *taker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
@@ -212,7 +214,17 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
 /// Whether a worker is to have a copy of a batch: it may, and leaves nothing unanswered itself.
 fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
     let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
-    state.is_sound(worker) && may_have(state, id, &worker.name) && !late()
+    let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
+    trusted && may_have(state, id, &worker.name) && !late()
+}
+
+/// Whether a worker on probation is tried with a copy of a batch. An audit is not worth it.
+fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
+    let purpose = state.batches.get(&id).map(|batch| batch.purpose);
+    !worker.draining
+        && worker.in_flight.is_empty()
+        && !state.probation.rests(&worker.name, now)
+        && matches!(purpose, Some(Purpose::Fill | Purpose::Judge))
 }
 
 /// The names of the workers that hold a batch and its copies.

@@ -26,9 +26,9 @@ use crate::worker_name::WorkerName;
 /// How long the losses of a host are remembered when no more come.
 const MEMORY: Duration = Duration::from_secs(600);
 
-/// How little may be expected of a worker, the least last: whether it does not answer what it
-/// holds, whether its host's workers are lost over whatever they hold, whether one was lost over
-/// this, whether it has not answered anything yet.
+/// How little may be expected of a worker, the least last: whether its host's workers are lost over
+/// whatever they hold, whether it does not answer what it holds (which costs time, and fails no
+/// job), whether one was lost over this, whether it has not answered anything yet.
 pub(super) type Standing = (bool, bool, bool, bool);
 
 /// Hands out suspects, each alone to a worker that holds nothing. Returns those who must not be
@@ -158,7 +158,7 @@ pub(super) fn hopeless(
 
 pub(super) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
     let untried = |worker: &Worker| {
-        let (silent, failing, lost, _) = standing(state, worker, losses);
+        let (failing, silent, lost, _) = standing(state, worker, losses);
         let stayed = losses.first().is_some_and(|first| worker.attached < first);
         !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
     };
@@ -169,7 +169,7 @@ pub(super) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) ->
 pub(super) fn standing(state: &State, worker: &Worker, losses: &Losses) -> Standing {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);
-    (silent, state.is_failing(host), losses.are_of(host), !worker.proven)
+    (state.is_failing(host), silent, losses.are_of(host), !worker.proven)
 }
 
 fn computing(state: &State, job: JobId) -> Option<&Evaluation> {

@@ -2,10 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
 use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
@@ -18,9 +16,11 @@ use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::{EndRecord, Store};
 use osteon_proto::batch::Work;
 
+use self::clients::Client;
 use crate::fake;
 
 mod check;
+mod clients;
 mod counts;
 mod disk;
 mod faults;
@@ -76,18 +76,6 @@ enum Happening {
     Drain,
     /// A client wants its job ended, until it hears that it has.
     Cancel(usize),
-}
-
-struct Client {
-    specification: Arc<JobSpecification>,
-    request_id: String,
-    job: Option<JobId>,
-    /// It will want its job ended at some time.
-    cancels: bool,
-    /// It has not heard yet that its job has ended.
-    wants_end: bool,
-    /// Its job has ended, was looked at, and is forgotten.
-    pruned: bool,
 }
 
 #[derive(Default)]
@@ -178,7 +166,7 @@ impl World {
             audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
             ..Config::default()
         };
-        let clients = clients(seed, &mut draw);
+        let clients = clients::some(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
         // Long: a client has given up by then, and so have many programs.
@@ -226,9 +214,7 @@ impl World {
         for _ in 0..workers {
             world.within(500, Happening::Arrive);
         }
-        for at in restarts {
-            world.after(at, Happening::Restart);
-        }
+        restarts.into_iter().for_each(|at| world.after(at, Happening::Restart));
         world.plan_faults();
         if let Some(at) = prune {
             world.after(at, Happening::Prune);
@@ -572,50 +558,4 @@ fn key(work: &Work) -> (u64, u64, u64, u32) {
 
 fn point_key(point: &Point) -> u64 {
     point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()))
-}
-
-/// An identification, one in three by `newton`, which takes two realizations at least.
-fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobSpecification {
-    let mut specification = fake::identification(realizations, evaluations, seed);
-    if method == 0 {
-        specification.monte_carlo.realizations = realizations.max(2);
-        let by = Search::by(SearchMethod::Newton);
-        specification.search = Search { max_evaluations: evaluations, ..by };
-    }
-    // One in four for two groups, one in four from two starts, one in two with derivatives.
-    if seed.is_multiple_of(4) {
-        let group = |name: &str, velocity: f64| Group {
-            name: name.to_owned(),
-            velocities: vec![0.97 * velocity, 1.03 * velocity],
-        };
-        specification.data =
-            Some(Data::Groups(vec![group("left", 3900.0), group("right", 4000.0)]));
-    }
-    specification.search.starts = 1 + u64::from(seed % 4 == 1);
-    specification.search.sensitivities = !seed.is_multiple_of(3);
-    specification
-}
-
-/// One to three clients with small jobs.
-fn clients(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
-    (0..1 + draw(3))
-        .map(|number| {
-            let specification = match draw(4) {
-                0 => fake::propagation(1 + draw(60), 4 * seed + number),
-                _ => searched(draw(3), 1 + draw(40), 2 + draw(12), 4 * seed + number),
-            };
-            let search = Search { speculation: draw(3) > 0, ..specification.search };
-            let specification = JobSpecification { search, ..specification };
-            let request_id = format!("request {number}");
-            let cancels = draw(6) == 0;
-            Client {
-                specification: Arc::new(specification),
-                request_id,
-                job: None,
-                cancels,
-                wants_end: cancels,
-                pruned: false,
-            }
-        })
-        .collect()
 }

@@ -384,6 +384,17 @@ fn a_suspect_does_not_wait_for_who_does_not_answer() {
 }
 
 #[test]
+fn who_is_on_probation_is_tried_with_what_is_overdue_where_nobody_else_is() {
+    let mut rig = rig(1, 1, 0.0);
+    rig.state.probation.miss(&name(2), rig.now, rig.now);
+    rig.event(on_its_own(2));
+    assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
+    assert_eq!(rig.live(SECOND / 10), ["send 2: batch 2 = 0+1"]);
+    rig.check(answer(2, 2, 0, 1), &["revoke 1: batch 1", "store job 1 evaluation 0"]);
+    assert!(!rig.state.probation.has(&name(2)));
+}
+
+#[test]
 fn a_probation_is_remembered_for_the_worker_and_its_host() {
     let mut rig = with_silent_worker();
     rig.event(end_of_stream(1));

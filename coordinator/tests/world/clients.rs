@@ -1,0 +1,67 @@
+//! Clients and their small jobs.
+
+use std::sync::Arc;
+
+use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
+use osteon_coordinator::ids::JobId;
+
+use crate::fake;
+
+/// A client with one job.
+pub(super) struct Client {
+    pub(super) specification: Arc<JobSpecification>,
+    pub(super) request_id: String,
+    pub(super) job: Option<JobId>,
+    /// It will want its job ended at some time.
+    pub(super) cancels: bool,
+    /// It has not heard yet that its job has ended.
+    pub(super) wants_end: bool,
+    /// Its job has ended, was looked at, and is forgotten.
+    pub(super) pruned: bool,
+}
+
+/// An identification, one in three by `newton`, which takes two realizations at least.
+fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobSpecification {
+    let mut specification = fake::identification(realizations, evaluations, seed);
+    if method == 0 {
+        specification.monte_carlo.realizations = realizations.max(2);
+        let by = Search::by(SearchMethod::Newton);
+        specification.search = Search { max_evaluations: evaluations, ..by };
+    }
+    // One in four for two groups, one in four from two starts, one in two with derivatives.
+    if seed.is_multiple_of(4) {
+        let group = |name: &str, velocity: f64| Group {
+            name: name.to_owned(),
+            velocities: vec![0.97 * velocity, 1.03 * velocity],
+        };
+        specification.data =
+            Some(Data::Groups(vec![group("left", 3900.0), group("right", 4000.0)]));
+    }
+    specification.search.starts = 1 + u64::from(seed % 4 == 1);
+    specification.search.sensitivities = !seed.is_multiple_of(3);
+    specification
+}
+
+/// One to three clients with small jobs.
+pub(super) fn some(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
+    (0..1 + draw(3))
+        .map(|number| {
+            let specification = match draw(4) {
+                0 => fake::propagation(1 + draw(60), 4 * seed + number),
+                _ => searched(draw(3), 1 + draw(40), 2 + draw(12), 4 * seed + number),
+            };
+            let search = Search { speculation: draw(3) > 0, ..specification.search };
+            let specification = JobSpecification { search, ..specification };
+            let request_id = format!("request {number}");
+            let cancels = draw(6) == 0;
+            Client {
+                specification: Arc::new(specification),
+                request_id,
+                job: None,
+                cancels,
+                wants_end: cancels,
+                pruned: false,
+            }
+        })
+        .collect()
+}
