@@ -151,6 +151,9 @@ pub(crate) struct CoordinatorArguments {
     /// Delete finished jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
+    /// Go on with a store that has lost jobs which it had accepted; without this it is refused
+    #[arg(long)]
+    pub(crate) accept_lost_jobs: bool,
     /// Seconds of silence after which a worker's batches are reassigned, 1 to 3600; heartbeats are
     /// sent five times per lease
     #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]

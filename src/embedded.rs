@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
-use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{Config, Coordinator, ListenAddress, Listener};
 use osteon_proto::endpoint::Endpoint;
 use tempfile::TempDir;
@@ -85,7 +85,11 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
     let listener = listener.map_err(Failure::failed)?;
     let store: Box<dyn Store> = match store {
         StorePlace::Memory => Box::new(MemoryStore::new()),
-        StorePlace::Directory(path) => Box::new(SqliteStore::open(&path).map_err(Failure::failed)?),
+        // This process submits its job again: one that is lost is computed anew.
+        StorePlace::Directory(path) => {
+            let store = SqliteStore::open_with(&path, LostJobs::Accept);
+            Box::new(store.map_err(Failure::failed)?)
+        }
     };
     let store_patience = Some(Duration::from_secs(STORE_PATIENCE_S));
     let config = Config { store_patience, ..Config::default() };

@@ -7,8 +7,7 @@ use std::path::Path;
 use osteon_common::document::Format as FileFormat;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
-use osteon_fuzz::{bounded, config, damaged_text, texts};
-use proptest::prelude::*;
+use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
 use crate::output::{self, ShownResult};
 use crate::resolved::Format;
@@ -88,15 +87,11 @@ fn large_results_take_no_more_than_their_share() {
     check_directory(&"\n".repeat(400_000), "");
 }
 
-proptest! {
-    #![proptest_config(config())]
-
-    #[test]
+properties! {
     fn damaged_results_are_shown_or_refused(json in damaged_text(texts("results"))) {
         check_result(&json);
     }
 
-    #[test]
     fn damaged_directories_are_taken_or_refused(
         job in damaged_text(stored_jobs()),
         json in damaged_text(texts("results")),

@@ -21,11 +21,13 @@ mod resolved;
 mod results_directory;
 mod signals;
 mod verdict;
+mod warnings;
 
 use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser as _;
+use osteon_common::visible;
 use tracing_subscriber::EnvFilter;
 
 use crate::arguments::Arguments;
@@ -39,7 +41,8 @@ fn main() -> ExitCode {
         Ok(Ending::RunFailed) => ExitCode::from(1),
         Err(failure) => {
             // Nothing is left to be done when stderr is closed, too.
-            let _closed = writeln!(std::io::stderr(), "osteon: {failure}");
+            let message = failure.to_string();
+            let _closed = writeln!(std::io::stderr(), "osteon: {}", visible::lines(&message));
             ExitCode::from(failure.exit_code())
         }
     }

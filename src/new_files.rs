@@ -6,6 +6,7 @@ use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
+use osteon_common::{user_file, visible};
 
 use crate::ending::Failure;
 
@@ -28,7 +29,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
         if path.symlink_metadata().is_ok() {
             return Err(Failure::bad_input(anyhow!(
                 "{} exists already and is not replaced; remove it, or choose another place",
-                path.display()
+                visible::path(path)
             )));
         }
     }
@@ -38,7 +39,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
                 // The first error is the one to tell.
                 drop(fs::remove_file(&earlier.path));
             }
-            let context = format!("cannot write {}", file.path.display());
+            let context = format!("cannot write {}", visible::path(&file.path));
             return Err(Failure::unusable_path(error, context));
         }
     }
@@ -52,7 +53,10 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
     made.map_err(|error| {
-        Failure::unusable_path(error, format!("cannot create the directory {}", path.display()))
+        Failure::unusable_path(
+            error,
+            format!("cannot create the directory {}", visible::path(path)),
+        )
     })
 }
 
@@ -62,15 +66,17 @@ pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
 /// When it cannot be written.
 pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
-        let mut file =
-            OpenOptions::new().read(true).append(true).create(true).mode(0o600).open(path)?;
+        let mut options = OpenOptions::new();
+        let options = options.read(true).append(true).create(true).mode(0o600);
+        let mut file = user_file::open_with(options, path)?;
         let whole = ends_with_newline(&file)?;
         // In one piece: others may add lines at the same time.
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
-    write()
-        .map_err(|error| Failure::unusable_path(error, format!("cannot add to {}", path.display())))
+    write().map_err(|error| {
+        Failure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
+    })
 }
 
 fn write(file: &NewFile) -> std::io::Result<()> {

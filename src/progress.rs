@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use osteon_common::job::{Data, JobKind, JobSpecification};
+use osteon_common::visible;
 use osteon_proto::v1::JobSnapshot;
 use terminal_size::{Width, terminal_size_of};
 use tracing_subscriber::fmt::MakeWriter;
@@ -105,6 +106,7 @@ fn terminal_width() -> usize {
 
 /// One line on stderr, above a bar if there is one.
 pub(crate) fn say(line: &str) {
+    let line = visible::lines(line);
     // Nothing is left to be done when stderr is closed.
     let write = || drop(writeln!(std::io::stderr(), "{line}"));
     match BARS.get() {
@@ -127,8 +129,9 @@ impl<'a> MakeWriter<'a> for LogWriter {
 
 impl Write for LogWriter {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let text = shown(bytes);
         // A closed stderr must not end a computation.
-        let write = || drop(std::io::stderr().write_all(bytes));
+        let write = || drop(std::io::stderr().write_all(text.as_bytes()));
         match BARS.get() {
             Some(bars) => bars.suspend(write),
             None => write(),
@@ -138,5 +141,29 @@ impl Write for LogWriter {
 
     fn flush(&mut self) -> std::io::Result<()> {
         Ok(())
+    }
+}
+
+/// An event of the log as one line: what others have said in it begins no line of its own.
+fn shown(event: &[u8]) -> String {
+    let text = String::from_utf8_lossy(event);
+    match text.strip_suffix('\n') {
+        Some(line) => format!("{}\n", visible::line(line)),
+        None => visible::line(&text).into_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_event_of_the_log_is_one_line() {
+        assert_eq!(
+            shown(b"WARN lost host=a\x1b[2J\n INFO b\n"),
+            "WARN lost host=a\\u{1b}[2J\\n INFO b\n"
+        );
+        assert_eq!(shown("Größe \u{202e}\n".as_bytes()), "Größe \\u{202e}\n");
+        assert_eq!(shown(b"\xff\n"), "\u{fffd}\n");
     }
 }

@@ -6,7 +6,7 @@
 //! cancelled job.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{BufWriter, IntoInnerError, Read as _, Write};
+use std::io::{BufWriter, IntoInnerError, Write};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use osteon_common::inference::inference;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::FILE_BYTES_MAX;
 use osteon_common::results::Status;
-use osteon_common::{job_file, results_csv, results_json};
+use osteon_common::{job_file, results_csv, results_json, user_file, visible};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
@@ -66,7 +66,7 @@ impl ResultsDirectory {
         if path.exists() && !path.is_dir() {
             return Err(Failure::bad_input(anyhow!(
                 "{} is not a directory; choose another --out directory",
-                path.display()
+                visible::path(path)
             )));
         }
         let result = given(&path.join(RESULT))?;
@@ -76,7 +76,7 @@ impl ResultsDirectory {
                 return Err(Failure::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: whose result it is cannot be told; \
                      choose another --out directory",
-                    path.display()
+                    visible::path(path)
                 )));
             }
             None => {}
@@ -105,8 +105,8 @@ impl ResultsDirectory {
         make_directory(path)?;
         let lock_path = path.join(LOCK);
         for _ in 0..LOCK_ATTEMPTS_MAX {
-            let lock = File::create(&lock_path).map_err(|error| {
-                Failure::unusable_path(error, format!("cannot write {}", lock_path.display()))
+            let lock = user_file::create(&lock_path).map_err(|error| {
+                Failure::unusable_path(error, format!("cannot write {}", visible::path(&lock_path)))
             })?;
             match lock.try_lock() {
                 // A run that ended meanwhile has removed the file: its lock locks nothing.
@@ -114,12 +114,12 @@ impl ResultsDirectory {
                 Ok(()) => return Ok(Self { path: path.to_owned(), _lock: lock }),
                 Err(TryLockError::WouldBlock) => break,
                 Err(TryLockError::Error(error)) => {
-                    let context = format!("cannot lock {}", lock_path.display());
+                    let context = format!("cannot lock {}", visible::path(&lock_path));
                     return Err(Failure::failed(anyhow::Error::new(error).context(context)));
                 }
             }
         }
-        Err(Failure::failed(anyhow!("another osteon is running in {}", path.display())))
+        Err(Failure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
     }
 
     /// Where a store of this run is kept until it has ended.
@@ -210,14 +210,17 @@ impl Drop for ResultsDirectory {
 /// Bad input when it cannot be one, failed when the machine has no room for it.
 pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(path).map_err(|error| {
-        Failure::unusable_path(error, format!("cannot create the directory {}", path.display()))
+        Failure::unusable_path(
+            error,
+            format!("cannot create the directory {}", visible::path(path)),
+        )
     })
 }
 
 /// The text of a file in a directory that the user has named; `None` if there is no such file.
 fn given(path: &Path) -> Result<Option<String>, Failure> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
-        Ok(error) => Failure::unusable_path(error, format!("cannot read {}", path.display())),
+        Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
         Err(error) => Failure::Failed(error),
     })
 }
@@ -252,7 +255,7 @@ fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Resu
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \
              choose another --out directory",
-            path.display()
+            visible::path(path)
         ))),
     }
 }
@@ -285,18 +288,18 @@ pub(crate) fn write_by(
     name.push(".part");
     let part = path.with_file_name(name);
     let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(&part)?);
+        let mut file = BufWriter::new(user_file::create(&part)?);
         print(&mut file)?;
         file.into_inner().map_err(IntoInnerError::into_error)?.sync_all()?;
         fs::rename(&part, path)
     };
-    write().with_context(|| format!("cannot write {}", path.display()))
+    write().with_context(|| format!("cannot write {}", visible::path(path)))
 }
 
 fn remove_if_there(path: &Path) -> anyhow::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| format!("cannot replace {}", path.display()))
+            Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))
         }
         _ => Ok(()),
     }
@@ -309,28 +312,23 @@ fn remove_if_there(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
     let path = directory.join(RESULT);
     let text = read_if_there(&path)?;
-    text.with_context(|| format!("cannot read {}: no such file", path.display()))
+    text.with_context(|| format!("cannot read {}: no such file", visible::path(&path)))
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
 fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
+    let cannot = || format!("cannot read {}", visible::path(path));
+    let read = match user_file::read(path, FILE_BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => {
-            return Err(error).with_context(|| format!("cannot read {}", path.display()));
-        }
+        read => read.with_context(cannot)?,
     };
-    let cannot = || format!("cannot read {}", path.display());
-    let mut bytes = Vec::new();
-    let length = file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).with_context(cannot)?;
-    if length as u64 > FILE_BYTES_MAX {
+    let Some(bytes) = read else {
         bail!(
             "{} is longer than {FILE_BYTES_MAX} bytes, and osteon writes no such file; remove it, \
              or choose another directory",
-            path.display()
+            visible::path(path)
         );
-    }
+    };
     Ok(Some(String::from_utf8(bytes).with_context(cannot)?))
 }
 

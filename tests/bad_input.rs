@@ -5,9 +5,12 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
+use std::os::unix::fs::symlink;
 use std::path::Path;
+use std::process::Command;
 
-use support::{OPTIMUM, Scratch, job, run, text};
+use osteon_common::visible::is_hidden;
+use support::{Finished, OPTIMUM, Scratch, job, osteon, run, text};
 
 /// A case file with `bone` as its section.
 fn case(bone: &str) -> String {
@@ -103,6 +106,86 @@ fn numbers_out_of_range_name_their_field() {
 }
 
 #[test]
+fn numbers_in_other_units_are_asked_about() {
+    let changed = |from: &str, to: &str| {
+        let text = job(10, 1);
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text.replace(from, to)
+    };
+    let velocity = ["data.mean", "3.9", "did you mean 3.9 km/s (3.9e3)?"];
+    check_job(&changed("mean = 3906.0", "mean = 3.9"), &velocity);
+    let variation = ["data.coefficient_of_variation", "did you mean 2.7 % (0.027)?"];
+    check_job(&changed("variation = 0.0271", "variation = 2.7"), &variation);
+    let thickness = ["layers.bone.thickness: is 4.0", "did you mean 4 mm (4e-3)?"];
+    check_job(&(job(10, 1) + "[layers]\nbone = { thickness = 4 }\n"), &thickness);
+    let frequency = ["probe.center_frequency: is 1.0", "did you mean 1 MHz (1e6)?"];
+    check_job(&(job(10, 1) + "[probe]\ncenter_frequency = 1\n"), &frequency);
+    let gigapascal = changed("19488700000.0", "20")
+        .replace("[12000000000.0, 25000000000.0]", "[12, 25]")
+        .replace("4795000000.0", "4.795")
+        .replace("9825400000.0", "9.8254");
+    let moduli = [
+        "4 errors",
+        "parameters.longitudinal_young_modulus.start: is 20.0; values are in Pa: did you mean 20 GPa (20e9)?",
+        "parameters.longitudinal_young_modulus.bounds: are 12.0 and 25.0",
+        "parameters.longitudinal_shear_modulus.fixed: is 4.795",
+        "parameters.transverse_young_modulus.fixed: is 9.8254",
+    ];
+    check_job(&gigapascal, &moduli);
+    check_case(
+        &constants("longitudinal_young_modulus", "17.717"),
+        &["1 error", "bone.longitudinal_young_modulus", "did you mean 17.717 GPa (17.717e9)?"],
+    );
+    check_case(&constants("density", "1.6"), &["bone.density", "did you mean 1.6 g/cm³ (1.6e3)?"]);
+}
+
+#[test]
+fn data_that_no_point_can_reach_are_refused() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(10, 1).replace("mean = 3906.0", "mean = 12000.0"));
+    let expected = "data.mean: is 12000.0; the bounds of [parameters] allow mean velocities of about 2700 \
+                    to 4700 m/s";
+    refused(&scratch, "identify", &file, &[expected]);
+}
+
+/// What is only unusual is computed, after a word on stderr.
+#[test]
+fn unusual_numbers_are_warned_of_and_computed_with() {
+    let warned = |command: &str, name: &str, text: &str, expected: &[&str]| {
+        let scratch = Scratch::new();
+        let finished = run(&[command, scratch.write(name, text).to_str().unwrap()]);
+        assert_eq!(finished.code, Some(0), "{finished:?}");
+        let warnings: Vec<&str> =
+            finished.stderr.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert_eq!(warnings.len(), expected.len(), "{warnings:?}");
+        for (warning, expected) in warnings.iter().zip(expected) {
+            assert!(warning.contains(expected), "{expected} is not in: {warning}");
+        }
+    };
+    warned("identify", "job.toml", &job(8, 2), &[]);
+    warned("propagate", "job.toml", &job(8, 1), &[]);
+    let deep = "[layers]\nmarrow = { thickness = 11 }\n";
+    let unusual =
+        "layers.marrow.thickness: is 11 m; usual is up to 0.3 m; did you mean 11 mm (11e-3)?";
+    warned("simulate", "case.toml", &(constants("", "") + deep), &[unusual]);
+    warned("propagate", "job.toml", &(job(8, 1) + deep), &[unusual]);
+    let wide = job(8, 2).replace("variation = 0.0271", "variation = 0.12");
+    warned(
+        "identify",
+        "job.toml",
+        &wide,
+        &["the coefficient of variation is 1.200e-1, above what points"],
+    );
+    let fast = job(8, 2).replace("mean = 3906.0", "mean = 5500");
+    warned(
+        "identify",
+        "job.toml",
+        &fast,
+        &["the mean is 5500, above what points within the bounds reach"],
+    );
+}
+
+#[test]
 fn a_matrix_must_be_an_elasticity() {
     check_case(&mandel(0, 3, 1e9), &["bone.mandel", "symmetric"]);
     check_case(&mandel(4, 4, -1e10), &["bone.mandel", "positive definite"]);
@@ -141,6 +224,14 @@ fn bad_velocities_are_shown_by_file_and_line() {
     check(Some("velocity\n3900.0\n-3900.0\n"), &["v.csv", "line 3", "-3900"]);
     check(Some("velocity\n3900.0\nNaN\n"), &["v.csv", "line 3"]);
     check(Some("speed\n3900.0\n3901.0\n"), &["v.csv", "velocity"]);
+    check(
+        Some("velocity\n3.9\n3.95\n3.8\n"),
+        &["their median is 3.9", "did you mean 3.9 km/s (3.9e3)?"],
+    );
+    check(
+        Some("velocity\n3900.0\n3950.0\n39000\n"),
+        &["v.csv, line 4", "39000", "no velocity of sound in bone is outside 100 to 20000"],
+    );
 }
 
 #[test]
@@ -168,6 +259,126 @@ fn a_realization_that_does_not_exist_is_refused() {
     let drawn = run(&at);
     assert_eq!(drawn.code, Some(2), "{drawn:?}");
     assert!(drawn.stderr.contains("result.json"), "{drawn:?}");
+}
+
+/// Runs the program to its end, for which it has a minute.
+fn run_within_a_minute(arguments: &[&str]) -> Finished {
+    let mut command = Command::new("timeout");
+    command.arg("60").arg(osteon().get_program()).args(arguments).env("RUST_LOG", "warn");
+    Finished::of(command.output().unwrap())
+}
+
+/// A pipe that nobody writes would be waited for without end.
+#[test]
+fn what_is_no_regular_file_is_refused_at_once() {
+    let scratch = Scratch::new();
+    let pipe = |name: &str| {
+        let path = scratch.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
+        path.to_str().unwrap().to_owned()
+    };
+    let check = |path: &str, kind: &str, arguments: &[&str]| {
+        let refused = run_within_a_minute(arguments);
+        assert!(matches!(refused.code, Some(1 | 2)), "{arguments:?}: {refused:?}");
+        let expected = format!("it is {kind}, and must be a regular file");
+        for part in [path, &expected] {
+            assert!(refused.stderr.contains(part), "{part} in {refused:?}");
+        }
+        assert_eq!(refused.stdout, "", "{arguments:?}");
+    };
+    let good = scratch.write("good.toml", &job(10, 1));
+    let (good, case) = (text(&good), scratch.write("case.toml", &constants("", "")));
+    let piped = pipe("pipe.toml");
+    for command in ["identify", "propagate", "simulate"] {
+        check(&piped, "a pipe", &[command, &piped]);
+    }
+    check(&piped, "a pipe", &["draw", &piped, "--index", "1"]);
+    let device = scratch.path("device.json");
+    symlink("/dev/zero", &device).unwrap();
+    check(text(&device), "a device", &["identify", text(&device)]);
+    std::fs::create_dir(scratch.path("directory.toml")).unwrap();
+    let directory = scratch.path("directory.toml");
+    check(text(&directory), "a directory", &["identify", text(&directory)]);
+
+    let data = pipe("data.csv");
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+    let with_data = job(10, 1).replace(moments, "velocities = \"data.csv\"\n");
+    let with_data = scratch.write("with_data.toml", &with_data);
+    check(&data, "a pipe", &["identify", text(&with_data)]);
+
+    let result = pipe("at/result.json");
+    let at = scratch.path("at");
+    check(&result, "a pipe", &["draw", good, "--index", "1", "--at", text(&at)]);
+    check(&result, "a pipe", &["identify", good, "--out", text(&at)]);
+    let lock = pipe("out/.lock");
+    check(&lock, "a pipe", &["identify", good, "--out", text(&scratch.path("out"))]);
+    pipe("traces/traces.csv.part");
+    let traces = scratch.path("traces");
+    check(text(&traces), "a pipe", &["simulate", text(&case), "--out", text(&traces)]);
+
+    let secret = pipe("secret");
+    let jobs = ["jobs", "--coordinator", "https://127.0.0.1:1"];
+    check(&secret, "a pipe", &[&jobs[..], &["--token-file", &secret]].concat());
+    check(&secret, "a pipe", &[&jobs[..], &["--tls-ca", &secret]].concat());
+    let store = scratch.path("store");
+    let serve = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(&store)];
+    check(&secret, "a pipe", &[&serve[..], &["--tokens", &secret]].concat());
+    let pem = pipe("authority/ca.pem");
+    let made = scratch.path("made");
+    let authority = scratch.path("authority");
+    check(&pem, "a pipe", &["certs", text(&made), "--ca", text(&authority)]);
+    let out = scratch.path("ann.token");
+    let token = ["token", "ann", "--role", "read", "--out", text(&out), "--tokens", &secret];
+    check(&secret, "a pipe", &token);
+    pipe("locked/osteon.lock");
+    let locked = scratch.path("locked");
+    let serve = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(&locked)];
+    check(text(&locked), "a pipe", &serve);
+}
+
+/// Escape sequences and marks that turn the direction of writing are written out.
+#[test]
+fn what_a_user_does_not_see_is_shown() {
+    let scratch = Scratch::new();
+    let check = |arguments: &[&str], expected: &[&str]| {
+        let refused = run_within_a_minute(arguments);
+        assert!(matches!(refused.code, Some(1 | 2)), "{refused:?}");
+        for part in expected {
+            assert!(refused.stderr.contains(part), "{part} is not in: {refused:?}");
+        }
+        let raw = refused.stderr.contains(|c| c != '\n' && is_hidden(c));
+        assert!(!raw, "{refused:?}");
+    };
+    // In names of files.
+    let name = "job\u{202e}\u{1b}[31m\n.toml";
+    let shown = r"job\u{202e}\u{1b}[31m\n.toml";
+    let absent = scratch.path(name);
+    check(&["identify", text(&absent)], &[shown, "No such file"]);
+    let file = scratch.write(name, "[bone]\n\"a\\u001bb\\u202e\" = 1\nb = \"\\u009b2J\"\n");
+    check(&["simulate", text(&file)], &[shown, r"a\u{1b}b\u{202e}"]);
+    // In keys and values of a job file, and in what a parser says of them.
+    let with = |section: &str| scratch.write("job.toml", &(job(10, 1) + section));
+    let file = with("[solver]\nmethod = \"exa\\u001b[2Jct\"\n");
+    check(&["identify", text(&file)], &[r"exa\u{1b}[2Jct"]);
+    for line in ["a\u{1b}[2J = 1\n", "a = \u{202e}\n", "\u{200b}\n", "a = 1\na = \u{9b}\n"] {
+        let file = with(line);
+        check(&["identify", text(&file)], &["job.toml, line"]);
+    }
+    let file = scratch.write("job.json", "{\"a\u{202e}\": 1, \"a\u{202e}\": 1}");
+    check(&["identify", text(&file)], &[r"a\u{202e}"]);
+    // In the header and the groups of a file of velocities.
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+    let data = "velocities = \"v.csv\"\ngroup = \"bone\"\n";
+    let file = scratch.write("groups.toml", &job(10, 1).replace(moments, data));
+    scratch.write("v.csv", "velocity,b\u{1b}[2J\u{2066}one\n3900,a\n");
+    check(&["identify", text(&file)], &[r"b\u{1b}[2J\u{2066}one"]);
+    scratch.write("v.csv", "velocity,bone\n3900,a\n3901,a\n3900,a\u{200b}\n3901,a\u{200b}\n");
+    check(&["identify", text(&file)], &[r"a\u{200b}", "has the character U+200B", "leave it out"]);
+    // In the log, where it would begin a line of its own, too.
+    let url = format!("unix:{}", text(&scratch.path("a\u{1b}[2J\n\u{202e}ERROR")));
+    let worker = ["worker", "--coordinator", &url, "--give-up-after", "0.1"];
+    check(&worker, &["WARN", r"a\u{1b}[2J\n\u{202e}ERROR"]);
 }
 
 #[test]

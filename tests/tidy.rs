@@ -114,6 +114,27 @@ fn state_and_reactions_know_no_clock_no_socket_and_no_future() {
     assert!(count > 10, "only {count} files were found");
 }
 
+/// `proptest!` listens to the environment, begins with another seed each time, and writes files.
+#[test]
+fn properties_are_tested_on_the_same_cases_everywhere() {
+    let helper = root().join("fuzz/src");
+    let mut count = 0;
+    for path in files(&[".rs"]) {
+        let text = fs::read_to_string(&path).unwrap();
+        count += text.matches("properties! {").count();
+        if !path.starts_with(&helper) && !path.ends_with("tests/tidy.rs") {
+            for word in ["proptest! {", "proptest!(", "TestRunner::", "ProptestConfig"] {
+                assert!(!text.contains(word), "{} contains {word:?}", path.display());
+            }
+        }
+    }
+    assert!(count > 10, "only {count} blocks were found");
+    let folders = files(&[".txt"])
+        .into_iter()
+        .filter(|path| path.to_string_lossy().contains("proptest-regressions"));
+    assert_eq!(folders.collect::<Vec<_>>(), Vec::<PathBuf>::new());
+}
+
 #[test]
 fn files_and_functions_are_short() {
     let mut long = Vec::new();

@@ -107,25 +107,46 @@ impl fmt::Display for Interval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.lower, self.upper) {
             (Edge::None, Edge::None) => f.write_str("a finite number")?,
-            (Edge::Closed(lower), Edge::Closed(upper)) => write!(f, "from {lower} to {upper}")?,
+            (Edge::Closed(lower), Edge::Closed(upper)) => {
+                write!(f, "from {} to {}", shown(lower), shown(upper))?
+            }
             (lower, upper) => {
                 match lower {
                     Edge::None => {}
-                    Edge::Open(lower) => write!(f, "above {lower}")?,
-                    Edge::Closed(lower) => write!(f, "at least {lower}")?,
+                    Edge::Open(lower) => write!(f, "above {}", shown(lower))?,
+                    Edge::Closed(lower) => write!(f, "at least {}", shown(lower))?,
                 }
                 if lower != Edge::None && upper != Edge::None {
                     f.write_str(" and ")?;
                 }
                 match upper {
                     Edge::None => {}
-                    Edge::Open(upper) => write!(f, "below {upper}")?,
-                    Edge::Closed(upper) => write!(f, "at most {upper}")?,
+                    Edge::Open(upper) => write!(f, "below {}", shown(upper))?,
+                    Edge::Closed(upper) => write!(f, "at most {}", shown(upper))?,
                 }
             }
         }
         if self.unit.is_empty() { Ok(()) } else { write!(f, " ({})", self.unit) }
     }
+}
+
+/// Numbers from here on are written with an exponent: nobody counts the zeros of 25000000000.
+const EXPONENT_FROM: f64 = 1e7;
+
+/// The edge of an interval in a message.
+fn shown(edge: f64) -> String {
+    if edge == DISPERSION_MAX {
+        format!("{edge:.5}…")
+    } else if edge.abs() >= EXPONENT_FROM {
+        format!("{edge:e}")
+    } else {
+        edge.to_string()
+    }
+}
+
+/// A number of a file in a message.
+pub(crate) fn written(value: f64) -> String {
+    if value.abs() >= EXPONENT_FROM { format!("{value:e}") } else { format!("{value:?}") }
 }
 
 impl WholeRange {
@@ -181,6 +202,18 @@ mod tests {
             (Interval::from_below(0.0, 1.0, ""), [0.0, 0.5], [-0.1, 1.0], "at least 0 and below 1"),
             (Interval::from_to(0.5, 16.0, ""), [0.5, 16.0], [0.49, 16.1], "from 0.5 to 16"),
             (Interval::from(0.0, ""), [0.0, 1.0], [-1.0, f64::INFINITY], "at least 0"),
+            (
+                Interval::from_to(12e9, 25e9, "the bounds"),
+                [12e9, 20e9],
+                [20.0, 26e9],
+                "from 1.2e10 to 2.5e10 (the bounds)",
+            ),
+            (
+                Interval::of(Parameter::Dispersion),
+                [0.1, DISPERSION_MAX.next_down()],
+                [0.0, DISPERSION_MAX],
+                "above 0 and below 0.79772… (that is √(7/11))",
+            ),
         ] {
             assert!(inside.iter().all(|&value| interval.contains(value)), "{said}");
             assert!(outside.iter().all(|&value| !interval.contains(value)), "{said}");

@@ -7,8 +7,10 @@ use crate::case::{Bone, Case};
 use crate::check;
 use crate::document::{self, Format, Node, Value, element_path};
 use crate::elasticity::{Elasticity, EngineeringConstants};
-use crate::file_error::{self, ContentError, FileError};
+use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::limits;
 use crate::parameters::Parameter;
+use crate::plausible::Quantity;
 use crate::reader::{Reader, Table};
 use crate::setup_section;
 
@@ -23,12 +25,15 @@ const CONSTANTS: [Parameter; 5] = [
     Parameter::TransversePoissonRatio,
 ];
 
+/// A case file with a matrix and all keys has some kilobytes.
+const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
+
 /// Reads and validates the case file at `path`; its extension tells the format.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
 pub fn read(path: &Path) -> Result<Case, FileError> {
-    let (text, format) = file_error::read(path)?;
+    let (text, format) = file_error::read(path, BOUND)?;
     parse(&text, format).map_err(|content| FileError::Content { path: path.to_owned(), content })
 }
 
@@ -65,8 +70,9 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
         }
         return None;
     }
-    let density = required(reader, &table, Parameter::Density);
     let given: Vec<_> = CONSTANTS.into_iter().filter(|key| table.has(key.name())).collect();
+    // Programs write matrices, of any scale; constants are typed.
+    let density = required(reader, &table, Parameter::Density, !given.is_empty());
     let elasticity = match (table.has("mandel"), given.first()) {
         (true, None) => mandel(reader, &table),
         (true, Some(constant)) => {
@@ -91,20 +97,33 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
 /// How an elasticity may be given.
 const FORMS: &str = "either the five engineering constants or mandel";
 
-/// A number of `[bone]` that must be there and within its range.
-fn required(reader: &mut Reader, table: &Table<'_>, parameter: Parameter) -> Option<f64> {
+/// A number of `[bone]` that must be there and within its range, and where it is `typed` in a unit that
+/// can be meant.
+fn required(
+    reader: &mut Reader,
+    table: &Table<'_>,
+    parameter: Parameter,
+    typed: bool,
+) -> Option<f64> {
     let (key, accepted) = (parameter.name(), Interval::of(parameter));
     if !table.has(key) {
         reader.missing(table, key, accepted);
         return None;
     }
     let value = reader.number(table, key)?;
-    check::number(&table.path(key), value, accepted, &mut reader.violations);
-    accepted.contains(value).then_some(value)
+    let path = table.path(key);
+    if typed {
+        let kind = Quantity::of(parameter);
+        check::quantity(&path, value, accepted, &kind, &mut reader.violations);
+    } else {
+        check::number(&path, value, accepted, &mut reader.violations);
+    }
+    (!reader.violations.touches(&path)).then_some(value)
 }
 
 fn from_constants(reader: &mut Reader, table: &Table<'_>) -> Option<Elasticity> {
-    let [e_l, nu_l, g_l, e_t, nu_t] = CONSTANTS.map(|parameter| required(reader, table, parameter));
+    let [e_l, nu_l, g_l, e_t, nu_t] =
+        CONSTANTS.map(|parameter| required(reader, table, parameter, true));
     let constants = EngineeringConstants {
         longitudinal_young_modulus: e_l?,
         longitudinal_poisson_ratio: nu_l?,

@@ -9,11 +9,12 @@ mod solver;
 
 use crate::accepted::{Interval, WholeRange};
 use crate::job::JobSpecification;
+use crate::plausible::Quantity;
 use crate::violations::Violations;
 
 pub(crate) use self::job::{
     DATA_FORMS, EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, STARTS, VELOCITIES_MIN, VELOCITY,
-    no_data,
+    job_from, no_data,
 };
 pub use self::job::{data, job};
 pub use self::setup::setup;
@@ -34,6 +35,28 @@ pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &m
     if !known_wrong(field, violations) && !accepted.contains(value) {
         violations.add(field, accepted.refusal(value));
     }
+}
+
+/// Records a number outside `accepted`, or one that no bone and no probe has and another unit
+/// explains, unless `field` is known to be wrong.
+pub(crate) fn quantity(
+    field: &str,
+    value: f64,
+    accepted: Interval,
+    quantity: &Quantity,
+    violations: &mut Violations,
+) {
+    if known_wrong(field, violations) {
+        return;
+    }
+    let question = quantity.question(&[value], accepted);
+    let refusal = match (accepted.contains(value), question) {
+        (true, None) => return,
+        (true, Some(question)) => format!("is {value:?}; {}: {question}", quantity.asked_for()),
+        (false, None) => accepted.refusal(value),
+        (false, Some(question)) => format!("{}: {question}", accepted.refusal(value)),
+    };
+    violations.add(field, refusal);
 }
 
 /// Records a whole number outside `accepted`, unless `field` is known to be wrong.

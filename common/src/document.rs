@@ -3,6 +3,7 @@
 //! Nothing is interpreted here: which keys exist and what they mean is the business of
 //! the readers of job and case files.
 
+mod budget;
 mod json;
 mod toml;
 
@@ -10,6 +11,8 @@ use std::fmt;
 use std::path::Path;
 
 use thiserror::Error;
+
+use crate::visible;
 
 /// How a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +48,7 @@ impl Format {
 
 /// A text that is not of its format.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("line {line}, column {column}: not valid {}: {message}", .format.name())]
+#[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
 pub struct Malformed {
     /// The format it should have.
     pub format: Format,

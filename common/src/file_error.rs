@@ -1,14 +1,13 @@
 //! Reading a file within bounds, and what can be wrong with it.
 
 use std::fmt;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use crate::document::{Format, Malformed, Node};
-use crate::limits;
 use crate::violations::Violation;
+use crate::{user_file, visible};
 
 /// Why a job or case file gives nothing.
 ///
@@ -16,7 +15,7 @@ use crate::violations::Violation;
 #[derive(Debug, Error)]
 pub enum FileError {
     /// The operating system does not give its bytes.
-    #[error("cannot read {}: {error}", .path.display())]
+    #[error("cannot read {}: {error}", visible::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -24,21 +23,23 @@ pub enum FileError {
         error: std::io::Error,
     },
     /// The name does not say what it is.
-    #[error("{}: the name of a job or case file must end in .toml or .json", .path.display())]
+    #[error("{}: the name of a job or case file must end in .toml or .json", visible::path(path))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// Longer than [`limits::FILE_BYTES_MAX`].
-    #[error("{} is longer than {max_bytes} bytes", .path.display())]
+    /// Longer than any file of its kind needs to be.
+    #[error("{} is longer than {max_bytes} bytes, more than {purpose}", visible::path(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
         /// Most bytes that are read.
         max_bytes: u64,
+        /// Who needs no more.
+        purpose: &'static str,
     },
     /// Its text is refused.
-    #[error("{}{}{content}", .path.display(), if matches!(content, ContentError::Malformed(_)) { ", " } else { ": " })]
+    #[error("{}{}{content}", visible::path(path), if matches!(content, ContentError::Malformed(_)) { ", " } else { ": " })]
     Content {
         /// The file.
         path: PathBuf,
@@ -100,12 +101,21 @@ impl fmt::Display for Invalid {
     }
 }
 
+/// How long a kind of file may be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bound {
+    /// Most bytes.
+    pub(crate) bytes: u64,
+    /// Who needs no more, after "more than".
+    pub(crate) purpose: &'static str,
+}
+
 /// The text of the file at `path` and its format.
-pub(crate) fn read(path: &Path) -> Result<(String, Format), FileError> {
+pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileError> {
     let Some(format) = Format::of(path) else {
         return Err(FileError::UnknownFormat { path: path.to_owned() });
     };
-    match read_bytes(path) {
+    match user_file::read(path, bound.bytes) {
         Ok(Some(bytes)) => match String::from_utf8(bytes) {
             Ok(text) => Ok((text, format)),
             Err(error) => Err(FileError::Content {
@@ -114,18 +124,11 @@ pub(crate) fn read(path: &Path) -> Result<(String, Format), FileError> {
             }),
         },
         Ok(None) => {
-            Err(FileError::TooLarge { path: path.to_owned(), max_bytes: limits::FILE_BYTES_MAX })
+            let Bound { bytes: max_bytes, purpose } = bound;
+            Err(FileError::TooLarge { path: path.to_owned(), max_bytes, purpose })
         }
         Err(error) => Err(FileError::Unreadable { path: path.to_owned(), error }),
     }
-}
-
-/// The bytes of a file; `None` if there are more than [`limits::FILE_BYTES_MAX`].
-pub(crate) fn read_bytes(path: &Path) -> std::io::Result<Option<Vec<u8>>> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)?.take(limits::FILE_BYTES_MAX + 1).read_to_end(&mut bytes)?;
-    let fits = u64::try_from(bytes.len()).is_ok_and(|count| count <= limits::FILE_BYTES_MAX);
-    Ok(fits.then_some(bytes))
 }
 
 fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> Malformed {

@@ -8,13 +8,21 @@ use std::slice;
 
 use crate::check;
 use crate::document::{self, Format};
-use crate::file_error::{self, ContentError, FileError};
+use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::job::{JobKind, JobSpecification, Range};
+use crate::limits;
 use crate::parameters::Parameter;
+use crate::plausible::{self, Warning};
 use crate::reader::{Reader, Table};
 use crate::setup_section;
 
 pub use crate::toml_text::job as to_toml;
+
+/// Measured velocities may be in it.
+const BOUND: Bound = Bound {
+    bytes: limits::JOB_FILE_BYTES_MAX,
+    purpose: "a job with a million velocities needs; data.velocities may also name a CSV file",
+};
 
 /// Reads and validates the job file at `path`; its extension tells the format. The file of
 /// measured velocities that it names is read too, relative to the job file, and inlined.
@@ -24,9 +32,20 @@ pub use crate::toml_text::job as to_toml;
 /// # Errors
 /// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
 pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
-    let (text, format) = file_error::read(path)?;
+    read_with_warnings(path, kind).map(|(specification, _)| specification)
+}
+
+/// The same, with what is unusual about the job.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_warnings(
+    path: &Path,
+    kind: JobKind,
+) -> Result<(JobSpecification, Vec<Warning>), FileError> {
+    let (text, format) = file_error::read(path, BOUND)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    parse(&text, format, directory, kind)
+    parse_with_warnings(&text, format, directory, kind)
         .map_err(|content| FileError::Content { path: path.to_owned(), content })
 }
 
@@ -40,6 +59,15 @@ pub fn parse(
     directory: &Path,
     kind: JobKind,
 ) -> Result<JobSpecification, ContentError> {
+    parse_with_warnings(text, format, directory, kind).map(|(specification, _)| specification)
+}
+
+fn parse_with_warnings(
+    text: &str,
+    format: Format,
+    directory: &Path,
+    kind: JobKind,
+) -> Result<(JobSpecification, Vec<Warning>), ContentError> {
     let root = document::parse(file_error::without_byte_order_mark(text), format)?;
     let mut reader = Reader::default();
     let keys = [
@@ -57,17 +85,23 @@ pub fn parse(
     if !table.is_table() {
         return Err(reader.refuse(&root).into());
     }
+    let setup = setup_section::read(&mut reader, &table);
+    let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let specification = JobSpecification {
         kind,
-        setup: setup_section::read(&mut reader, &table),
-        data: data_section::read(&mut reader, &table, directory, kind),
+        setup,
+        data,
         parameters: parameters(&mut reader, &table),
         monte_carlo: run_sections::monte_carlo(&mut reader, &table),
         objective: run_sections::objective(&mut reader, &table),
         search: run_sections::search(&mut reader, &table),
     };
-    check::job(&specification, &mut reader.violations);
-    if reader.violations.is_empty() { Ok(specification) } else { Err(reader.refuse(&root).into()) }
+    check::job_from(&specification, origin.as_ref(), &mut reader.violations);
+    if !reader.violations.is_empty() {
+        return Err(reader.refuse(&root).into());
+    }
+    let warnings = plausible::job_warnings_from(&specification, origin.as_ref());
+    Ok((specification, warnings))
 }
 
 /// The seven ranges; where one is missing or wrong, that is recorded and it has no meaning.

@@ -3,7 +3,7 @@
 //! Elasticity and its random ensemble, layers, probe, case and job specifications with their
 //! validation, the moments of a set of velocities, results and the digest that pins them.
 //! This crate knows no network, no clock and no thread; all of it is a pure function of its input
-//! except [`job_file`] and [`case_file`], which read the files a user names.
+//! except [`job_file`], [`case_file`] and [`user_file`], which read the files a user names.
 //!
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 
@@ -26,8 +26,10 @@ pub mod layers;
 pub mod limits;
 pub mod outcome;
 pub mod parameters;
+pub mod plausible;
 pub mod probe;
 pub mod quantile;
+pub mod reach;
 mod reader;
 pub mod realization;
 pub mod results;
@@ -40,6 +42,8 @@ mod sobol;
 pub mod special;
 pub mod statistics;
 mod toml_text;
+pub mod user_file;
 mod velocities;
 pub mod version;
 pub mod violations;
+pub mod visible;

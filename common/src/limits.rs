@@ -32,8 +32,22 @@ pub const ELEMENT_ORDER_MIN: u32 = 2;
 pub const ELEMENT_ORDER_MAX: u32 = 12;
 /// Most (frequency, wavenumber) pairs of one realization.
 pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
-/// Longest job or case file, bytes. (A million velocities inlined take 20 MB.)
+/// Longest file of measured velocities, and longest file of a run that is read again, bytes.
 pub const FILE_BYTES_MAX: u64 = 64 << 20;
+/// Longest line of a file of measured velocities, bytes.
+pub const LINE_BYTES_MAX: usize = 64 << 10;
+/// Longest job file, bytes. (A million velocities inlined take 20 MB, one on each line 24 MB.)
+pub const JOB_FILE_BYTES_MAX: u64 = 32 << 20;
+/// Longest case file, bytes. (Its 36 entries of a matrix take 1 kB.)
+pub const CASE_FILE_BYTES_MAX: u64 = 1 << 20;
+/// Most values in a job or case file: measured velocities, and room for everything else.
+pub const DOCUMENT_VALUES_MAX: usize = DATA_VELOCITIES_MAX + 100_000;
+/// Most keys, tables and lists in a job or case file: two for each group, and room for everything
+/// else. Each may take a kilobyte of memory.
+pub const DOCUMENT_KEYS_MAX: usize = 10_000;
+/// Most words, marks, spaces, comments and line ends in a TOML file: six for each value, as many as
+/// `    3900.5,` on a line of its own has. A parser keeps each.
+pub const TOML_TOKENS_MAX: usize = 6 * DOCUMENT_VALUES_MAX;
 /// Longest message on the wire, bytes.
 pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
 /// Most realizations in one batch: 17 bytes each on the wire.

@@ -33,14 +33,30 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     out
 }
 
-/// A text as a field: in quotes where it must be.
+/// A text as a field that no spreadsheet takes for a formula: a `'` is put before a [`FORMULA`] that
+/// begins it or, since some take `;` for the end of a field, that follows a `;`; before a `'` in such
+/// a place, too, so that whoever takes one `'` away there has the text again. In quotes where that is
+/// needed.
 fn field(text: &str) -> String {
-    if text.contains([',', '"', '#']) || text.trim() != text {
-        format!("\"{}\"", text.replace('"', "\"\""))
+    let mut harmless = String::with_capacity(text.len());
+    let mut begins = true;
+    for c in text.chars() {
+        if begins && (c == '\'' || FORMULA.contains(&c)) {
+            harmless.push('\'');
+        }
+        begins = c == ';' || (begins && c == ' ');
+        harmless.push(c);
+    }
+    let changed = harmless.len() > text.len();
+    if changed || text.contains([',', ';', '"', '#', '\t', '\r', '\n']) || text.trim() != text {
+        format!("\"{}\"", harmless.replace('"', "\"\""))
     } else {
-        text.to_owned()
+        harmless
     }
 }
+
+/// What begins a formula, or is passed over before one (OWASP, "CSV Injection").
+const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
 fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
     write!(out, "{}", evaluation.number)?;
@@ -163,4 +179,76 @@ pub fn realizations(outcomes: &[Outcome]) -> String {
         };
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The text of a field, as docs/results.md says that it is got back.
+    fn text_of(field: &str) -> String {
+        let inner = field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+        let text = inner.unwrap_or(field).replace("\"\"", "\"");
+        let mut found = String::new();
+        let mut begins = true;
+        for c in text.chars() {
+            if begins && c == '\'' {
+                begins = false;
+                continue;
+            }
+            begins = c == ';' || (begins && c == ' ');
+            found.push(c);
+        }
+        found
+    }
+
+    #[test]
+    fn no_field_is_a_formula() {
+        for (text, expected) in [
+            ("left", "left"),
+            ("left tibia, 2", "\"left tibia, 2\""),
+            ("say \"a\"", "\"say \"\"a\"\"\""),
+            ("x-1+2=y@z'", "x-1+2=y@z'"),
+            ("=1+1", "\"'=1+1\""),
+            ("+1", "\"'+1\""),
+            ("-1", "\"'-1\""),
+            ("@SUM(A1)", "\"'@SUM(A1)\""),
+            ("\t=1", "\"'\t=1\""),
+            ("\r=1", "\"'\r=1\""),
+            ("\n=1", "\"'\n=1\""),
+            ("＝1", "\"'＝1\""),
+            (" =1", "\" '=1\""),
+            ("'=1", "\"''=1\""),
+            ("'", "\"''\""),
+            ("a;=1", "\"a;'=1\""),
+            ("a; -b;'c", "\"a; '-b;''c\""),
+            ("a;b", "\"a;b\""),
+            ("a\rb", "\"a\rb\""),
+            ("a\nb", "\"a\nb\""),
+            ("#1", "\"#1\""),
+            (" a ", "\" a \""),
+        ] {
+            assert_eq!(field(text), expected, "{text:?}");
+            assert_eq!(text_of(expected), text, "{expected}");
+        }
+    }
+
+    /// Every text of up to five of the characters that matter.
+    #[test]
+    fn names_that_differ_have_fields_that_differ() {
+        let mut texts = vec![String::new()];
+        for _ in 0..5 {
+            let longer: Vec<String> = texts
+                .iter()
+                .flat_map(|text| "='; \"a".chars().map(move |c| format!("{text}{c}")))
+                .collect();
+            texts.extend(longer);
+            texts.sort();
+            texts.dedup();
+        }
+        assert!(texts.len() > 9000, "{}", texts.len());
+        for text in &texts {
+            assert_eq!(&text_of(&field(text)), text, "{}", field(text));
+        }
+    }
 }

@@ -15,7 +15,7 @@
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
 //! High in the band nothing is left but the tail of the pulse's kink at t = 0. There a shorter
-//! period does, so frequencies are thinned out ([`thinning`]), and so do the wavenumbers of the first
+//! period does, so frequencies are thinned out (`thinning.rs`), and so do the wavenumbers of the first
 //! packet, so that those of the later, slower waves are left out smoothly.
 
 mod thinning;

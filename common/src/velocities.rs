@@ -5,23 +5,63 @@
 //! quoted, but hold no line break.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use crate::check::{VELOCITIES_MIN, VELOCITY};
-use crate::file_error::{read_bytes, without_byte_order_mark};
+use crate::file_error::without_byte_order_mark;
 use crate::job::Group;
-use crate::limits;
+use crate::{limits, user_file, visible};
 
 /// The column that is read.
 const COLUMN: &str = "velocity";
 /// Most bad lines that are reported one by one.
 const REPORTED_MAX: usize = 10;
 
+/// Measured velocities of a file, one set or a set for each group.
+#[derive(Debug)]
+pub(crate) struct Measured<T> {
+    /// The velocities, m/s.
+    pub(crate) data: T,
+    /// Where they stand.
+    pub(crate) origin: Origin,
+}
+
+/// Where the velocities of a job stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Origin {
+    path: PathBuf,
+    /// Line of each velocity of each set, from 1.
+    lines: Vec<Vec<usize>>,
+}
+
+impl Origin {
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The line of a velocity of a set.
+    pub(crate) fn line(&self, set: usize, index: usize) -> Option<usize> {
+        self.lines.get(set)?.get(index).copied()
+    }
+
+    /// File and line of a velocity as the beginning of a message; nothing where there is no file.
+    pub(crate) fn place(origin: Option<&Self>, set: usize, index: usize) -> String {
+        let place = origin.and_then(|origin| {
+            let line = origin.line(set, index)?;
+            Some(format!("{}, line {line}: velocity ", origin.path.display()))
+        });
+        place.unwrap_or_default()
+    }
+}
+
 /// One thing wrong with a CSV file of velocities.
 #[derive(Debug, Error)]
-#[error("{}{}: {problem}", .path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
+#[error("{}{}: {problem}", visible::path(path), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
 pub(crate) struct CsvError {
     path: PathBuf,
     line: Option<usize>,
@@ -31,9 +71,14 @@ pub(crate) struct CsvError {
 #[derive(Debug, Error)]
 enum Problem {
     #[error("cannot be read: {0} (its path is relative to the job file)")]
-    Unreadable(std::io::Error),
+    Unreadable(io::Error),
     #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
     TooLarge,
+    #[error(
+        "is longer than {} bytes; a line has the fields of one velocity",
+        limits::LINE_BYTES_MAX
+    )]
+    LongLine,
     #[error("is not UTF-8 text")]
     NotUtf8,
     #[error("has no header; its first line must name the columns, one of them `{COLUMN}`")]
@@ -79,9 +124,10 @@ impl CsvError {
 ///
 /// # Errors
 /// Everything that is wrong with it, up to [`REPORTED_MAX`] lines.
-pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
-    let rows = rows_of(path, None)?;
-    Ok(rows.into_iter().map(|(_, velocity)| velocity).collect())
+pub(crate) fn read(path: &Path) -> Result<Measured<Vec<f64>>, Vec<CsvError>> {
+    let Measured { data, origin } = measured(path, None)?;
+    // Without a column of groups they are all in one.
+    Ok(Measured { data: data.into_iter().flat_map(|group| group.velocities).collect(), origin })
 }
 
 /// The velocities of the CSV file at `path`, m/s, by the names in its column `column`: groups in the
@@ -89,76 +135,151 @@ pub(crate) fn read(path: &Path) -> Result<Vec<f64>, Vec<CsvError>> {
 ///
 /// # Errors
 /// As [`read`].
-pub(crate) fn read_groups(path: &Path, column: &str) -> Result<Vec<Group>, Vec<CsvError>> {
-    let mut groups: Vec<Group> = Vec::new();
-    let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for (name, velocity) in rows_of(path, Some(column))? {
-        let place = places.get(&name).copied().unwrap_or_else(|| {
-            groups.push(Group { name: name.clone(), velocities: Vec::new() });
-            places.insert(name, groups.len() - 1);
-            groups.len() - 1
-        });
-        groups[place].velocities.push(velocity);
-        if groups.len() > limits::GROUPS_MAX {
-            let (line, problem) = (None, Problem::TooManyGroups);
-            return Err(vec![CsvError { path: path.to_owned(), line, problem }]);
-        }
-    }
-    Ok(groups)
+pub(crate) fn read_groups(
+    path: &Path,
+    column: &str,
+) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
+    measured(path, Some(column))
 }
 
-/// Name of the group (empty without a `column` of them) and velocity of each row.
-fn rows_of(path: &Path, column: Option<&str>) -> Result<Vec<(String, f64)>, Vec<CsvError>> {
+/// The velocities by the names in `column`; all in a group without name if there is no column.
+fn measured(path: &Path, column: Option<&str>) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
     let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
-    text_of(path)
-        .map_err(|located| vec![located])
-        .and_then(|text| parse(&text, column))
-        .map_err(|problems| problems.into_iter().map(located).collect())
+    let gathered = open(path)
+        .map_err(|problem| vec![(None, problem)])
+        .and_then(|file| parse(file, column))
+        .map_err(|problems| problems.into_iter().map(located).collect::<Vec<_>>())?;
+    let Gathered { groups, lines, .. } = gathered;
+    Ok(Measured { data: groups, origin: Origin { path: path.to_owned(), lines } })
 }
 
-fn text_of(path: &Path) -> Result<String, Located> {
-    let bytes = read_bytes(path).map_err(|error| (None, Problem::Unreadable(error)))?;
-    let bytes = bytes.ok_or((None, Problem::TooLarge))?;
-    String::from_utf8(bytes).map_err(|error| {
-        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
-        (Some(line), Problem::NotUtf8)
-    })
+fn open(path: &Path) -> Result<impl BufRead, Problem> {
+    let open = || -> io::Result<(File, u64)> {
+        let file = user_file::open(path)?;
+        let length = file.metadata()?.len();
+        Ok((file, length))
+    };
+    match open().map_err(Problem::Unreadable)? {
+        (_, length) if length > limits::FILE_BYTES_MAX => Err(Problem::TooLarge),
+        // What is added while it is read is not read.
+        (file, length) => Ok(BufReader::new(file.take(length))),
+    }
 }
 
 type Located = (Option<usize>, Problem);
 
-fn parse(text: &str, group: Option<&str>) -> Result<Vec<(String, f64)>, Vec<Located>> {
-    let mut lines = without_byte_order_mark(text)
-        .lines()
-        .enumerate()
-        .map(|(index, line)| (index + 1, line))
-        .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    let Some((number, header)) = lines.next() else {
-        return Err(vec![(None, Problem::Empty)]);
-    };
+fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Located>> {
+    let mut lines = Lines { file, number: 0, bytes: Vec::new() };
+    let header = lines.next().map_err(|problem| vec![problem])?;
+    let (number, header) = header.ok_or_else(|| vec![(None, Problem::Empty)])?;
     let columns = Columns::of(header, group).map_err(|problem| vec![(Some(number), problem)])?;
-    let mut velocities = Vec::new();
+    let mut gathered = Gathered::default();
     let mut problems = Vec::new();
-    for (number, line) in lines {
-        match columns.row(line) {
-            Ok(row) => velocities.push(row),
-            Err(problem) => problems.push((Some(number), problem)),
+    loop {
+        match lines.next() {
+            Ok(None) => break,
+            Ok(Some((number, line))) => match columns.row(line) {
+                Ok((name, velocity)) => {
+                    gathered
+                        .add(number, name, velocity)
+                        .map_err(|problem| vec![(None, problem)])?;
+                }
+                Err(problem) => problems.push((Some(number), problem)),
+            },
+            // What follows cannot be told.
+            Err(problem) => {
+                problems.push(problem);
+                return Err(problems);
+            }
         }
         if problems.len() > REPORTED_MAX {
             problems.pop();
             problems.push((None, Problem::More));
             return Err(problems);
         }
-        if velocities.len() > limits::DATA_VELOCITIES_MAX {
-            return Err(vec![(None, Problem::TooMany)]);
+    }
+    if problems.is_empty() && gathered.count < VELOCITIES_MIN {
+        problems.push((None, if gathered.count == 0 { Problem::NoRows } else { Problem::OneRow }));
+    }
+    if problems.is_empty() { Ok(gathered) } else { Err(problems) }
+}
+
+/// The lines of a file, one in memory at a time.
+struct Lines<R> {
+    file: R,
+    /// Of the last line, from 1.
+    number: usize,
+    bytes: Vec<u8>,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The next line that is neither empty nor a comment, without its end, and its number.
+    fn next(&mut self) -> Result<Option<(usize, &str)>, Located> {
+        loop {
+            self.bytes.clear();
+            // With its end, of two bytes at most.
+            let most = limits::LINE_BYTES_MAX as u64 + 2;
+            let mut line = self.file.by_ref().take(most);
+            let read = line.read_until(b'\n', &mut self.bytes);
+            if read.map_err(|error| (None, Problem::Unreadable(error)))? == 0 {
+                return Ok(None);
+            }
+            self.number += 1;
+            if self.bytes.last() == Some(&b'\n') {
+                self.bytes.pop();
+            }
+            if self.bytes.last() == Some(&b'\r') {
+                self.bytes.pop();
+            }
+            if self.bytes.len() > limits::LINE_BYTES_MAX {
+                return Err((Some(self.number), Problem::LongLine));
+            }
+            // Looked at as bytes first: a line that is kept must not be borrowed in a loop.
+            let text = str::from_utf8(&self.bytes);
+            let text = text.map_err(|_| (Some(self.number), Problem::NotUtf8))?;
+            let begin = without_byte_order_mark(text).trim_start();
+            if !begin.is_empty() && !begin.starts_with('#') {
+                break;
+            }
         }
+        // It is UTF-8, as was seen.
+        let text = str::from_utf8(&self.bytes).unwrap_or_default();
+        let text = if self.number == 1 { without_byte_order_mark(text) } else { text };
+        Ok(Some((self.number, text)))
     }
-    if problems.is_empty() && velocities.len() < VELOCITIES_MIN {
-        problems
-            .push((None, if velocities.is_empty() { Problem::NoRows } else { Problem::OneRow }));
+}
+
+/// The velocities read so far.
+#[derive(Default)]
+struct Gathered {
+    groups: Vec<Group>,
+    /// Line of each velocity of each group, from 1.
+    lines: Vec<Vec<usize>>,
+    /// Of each group, by its name.
+    places: BTreeMap<String, usize>,
+    count: usize,
+}
+
+impl Gathered {
+    fn add(&mut self, line: usize, name: String, velocity: f64) -> Result<(), Problem> {
+        self.count += 1;
+        if self.count > limits::DATA_VELOCITIES_MAX {
+            return Err(Problem::TooMany);
+        }
+        let place = match self.places.get(&name) {
+            Some(&place) => place,
+            None if self.groups.len() == limits::GROUPS_MAX => return Err(Problem::TooManyGroups),
+            None => {
+                self.groups.push(Group { name: name.clone(), velocities: Vec::new() });
+                self.lines.push(Vec::new());
+                self.places.insert(name, self.groups.len() - 1);
+                self.groups.len() - 1
+            }
+        };
+        self.groups[place].velocities.push(velocity);
+        self.lines[place].push(line);
+        Ok(())
     }
-    if problems.is_empty() { Ok(velocities) } else { Err(problems) }
 }
 
 /// Where velocity and group stand in each row.
@@ -267,7 +388,7 @@ fn quoted_field(mut rest: &str) -> Result<(String, &str), Problem> {
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
 fn shortened(text: &str) -> String {
-    text.chars().take(SHOWN_CHARACTERS_MAX).collect()
+    visible::line(&text.chars().take(SHOWN_CHARACTERS_MAX).collect::<String>()).into_owned()
 }
 
 fn listed(names: &[String]) -> String {

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::visible;
+
 /// One thing wrong with one field.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Violation {
@@ -16,10 +18,11 @@ pub struct Violation {
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let message = visible::line(&self.message);
         if self.field.is_empty() {
-            f.write_str(&self.message)
+            f.write_str(&message)
         } else {
-            write!(f, "{}: {}", self.field, self.message)
+            write!(f, "{}: {message}", visible::line(&self.field))
         }
     }
 }

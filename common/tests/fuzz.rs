@@ -10,8 +10,7 @@ use osteon_common::document::Format;
 use osteon_common::job::JobKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::{case_file, job_file, results_json};
-use osteon_fuzz::{bounded, bytes, config, damaged, damaged_text, texts};
-use proptest::prelude::*;
+use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties, texts};
 
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
@@ -176,25 +175,19 @@ fn large_velocities_take_no_more_than_their_share() {
     }
 }
 
-proptest! {
-    #![proptest_config(config())]
-
-    #[test]
+properties! {
     fn damaged_jobs_are_read_or_refused(text in damaged_text(texts("jobs"))) {
         check_job(&text);
     }
 
-    #[test]
     fn damaged_cases_are_read_or_refused(text in damaged_text(texts("cases"))) {
         check_case(&text);
     }
 
-    #[test]
     fn damaged_velocities_are_read_or_refused(csv in damaged(bytes("velocities"))) {
         check_velocities(&csv);
     }
 
-    #[test]
     fn damaged_results_are_read_or_refused(text in damaged_text(texts("results"))) {
         check_result(&text);
     }

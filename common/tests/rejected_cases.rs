@@ -57,6 +57,32 @@ fn engineering_constants() {
     );
 }
 
+/// Numbers in another unit than the one that is asked for, each with the cure.
+#[test]
+fn units() {
+    check(
+        "rejected_constants_units",
+        CASE,
+        &[
+            ("density = 1598.8", "density = 1.5988"),
+            ("longitudinal_young_modulus = 17.717e9", "longitudinal_young_modulus = 17.717"),
+            ("longitudinal_poisson_ratio = 0.3816", "longitudinal_poisson_ratio = 38.16"),
+            ("longitudinal_shear_modulus = 4.795e9", "longitudinal_shear_modulus = 4795"),
+            ("transverse_young_modulus = 9.8254e9", "transverse_young_modulus = 9.8254"),
+            ("[bone]", "[layers]\nbone = { thickness = 4 }\n[bone]"),
+            ("[bone]", "[probe]\ncenter_frequency = 1\n[bone]"),
+            ("[bone]", "[probe]\nreceivers = { first_x1 = 11, pitch = 0.8 }\n[bone]"),
+        ],
+    );
+}
+
+/// A matrix is written by programs, of any scale: a fluid, a phantom, a number for a test.
+#[test]
+fn a_matrix_may_have_any_scale() {
+    let soft = MANDEL.replace("e9", "");
+    assert_eq!(refusal(&soft.replace("density = 1800", "density = 1.8"), Format::Toml), "ACCEPTED");
+}
+
 #[test]
 fn mandel() {
     check(
@@ -132,9 +158,10 @@ fn files_that_cannot_be_read() {
 fn a_file_longer_than_the_bound_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.toml");
-    let bytes_max = osteon_common::limits::FILE_BYTES_MAX;
+    let bytes_max = osteon_common::limits::CASE_FILE_BYTES_MAX;
     let file = std::fs::File::create(&path).unwrap();
     file.set_len(bytes_max + 1).unwrap();
     let message = case_file::read(Path::new(&path)).unwrap_err().to_string();
-    assert!(message.ends_with("long.toml is longer than 67108864 bytes"), "{message}");
+    let expected = "long.toml is longer than 1048576 bytes, more than any case file needs";
+    assert!(message.ends_with(expected), "{message}");
 }

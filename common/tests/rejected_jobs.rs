@@ -128,6 +128,63 @@ fn parameters() {
     );
 }
 
+/// Numbers in another unit than the one that is asked for, each with the cure.
+#[test]
+fn units() {
+    check(
+        "rejected_units",
+        JobKind::Identification,
+        &[
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = 4 }"),
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = 4000 }"),
+            ("sound_speed = 1510.0", "sound_speed = 1.51"),
+            ("center_frequency = 0.9e6", "center_frequency = 1"),
+            ("center_frequency = 0.9e6", "center_frequency = 0.25"),
+            ("center_frequency = 0.9e6", "center_frequency = 900"),
+            ("x1 = 1e-3, x3 = 3e-3", "x1 = 1e-3, x3 = 3"),
+            ("first_x1 = 13e-3, pitch = 0.9e-3", "first_x1 = 13, pitch = 0.9"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_size = 0.5"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1.7"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1.7\nbounds = [1.5, 2.0]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 20\nbounds = [12, 25]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18000\nbounds = [12000, 25000]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18\nbounds = [12e9, 25e9]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18e9\nbounds = [25e9, 12e9]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 30e9\nbounds = [12e9, 25e9]"),
+            ("fixed = 4.795e9", "fixed = 4.795"),
+            ("start = 0.35\nbounds = [0.2, 0.45]", "start = 35\nbounds = [20, 45]"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 45"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 15"),
+        ],
+    );
+}
+
+/// Measured velocities in another unit, and those that no point within the bounds can reach.
+#[test]
+fn implausible_data() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_implausible_data",
+        JobKind::Identification,
+        &[
+            (given, "velocities = [3.9, 4.0, 3.95]"),
+            (given, "velocities = [3900e3, 4000e3, 3950e3]"),
+            (given, "velocities = [3900.5, 4000, 39000, 3.95]"),
+            (given, "velocities = [39, 40, 41]"),
+            (given, "groups = { a = [3.9, 4.0], b = [3900.0, 4000.0] }"),
+            (given, "mean = 3.8\ncoefficient_of_variation = 2.7"),
+            (given, "mean = 50\ncoefficient_of_variation = 0.027"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.6"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.001"),
+            (given, "mean = 1100.0\ncoefficient_of_variation = 0.027"),
+            (given, "velocities = [1100.0, 1200.0]"),
+            (given, "groups = { a = [1100.0, 1200.0], b = [1000.0, 1200.0] }"),
+        ],
+    );
+    let other = edited(given, "groups = { a = [1100.0, 1200.0], b = [3900.0, 4000.0] }");
+    assert_eq!(refusal(&other, JobKind::Identification), "ACCEPTED", "b can be matched");
+}
+
 #[test]
 fn run() {
     check(

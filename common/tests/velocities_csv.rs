@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use osteon_common::document::Format;
 use osteon_common::job::{Data, Group, JobKind};
 use osteon_common::job_file;
+use osteon_common::plausible::Warning;
 
 /// What the job of `files/job.toml` gets from a file with these bytes.
 fn read(bytes: &[u8]) -> Result<Option<Data>, String> {
@@ -25,6 +26,22 @@ fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
         Ok(job) => Ok(job.data),
         Err(error) => Err(error.to_string().replace(&*directory.path().to_string_lossy(), "DIR")),
     }
+}
+
+/// The warnings about a job with these velocities.
+fn warnings(text: &str, more: &str) -> Vec<String> {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("v.csv"), text).unwrap();
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let job =
+        include_str!("files/job.toml").replace(given, &format!("velocities = \"v.csv\"\n{more}"));
+    let path = directory.path().join("job.toml");
+    std::fs::write(&path, job).unwrap();
+    let (_, warnings) = job_file::read_with_warnings(&path, JobKind::Identification).unwrap();
+    let shown = |warning: &Warning| {
+        warning.to_string().replace(&*directory.path().to_string_lossy(), "DIR")
+    };
+    warnings.iter().map(shown).collect()
 }
 
 #[test]
@@ -105,4 +122,67 @@ fn what_is_refused() {
     insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
         insta::assert_snapshot!("rejected_csv", page);
     });
+}
+
+#[test]
+fn velocities_in_another_unit_are_refused() {
+    let check = |text: &str, more: &str, expected: &[&str]| {
+        let message = read_as(text.as_bytes(), more).unwrap_err();
+        for part in expected {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    };
+    let all = "data.velocities: their median is 3.95; values are in m/s: did you mean 3.95 km/s";
+    check("velocity\n3.9\n3.95\n4.0\n", "", &["1 error", all]);
+    let one = "DIR/data/v.csv, line 5: velocity is 39000.0; no velocity of sound in bone is outside \
+               100 to 20000 (m/s); their median is 3950";
+    check("# one\nvelocity\n3900.5\n\n39000\n3950\n", "", &["1 error", one]);
+    let grouped = "bone,velocity\na,3900.5\nb,3.9\na,3.95\nb,4.0\na,4000\n";
+    let expected = [
+        "2 errors",
+        "data.groups.b: their median is 3.95; values are in m/s: did you mean 3.95 km/s (3.95e3)?",
+        "data.groups.a[1]: DIR/data/v.csv, line 4: velocity is 3.95; no velocity",
+    ];
+    check(grouped, "group = \"bone\"", &expected);
+    let many = format!("velocity\n{}{}", "3900\n4000\n".repeat(20), "39000\n".repeat(12));
+    let expected =
+        ["more than 10 errors", "line 51: velocity is 39000.0", "more velocities out of range"];
+    check(&many, "", &expected);
+}
+
+#[test]
+fn single_velocities_far_from_the_others_are_warned_of_with_their_line() {
+    let one = "velocity\n3900.5\n# comment\n390\n3950\n4000\n3960\n3970\n";
+    assert_eq!(
+        warnings(one, ""),
+        [
+            "data.velocities: DIR/v.csv: 390 (line 4) m/s: more than a factor 3 from the median 3955 m/s; \
+          in other units, or a slip of the decimal point?"
+        ]
+    );
+    let many = format!("velocity\n{}{}", "3900\n4000\n".repeat(20), "390\n".repeat(7));
+    let found = warnings(&many, "");
+    assert_eq!(found.len(), 1, "{found:?}");
+    let listed =
+        "390 (line 42), 390 (line 43), 390 (line 44), 390 (line 45), 390 (line 46) and 2 more m/s";
+    assert!(found[0].contains(listed), "{found:?}");
+    assert_eq!(warnings("velocity\n3900.5\n3950\n2000\n8000\n", ""), [""; 0]);
+    let grouped = "bone,velocity\na,3900\nb,4000\na,3950\na,390\nb,3900\n";
+    assert_eq!(
+        warnings(grouped, "group = \"bone\""),
+        [
+            "data.groups.a: DIR/v.csv: 390 (line 5) m/s: more than a factor 3 from the median 3900 m/s; \
+          in other units, or a slip of the decimal point?"
+        ]
+    );
+}
+
+#[test]
+fn unusual_groups_are_listed_and_counted() {
+    let rows: String = (0..8).map(|i| format!("g{i},900\ng{i},950\n")).collect();
+    let csv = format!("bone,velocity\n{rows}z,3900\nz,3950\n");
+    let found = warnings(&csv, "group = \"bone\"");
+    assert_eq!(found.len(), 6, "{found:?}");
+    assert_eq!(found[0], "data.groups.g0: their median is 925 m/s; usual is 1000 to 8000 m/s");
+    assert_eq!(found[5], "data.groups: 3 more groups are unusual");
 }

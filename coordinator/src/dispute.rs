@@ -18,8 +18,8 @@ pub struct Dispute {
     votes: Vec<Vote>,
     /// Since when.
     pub since: Duration,
-    /// Batch of the worker that is to decide.
-    pub judge: Option<BatchId>,
+    /// Batch of the worker that is to decide, and its copies.
+    pub judges: Vec<BatchId>,
     /// Workers that were lost over it.
     pub(crate) lost: Losses,
 }
@@ -54,7 +54,7 @@ pub(crate) struct Verdict {
 impl Dispute {
     /// A dispute between two workers whose answers differ.
     pub(crate) fn new(indices: Indices, votes: [Vote; 2], since: Duration) -> Self {
-        Self { indices, votes: votes.into(), since, judge: None, lost: Losses::default() }
+        Self { indices, votes: votes.into(), since, judges: Vec::new(), lost: Losses::default() }
     }
 
     /// Whether `name` is one of those whose answers differ.

@@ -155,8 +155,13 @@ impl Evaluation {
 
     /// Puts one index that was alone in a batch of a lost worker into quarantine.
     pub(crate) fn suspect(&mut self, index: u64, loss: &Loss) {
-        self.suspects.entry(index).or_default().add(loss);
+        self.blame(index, loss);
         self.quarantine.push_back(index);
+    }
+
+    /// A worker was lost over one index, of which another worker holds a copy.
+    pub(crate) fn blame(&mut self, index: u64, loss: &Loss) {
+        self.suspects.entry(index).or_default().add(loss);
     }
 
     /// A worker is back: nothing that it held is to blame.

@@ -8,10 +8,13 @@
 //! Looked for is, of the points whose moments are the data's, the one nearest to the start in units
 //! of the box. What is believed of the moments (`model.rs`) is the closed form ln √(c1111/ρ), ln δ
 //! with a correction that every evaluation improves; the next point is the believed answer
-//! (`nearest.rs`). It is looked for from the start and not from where the search is, so that steps
-//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there: what is left to
-//! do is then so little that it does not matter, and corrections that also slid along the points
-//! that match would be longer than what they correct. The start itself is evaluated first.
+//! (`nearest.rs`): the nearest one that a fixed number of descents over the whole box find, since the
+//! points that match are curved and one descent may end at a point that is nearer only than those
+//! around it. It is looked for from the start and not from where the search is, so that steps
+//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there, and by one
+//! descent: what is left to do is then so little that it does not matter, and corrections that also
+//! slid along the points that match would be longer than what they correct. The start itself is
+//! evaluated first.
 //!
 //! # Safeguards
 //!
@@ -39,7 +42,7 @@ use crate::ask::{Ask, Stop};
 use crate::search_box::SearchBox;
 
 use self::model::{Logarithms, Model, subtract};
-use self::nearest::dot;
+use self::nearest::norm;
 
 pub use self::nearest::{Rows, nearest};
 
@@ -107,6 +110,8 @@ pub struct Newton {
     target: Logarithms,
     /// From where the nearest point is looked for: the start, later where it nearly is.
     centre: Vec<f64>,
+    /// Whether it nearly is there.
+    near: bool,
     model: Model,
     /// The lowest cost of all steps, once one was feasible.
     base: Option<Evaluated>,
@@ -138,6 +143,7 @@ impl Newton {
             base: None,
             pending: start.clone(),
             centre: start,
+            near: false,
             purpose: Purpose::Step,
             whole: false,
             radius: RADIUS_MAX,
@@ -240,6 +246,7 @@ impl Newton {
             self.model.settle_on(&trial.at, trial.found);
             if self.whole && trial.cost < NEAR {
                 self.centre.clone_from(&trial.at);
+                self.near = true;
             }
             self.base = Some(trial);
             self.radius = (2.0 * self.radius).min(RADIUS_MAX);
@@ -262,7 +269,7 @@ impl Newton {
                 return;
             }
             let anchor = self.anchor();
-            let mut step = subtract(&self.model.nearest(&self.centre, self.target), anchor);
+            let mut step = subtract(&self.believed_answer(), anchor);
             let length = norm(&step);
             if length > self.radius {
                 step.iter_mut().for_each(|d| *d *= self.radius / length);
@@ -275,6 +282,15 @@ impl Newton {
                 return;
             }
             stalled = true;
+        }
+    }
+
+    /// Where the search would go if steps could be as long as they like.
+    fn believed_answer(&self) -> Vec<f64> {
+        if self.near {
+            self.model.nearest_from_here(&self.centre, self.target)
+        } else {
+            self.model.nearest(&self.centre, self.target)
         }
     }
 
@@ -351,8 +367,4 @@ impl Newton {
 
 fn logarithms(moments: Moments) -> Logarithms {
     [moments.mean, moments.coefficient_of_variation].map(libm::log)
-}
-
-fn norm(step: &[f64]) -> f64 {
-    dot(step, step).sqrt()
 }

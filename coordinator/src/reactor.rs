@@ -15,6 +15,7 @@ mod dispatch;
 mod due;
 mod expulsion;
 mod jobs;
+mod overdue;
 mod prune;
 mod requests;
 mod reread;
@@ -24,6 +25,7 @@ mod ticks;
 mod workers;
 
 pub(crate) use ahead::LIKELY_MAX;
+pub(crate) use overdue::COPIES_MAX;
 pub use restore::Restored;
 
 #[cfg(test)]

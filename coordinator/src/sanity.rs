@@ -8,7 +8,7 @@ use thiserror::Error;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::reactor::LIKELY_MAX;
+use crate::reactor::{COPIES_MAX, LIKELY_MAX};
 use crate::state::{
     Ahead, BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Job, Purpose, RequestName, SETTLED_MAX, Stage,
     State,
@@ -27,12 +27,16 @@ pub enum Insane {
     /// A worker holds too much.
     #[error("worker {0} holds more than it may")]
     Credit(WorkerId),
-    /// Two copies of a batch do not name each other.
-    #[error("batch {0} and its copy do not match")]
+    /// The copies of a batch do not name each other.
+    #[error("batch {0} and its copies do not match")]
     Twin(BatchId),
     /// Not exactly those batches may be copied of which there is one and that are no suspects.
     #[error("the list of batches that may be copied is wrong")]
     Copyable,
+    /// What waits for another worker that computes the same is with nobody, is not the newest of
+    /// its copies, or is not waited for.
+    #[error("batch {0} cannot be overdue")]
+    Overdue(BatchId),
     /// A batch of an evaluation that is not under way.
     #[error("batch {0} belongs to no evaluation under way")]
     Stray(BatchId),
@@ -157,18 +161,18 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
     };
-    let judged = |dispute: &&Dispute| {
-        let judge = dispute.judge.and_then(|judge| state.batches.get(&judge));
-        judge.is_some_and(|batch| {
+    let judged = |dispute: &Dispute| {
+        let judges = dispute.judges.iter().filter_map(|judge| state.batches.get(judge));
+        let fits = |batch: &&Batch| {
             batch.purpose == Purpose::Judge && batch.assignment.indices == dispute.indices
-        })
+        };
+        judges.filter(fits).count() == dispute.judges.len()
     };
-    let waits = |dispute: &&Dispute| dispute.judge.is_none();
     let disputes = &evaluation.disputes;
-    let judges = disputes.iter().filter(judged).count();
+    let judges: usize = disputes.iter().map(|dispute| dispute.judges.len()).sum();
     if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
         || with(|purpose| *purpose == Purpose::Judge) != judges
-        || judges + disputes.iter().filter(waits).count() != disputes.len()
+        || !disputes.iter().all(judged)
     {
         return Err(Insane::Checks(job));
     }
@@ -205,13 +209,17 @@ fn check_workers(state: &State) -> Result<(), Insane> {
 }
 
 fn check_batches(state: &State) -> Result<(), Insane> {
-    let copyable = |batch: &Batch| {
-        let alone = batch.twin.is_none() && !batch.exclusive;
-        batch.purpose == Purpose::Fill && alone && !batch.ahead
-    };
-    let expected = state.batches.iter().filter(|(_, batch)| copyable(batch)).map(|(id, _)| id);
+    let copyable = state.batches.iter().filter(|(_, batch)| batch.is_copyable());
+    let expected = copyable.map(|(id, _)| id);
     if !state.copyable.iter().eq(expected) {
         return Err(Insane::Copyable);
+    }
+    let overdue = |id: &&BatchId| {
+        let batch = state.batches.get(id);
+        batch.is_some_and(|batch| !batch.ahead && batch.twins.iter().all(|twin| twin < id))
+    };
+    if let Some(id) = state.overdue.iter().find(|id| !overdue(id)) {
+        return Err(Insane::Overdue(*id));
     }
     for (&id, batch) in &state.batches {
         let worker = state.workers.get(&batch.worker);
@@ -219,15 +227,17 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         if held != 1 {
             return Err(Insane::Holding(batch.worker, id));
         }
-        if let Some(twin) = batch.twin {
-            let matches = state.batches.get(&twin).is_some_and(|twin| {
-                twin.twin == Some(id)
+        let matches = |twin: &BatchId| {
+            state.batches.get(twin).is_some_and(|twin| {
+                twin.twins.iter().filter(|of| **of == id).count() == 1
+                    && twin.twins.len() == batch.twins.len()
                     && twin.assignment == batch.assignment
+                    && (twin.purpose, twin.exclusive) == (batch.purpose, batch.exclusive)
                     && twin.worker != batch.worker
-            });
-            if !matches || batch.exclusive || batch.purpose != Purpose::Fill {
-                return Err(Insane::Twin(id));
-            }
+            })
+        };
+        if !batch.twins.iter().all(matches) || batch.twins.len() >= COPIES_MAX {
+            return Err(Insane::Twin(id));
         }
         let round = batch.assignment.round;
         let job = state.jobs.get(&batch.assignment.job);

@@ -22,6 +22,7 @@ use self::identification::Identification;
 
 pub(crate) use self::ahead::same_point;
 
+mod advice;
 mod ahead;
 mod identification;
 mod method;

@@ -8,10 +8,11 @@ use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
 use crate::state::{EndedJob, Job, LostInARow, Stage, State};
+use crate::worker_name::WorkerName;
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Most hosts that are named whose workers vanish.
+/// Most hosts that are named whose workers vanish, and most workers that do not answer.
 const UNFIT_SHOWN_MAX: usize = 3;
 
 /// How `id` stands at `now`; `None` if no client can know of it.
@@ -108,7 +109,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     if state.draining {
         return "the coordinator is shutting down".to_owned();
     }
-    let unfit = unfit_hosts(state);
+    let unfit = unfit(state);
     match &job.stage {
         Stage::Computing(evaluation) if !evaluation.quarantine.is_empty() && !unfit.is_empty() => {
             let count = evaluation.quarantine.len();
@@ -131,23 +132,15 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::Computing(evaluation) if !evaluation.disputes.is_empty() => {
             let begun = evaluation.disputes.iter().map(|dispute| dispute.since).min();
             let what = "a third worker, which decides between two whose answers differ";
-            format!("{what} {}", since(begun.unwrap_or(now)))
+            let judges = evaluation.disputes.iter().flat_map(|dispute| &dispute.judges);
+            let asked =
+                judges.filter_map(|judge| state.batches.get(judge)?.worker_in(state)).next();
+            let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
+            format!("{what} {}{asked}", since(begun.unwrap_or(now)))
         }
         Stage::Computing(_) if now.saturating_sub(job.progressed) >= PATIENCE => {
-            let oldest = state
-                .batches
-                .values()
-                .filter(|batch| batch.assignment.job == job.record.job && !batch.ahead)
-                .min_by_key(|batch| batch.sent);
-            match oldest.and_then(|batch| Some((batch, state.workers.get(&batch.worker)?))) {
-                Some((batch, worker)) => format!(
-                    "the answer of {} to {} realizations {}",
-                    worker.name,
-                    batch.assignment.indices.count,
-                    since(batch.sent)
-                ),
-                None => format!("a worker that takes batches {}", since(job.progressed)),
-            }
+            oldest_answer(state, job, since)
+                .unwrap_or_else(|| format!("a worker that takes batches {}", since(job.progressed)))
         }
         Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
         Stage::Accepting | Stage::Computing(_) | Stage::Storing { .. } | Stage::Finishing(_) => {
@@ -156,11 +149,37 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     }
 }
 
-/// The hosts whose workers vanish with whatever they hold, in words; empty if there is none.
-fn unfit_hosts(state: &State) -> String {
+/// The answer that a job waits for longest, in words.
+fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -> Option<String> {
+    let of_job = state
+        .batches
+        .iter()
+        .filter(|(_, batch)| batch.assignment.job == job.record.job && !batch.ahead);
+    let (id, batch) = of_job.min_by_key(|(_, batch)| batch.sent)?;
+    let others = batch.twins.len();
+    let instead = match others {
+        0 if !state.overdue.contains(id) => String::new(),
+        0 if job.pace.is_known() => {
+            "; it is overdue, and no other worker has taken it over".to_owned()
+        }
+        // It may take so long.
+        0 => "; nothing of this job is answered yet".to_owned(),
+        1 => "; another worker computes the same".to_owned(),
+        _ => format!("; {others} others compute the same"),
+    };
+    let (name, count) = (&batch.worker_in(state)?.name, batch.assignment.indices.count);
+    Some(format!("the answer of {name} to {count} realizations {}{instead}", since(batch.sent)))
+}
+
+/// The hosts whose workers vanish with whatever they hold, and the workers that do not answer it, in
+/// words; empty if there is none.
+fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
     let named = |(host, lost): (&String, &LostInARow)| {
         format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
     };
-    failing.map(named).take(UNFIT_SHOWN_MAX).collect::<Vec<_>>().join(", ")
+    let silent = state.probation.silent();
+    let silent = silent.map(|name: &WorkerName| format!("{name} does not answer what it holds"));
+    let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
+    all.collect::<Vec<_>>().join(", ")
 }

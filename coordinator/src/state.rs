@@ -18,6 +18,8 @@ use crate::evaluation::{Evaluation, Indices};
 use crate::event::Hello;
 use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::pace::Pace;
+use crate::probation::Probation;
 use crate::rate::Rate;
 use crate::search::Search;
 use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
@@ -67,11 +69,16 @@ pub struct State {
     /// How many workers of a host were lost in a row with what they held, none answering anything
     /// in between.
     pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
+    /// Workers that take batches and do not answer them.
+    pub(crate) probation: Probation,
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
     /// Batches that idle workers may have copies of, in the order they were sent.
     pub(crate) copyable: BTreeSet<BatchId>,
+    /// Batches that are overdue and wait for another worker that computes the same; of copies the
+    /// newest.
+    pub(crate) overdue: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -101,6 +108,10 @@ pub(crate) struct Job {
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
+    /// How long its realizations take.
+    pub(crate) pace: Pace,
+    /// The newest copy of an overdue batch of it.
+    pub(crate) scout: Option<BatchId>,
     /// Sequence number of its last snapshot that was published.
     pub(crate) sequence: u64,
     /// When it last got an answer, or began, or was accepted.
@@ -216,6 +227,8 @@ pub(crate) struct Worker {
     pub(crate) answered: Duration,
     /// It has answered something in this stay.
     pub(crate) proven: bool,
+    /// Batches that others answered in its place, since its last answer to one that it held.
+    pub(crate) missed: Missed,
     /// When the last sign of life was given to it.
     pub(crate) beat: Duration,
     /// Batches it holds, in the order they were sent.
@@ -226,6 +239,15 @@ pub(crate) struct Worker {
     pub(crate) rates: BTreeMap<JobId, f64>,
     /// It wants no more batches.
     pub(crate) draining: bool,
+}
+
+/// Batches in a row that others answered, long after their worker should have.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Missed {
+    /// How many.
+    pub(crate) count: u32,
+    /// When the worker could begin the first of them; means nothing while there is none.
+    pub(crate) since: Duration,
 }
 
 /// What a batch is about.
@@ -258,11 +280,16 @@ pub(crate) struct Batch {
     pub(crate) purpose: Purpose,
     pub(crate) worker: WorkerId,
     pub(crate) sent: Duration,
+    /// When its worker could begin it: when it was sent, or when the worker answered what it had
+    /// been sent before.
+    pub(crate) begun: Duration,
     /// Computing time that its client was charged for it.
     pub(crate) charged: Duration,
-    /// The other batch with the same indices, when there is a copy.
-    pub(crate) twin: Option<BatchId>,
-    /// A suspect: its worker holds nothing else, and it is never copied.
+    /// The other batches with the same indices and purpose, when there are copies.
+    pub(crate) twins: Vec<BatchId>,
+    /// How many of them were sent before it because those before them were overdue.
+    pub(crate) retries: u32,
+    /// A suspect: its worker holds nothing else, and it is not copied unless it is overdue.
     pub(crate) exclusive: bool,
     /// Of a point that the search has not asked for.
     pub(crate) ahead: bool,
@@ -288,9 +315,11 @@ impl State {
             workers: BTreeMap::new(),
             expelled: Vec::new(),
             lost_in_a_row: BTreeMap::new(),
+            probation: Probation::default(),
             no_worker_since: now,
             batches: BTreeMap::new(),
             copyable: BTreeSet::new(),
+            overdue: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
@@ -387,23 +416,29 @@ impl State {
         }
     }
 
-    /// Whether somebody that meets `of` takes batches.
-    pub(crate) fn takes_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
-        !self.draining && self.workers.values().any(|worker| !worker.draining && of(&worker.name))
+    /// Whether a worker takes batches, and is expected to answer them.
+    pub(crate) fn is_sound(&self, worker: &Worker) -> bool {
+        !worker.draining && !self.probation.has(&worker.name)
+    }
+
+    /// Whether somebody that meets `of` takes batches, and is expected to answer them.
+    pub(crate) fn answers_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
+        let answers = |worker: &Worker| of(&worker.name) && self.is_sound(worker);
+        !self.draining && self.workers.values().any(answers)
     }
 
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
         self.copyable.remove(&batch);
+        self.overdue.remove(&batch);
         if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
             match settled.purpose {
                 Purpose::Fill => {}
                 Purpose::Audit { .. } => evaluation.audits_out -= 1,
                 Purpose::Judge => {
-                    let of = evaluation.disputes.iter_mut().find(|it| it.judge == Some(batch));
-                    if let Some(dispute) = of {
-                        dispute.judge = None;
+                    for dispute in &mut evaluation.disputes {
+                        dispute.judges.retain(|judge| *judge != batch);
                     }
                 }
             }
@@ -415,10 +450,13 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        if let Some((id, twin)) = settled.twin.and_then(|id| Some((id, self.batches.get_mut(&id)?)))
-        {
-            twin.twin = None;
-            self.copyable.insert(id);
+        for id in &settled.twins {
+            if let Some(twin) = self.batches.get_mut(id) {
+                twin.twins.retain(|other| *other != batch);
+                if twin.is_copyable() {
+                    self.copyable.insert(*id);
+                }
+            }
         }
         Some(settled)
     }
@@ -439,6 +477,8 @@ impl Job {
             mended: false,
             cancelled: false,
             rate: Rate::default(),
+            pace: Pace::default(),
+            scout: None,
             sequence: sequence(0, now),
             progressed: now,
             tokens: Vec::new(),
@@ -466,6 +506,18 @@ impl Job {
             _ => None,
         };
         asked_for.into_iter().chain(&mut self.ahead.evaluations)
+    }
+}
+
+impl Batch {
+    /// The worker that holds it.
+    pub(crate) fn worker_in<'a>(&self, state: &'a State) -> Option<&'a Worker> {
+        state.workers.get(&self.worker)
+    }
+
+    /// Whether an idle worker may have a copy of it before it is overdue.
+    pub(crate) fn is_copyable(&self) -> bool {
+        self.purpose == Purpose::Fill && self.twins.is_empty() && !self.exclusive && !self.ahead
     }
 }
 

@@ -280,6 +280,44 @@ pub enum StoreError {
         /// Newest format known.
         known: i64,
     },
+    /// The mark of acknowledged jobs cannot be read or written.
+    #[error(
+        "cannot read or write {}: {error}; give the coordinator's user write permission to it and \
+         its directory, and see that its disk is sound",
+        path.display()
+    )]
+    Mark {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The mark of acknowledged jobs makes no sense.
+    #[error(
+        "{} is damaged: whether acknowledged jobs are missing cannot be told; look at the disk, \
+         restore the store from a copy, or start with --accept-lost-jobs",
+        path.display()
+    )]
+    MarkDamaged {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Jobs whose clients were told that they are accepted are not there.
+    #[error(
+        "{} has lost {}, which had been accepted: its write-ahead log was cut short or damaged, or \
+         an older copy of it was put in place; look at the disk, restore the store from a copy, or \
+         start with --accept-lost-jobs to go on without them",
+        path.display(),
+        if first == last { format!("job {first}") } else { format!("jobs {first} to {last}") }
+    )]
+    LostJobs {
+        /// The file.
+        path: PathBuf,
+        /// The first that is missing.
+        first: JobId,
+        /// The last.
+        last: JobId,
+    },
     /// An evaluation is missing.
     #[error(
         "{} has {found} evaluations of job {job}, but the last has number {last}; restore the file \

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use osteon_common::limits::{NAME_BYTES_MAX, TOKENS_MAX};
+use osteon_common::visible;
 use osteon_proto::credential_file::{self, CredentialError};
 use osteon_proto::token::{PREFIX, Token, TokenHash};
 use thiserror::Error;
@@ -49,7 +50,7 @@ pub enum TokensError {
     #[error(transparent)]
     File(#[from] CredentialError),
     /// A line cannot be read.
-    #[error("{}: line {line} {fault}", path.display())]
+    #[error("{}: line {line} {fault}", visible::path(path))]
     Line {
         /// The file.
         path: PathBuf,
@@ -59,13 +60,13 @@ pub enum TokensError {
         fault: LineFault,
     },
     /// Nobody could do anything.
-    #[error("{} holds no tokens; `osteon token` makes one", path.display())]
+    #[error("{} holds no tokens; `osteon token` makes one", visible::path(path))]
     Empty {
         /// The file.
         path: PathBuf,
     },
     /// More than there can be people.
-    #[error("{} holds more than {max} tokens", path.display())]
+    #[error("{} holds more than {max} tokens", visible::path(path))]
     TooMany {
         /// The file.
         path: PathBuf,

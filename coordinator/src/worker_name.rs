@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use osteon_common::visible;
+
 /// A process on a host. A worker that attaches again has the same name; two stays with one name
 /// are one worker to those who compare answers. Two containers may have host and process in common:
 /// the number that each process drew at its start tells them apart.
@@ -14,10 +16,10 @@ pub struct WorkerName {
 }
 
 impl WorkerName {
-    /// The process `process` on `host` that drew `instance`, 0 if none; control characters of the
-    /// host are replaced.
+    /// The process `process` on `host` that drew `instance`, 0 if none; characters of the host
+    /// that are not seen are replaced.
     pub fn new(host: &str, process: u32, instance: u64) -> Self {
-        let shown = |c: char| if c.is_control() { '?' } else { c };
+        let shown = |c: char| if visible::is_hidden(c) { '?' } else { c };
         Self { host: host.chars().map(shown).collect::<String>().into(), process, instance }
     }
 

@@ -6,6 +6,8 @@
 mod fake;
 
 use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,9 +22,10 @@ use osteon_coordinator::leftover;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::search::{Search, Step};
 use osteon_coordinator::state::State;
-use osteon_coordinator::store::sqlite::SqliteStore;
-use osteon_coordinator::store::{EvaluationRecord, Store};
+use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
+use osteon_coordinator::store::{EvaluationRecord, JobRecord, Store, StoreError};
 use osteon_proto::batch::Work;
+use tempfile::TempDir;
 
 /// When a process dies, counted in writes since the beginning of the job.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +117,156 @@ fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
             }
         }
     }
+}
+
+/// The bytes of every file of a store: what a process that is killed now leaves.
+type Image = Vec<(OsString, Vec<u8>)>;
+
+fn image(directory: &Path) -> Image {
+    let entries = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap());
+    entries.map(|entry| (entry.file_name(), fs::read(entry.path()).unwrap())).collect()
+}
+
+fn part<'i>(image: &'i mut Image, name: &str) -> &'i mut Vec<u8> {
+    &mut image.iter_mut().find(|(file, _)| file == name).unwrap().1
+}
+
+/// Opens a store of these files.
+fn opened(image: &Image, lost: LostJobs) -> (TempDir, Result<SqliteStore, StoreError>) {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, bytes) in image {
+        fs::write(directory.path().join(name), bytes).unwrap();
+    }
+    let store = SqliteStore::open_with(directory.path(), lost);
+    (directory, store)
+}
+
+fn record(job: u64) -> JobRecord {
+    JobRecord {
+        job: JobId(job),
+        request_id: String::new(),
+        specification: Arc::new(fake::propagation(10, job)),
+        accepted: Duration::from_secs(1),
+        fingerprint: version::fingerprint(),
+        client: String::new(),
+        priority: 0,
+    }
+}
+
+fn numbers(store: &mut SqliteStore) -> Vec<u64> {
+    store.jobs().unwrap().iter().map(|job| job.record.job.0).collect()
+}
+
+const LOG: &str = "osteon.sqlite-wal";
+const MARK: &str = "osteon.acknowledged";
+
+/// A store that has acknowledged the jobs 1 to 6, of which 2 is forgotten, and its files after each
+/// change, with the last job that was acknowledged by then.
+fn lives_of_a_store() -> (TempDir, SqliteStore, Vec<(u64, Image)>) {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    let mut images = vec![(0, image(directory.path()))];
+    for job in 1..=6 {
+        store.put_job(&record(job)).unwrap();
+        images.push((job, image(directory.path())));
+        if job == 3 {
+            store.forget_jobs(&[JobId(2)]).unwrap();
+            images.push((job, image(directory.path())));
+        }
+    }
+    (directory, store, images)
+}
+
+/// A job is durable first, then the mark says so, then its client hears of it.
+#[test]
+fn killed_between_a_job_and_its_mark_no_job_is_missed() {
+    let (_directory, _store, images) = lives_of_a_store();
+    for pair in images.windows(2) {
+        let [(_, before), (acknowledged, after)] = pair else { panic!("no pair") };
+        let mut between = after.clone();
+        *part(&mut between, MARK) = part(&mut before.clone(), MARK).clone();
+        for image in [before, &between, after] {
+            opened(image, LostJobs::Refuse).1.unwrap();
+        }
+        // The other way round it would be a loss.
+        let mut lost = before.clone();
+        *part(&mut lost, MARK) = part(&mut after.clone(), MARK).clone();
+        let missed = lost != *before;
+        let refused = opened(&lost, LostJobs::Refuse).1;
+        assert_eq!(refused.is_err(), missed, "{acknowledged}");
+    }
+    // What was only stored counts from the next start on.
+    let mut between = images[2].1.clone();
+    *part(&mut between, MARK) = part(&mut images[1].1.clone(), MARK).clone();
+    let (directory, store) = opened(&between, LostJobs::Refuse);
+    drop(store.unwrap());
+    let mut later = image(directory.path());
+    *part(&mut later, "osteon.sqlite") = part(&mut images[0].1.clone(), "osteon.sqlite").clone();
+    let refused = opened(&later, LostJobs::Refuse).1.unwrap_err();
+    assert!(matches!(refused, StoreError::LostJobs { .. }), "{refused}");
+}
+
+/// SQLite takes a log that is cut, or damaged somewhere, for one that ends there.
+#[test]
+fn a_log_that_was_cut_anywhere_loses_no_job_in_silence() {
+    let (_directory, _store, images) = lives_of_a_store();
+    let (acknowledged, whole) = images.last().unwrap();
+    let length = part(&mut whole.clone(), LOG).len();
+    assert!(length > 20_000, "{length}");
+    opened(whole, LostJobs::Refuse).1.unwrap();
+    let mut refused = 0;
+    for at in (0..length).step_by(509) {
+        for cut in [true, false] {
+            let mut image = whole.clone();
+            let log = part(&mut image, LOG);
+            if cut {
+                log.truncate(at);
+            } else {
+                log[at] ^= 0x5a;
+            }
+            let (directory, store) = opened(&image, LostJobs::Refuse);
+            match store {
+                Ok(mut store) => {
+                    assert_eq!(numbers(&mut store).last(), Some(acknowledged), "{at} {cut}");
+                }
+                Err(error @ StoreError::LostJobs { last, .. }) => {
+                    assert_eq!(last.0, *acknowledged, "{error}");
+                    assert_eq!(self::image(directory.path()).len(), image.len(), "{error}");
+                    for name in ["osteon.sqlite", LOG, MARK] {
+                        let there = fs::read(directory.path().join(name)).unwrap();
+                        assert!(there == *part(&mut image, name), "{name} is changed");
+                    }
+                    refused += 1;
+                }
+                Err(error) => panic!("{at} {cut}: {error}"),
+            }
+        }
+    }
+    assert!(refused > 20, "{refused} refused");
+}
+
+#[test]
+fn lost_jobs_that_are_accepted_leave_their_numbers_unused() {
+    let (_directory, _store, images) = lives_of_a_store();
+    let mut image = images[2].1.clone();
+    *part(&mut image, MARK) = part(&mut images.last().unwrap().1.clone(), MARK).clone();
+    let (_, refused) = opened(&image, LostJobs::Refuse);
+    let told = refused.unwrap_err().to_string();
+    for part in ["has lost jobs 3 to 6", "restore the store from a copy", "--accept-lost-jobs"] {
+        assert!(told.contains(part), "{told}");
+    }
+    let (directory, store) = opened(&image, LostJobs::Accept);
+    let mut store = store.unwrap();
+    assert_eq!(numbers(&mut store), [1, 2]);
+    assert_eq!(store.last_forgotten().unwrap(), Some(JobId(6)));
+    drop(store);
+    drop(SqliteStore::open(directory.path()).unwrap());
+    // A mark that makes no sense says nothing of what is there.
+    fs::write(directory.path().join(MARK), "?").unwrap();
+    let told = SqliteStore::open(directory.path()).unwrap_err().to_string();
+    assert!(told.contains("osteon.acknowledged is damaged"), "{told}");
+    drop(SqliteStore::open_with(directory.path(), LostJobs::Accept).unwrap());
+    drop(SqliteStore::open(directory.path()).unwrap());
 }
 
 /// Who computes, and how many batches are computed twice.

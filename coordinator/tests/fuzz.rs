@@ -10,9 +10,8 @@ use osteon_coordinator::access::{self, Need, Presented};
 use osteon_coordinator::ids::JobId;
 use osteon_coordinator::tokens::{self, Role, TokensError};
 use osteon_coordinator::{ListenAddress, Tokens};
-use osteon_fuzz::{bounded, bytes, config, damaged, damaged_text};
+use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties};
 use osteon_proto::token::TokenHash;
-use proptest::prelude::*;
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Tokens, TokensError> {
     fs::write(path, bytes).unwrap();
@@ -111,25 +110,19 @@ fn a_list_of_the_longest_file_takes_no_more_than_its_share() {
     check_tokens("a ".repeat(1_000_000).as_bytes());
 }
 
-proptest! {
-    #![proptest_config(config())]
-
-    #[test]
+properties! {
     fn damaged_lists_of_tokens_are_read_or_refused(bytes in damaged(bytes("tokens"))) {
         check_tokens(&bytes);
     }
 
-    #[test]
     fn damaged_headers_are_read_or_refused(bytes in damaged(headers())) {
         check_header(&bytes);
     }
 
-    #[test]
     fn no_damaged_path_opens_what_is_closed(path in damaged_text(paths())) {
         check_path(&path);
     }
 
-    #[test]
     fn damaged_addresses_are_read_or_refused(text in damaged_text(addresses())) {
         check_address(&text);
     }

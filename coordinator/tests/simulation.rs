@@ -1,5 +1,5 @@
 //! Coordinator, workers and store in one thread under a false clock. One seed decides order,
-//! delays, deaths, stalls, answers that come late, twice, malformed or contradict each other,
+//! delays, deaths, stalls, answers that come late, never, twice, malformed or contradict each other,
 //! a node that dies over whatever it gets, refusals, damage and long outages of the store, cancellations,
 //! points that are computed ahead, pauses, clean stops and restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
 //! cancelled, or failed because of a contradiction, what the loop has found by then.
@@ -39,7 +39,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     // A simulation in which nothing goes wrong tests nothing.
     if seeds.end - seeds.start == SCHEDULES {
         let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
-        let world::Counts { ahead, dropped, .. } = seen;
+        let world::Counts { ahead, dropped, swallowed, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -48,6 +48,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("restarts", restarts),
             ("refusals of the store", refusals),
             ("batches computed again to compare", checked),
+            ("batches that are never answered", swallowed),
             ("points computed ahead of their search", ahead),
             ("points computed ahead that no search asked for", dropped),
         ] {

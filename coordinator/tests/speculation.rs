@@ -8,6 +8,7 @@
 )]
 #![expect(clippy::print_stdout, reason = "what is measured stands in docs/searches.md")]
 
+#[expect(dead_code, reason = "each test file uses a part of it")]
 mod clockwork;
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;

@@ -169,6 +169,7 @@ fn read_setup(message: &v1::Batch, violations: &mut Violations) -> Result<Setup,
 #[cfg(test)]
 mod tests {
     use osteon_common::outcome::FailureKind;
+    use osteon_fuzz::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -181,10 +182,9 @@ mod tests {
         count,
     };
 
-    proptest! {
-        #[test]
+    properties! {
         fn work_survives_the_wire(
-            number: u64,
+            number in any::<u64>(),
             density in 1e-300..1e300,
             seed in 0..=SEED_MAX,
             first in 0..REALIZATIONS_MAX - u64::from(BATCH_REALIZATIONS_MAX),

@@ -1,12 +1,12 @@
 //! Files of certificates, keys and tokens: read with bounds, refused when others can read what is
 //! secret or change what is trusted. Errors name the file and what to do, never what it holds.
 
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use osteon_common::limits::CREDENTIAL_FILE_BYTES_MAX;
+use osteon_common::{user_file, visible};
 use thiserror::Error;
 use tokio_rustls::rustls;
 use tokio_rustls::rustls::crypto::ring;
@@ -30,7 +30,7 @@ enum Kind {
 #[derive(Debug, Error)]
 pub enum CredentialError {
     /// The operating system does not give it.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}", visible::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -38,7 +38,10 @@ pub enum CredentialError {
         source: io::Error,
     },
     /// It is no such file at all.
-    #[error("{} has more than {max} bytes, so it is not a file of certificates, keys or tokens", path.display())]
+    #[error(
+        "{} has more than {max} bytes, so it is not a file of certificates, keys or tokens",
+        visible::path(path)
+    )]
     TooLong {
         /// The file.
         path: PathBuf,
@@ -46,7 +49,7 @@ pub enum CredentialError {
         max: u64,
     },
     /// It is not a text file.
-    #[error("{} is not a text file", path.display())]
+    #[error("{} is not a text file", visible::path(path))]
     NoText {
         /// The file.
         path: PathBuf,
@@ -55,7 +58,7 @@ pub enum CredentialError {
     #[error(
         "{0} is open to other users (mode {mode:04o}); it is a secret: chmod 600 {0}, and make it \
          anew if somebody may have read it",
-        path.display()
+        visible::path(path)
     )]
     Exposed {
         /// The file.
@@ -64,7 +67,10 @@ pub enum CredentialError {
         mode: u32,
     },
     /// Others can change what is trusted.
-    #[error("{0} can be changed by other users (mode {mode:04o}): chmod 644 {0}", path.display())]
+    #[error(
+        "{0} can be changed by other users (mode {mode:04o}): chmod 644 {0}",
+        visible::path(path)
+    )]
     Changeable {
         /// The file.
         path: PathBuf,
@@ -72,7 +78,7 @@ pub enum CredentialError {
         mode: u32,
     },
     /// It is damaged.
-    #[error("{} is not a valid PEM file: {fault}", path.display())]
+    #[error("{} is not a valid PEM file: {fault}", visible::path(path))]
     Pem {
         /// The file.
         path: PathBuf,
@@ -82,7 +88,8 @@ pub enum CredentialError {
     /// It holds no certificate.
     #[error(
         "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` makes \
-         them", path.display()
+         them",
+        visible::path(path)
     )]
     NoCertificate {
         /// The file.
@@ -91,14 +98,15 @@ pub enum CredentialError {
     /// It holds no private key.
     #[error(
         "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` makes \
-         them", path.display()
+         them",
+        visible::path(path)
     )]
     NoKey {
         /// The file.
         path: PathBuf,
     },
     /// It holds a key that cannot be used.
-    #[error("the key in {} cannot be used: {source}", path.display())]
+    #[error("the key in {} cannot be used: {source}", visible::path(path))]
     Key {
         /// The file.
         path: PathBuf,
@@ -108,7 +116,8 @@ pub enum CredentialError {
     /// Certificate and key do not belong together.
     #[error(
         "the key in {} is not the one of the certificate in {}; give the two that were made together",
-        key.display(), certificate.display()
+        visible::path(key),
+        visible::path(certificate)
     )]
     Mismatch {
         /// The file of the certificate.
@@ -117,19 +126,22 @@ pub enum CredentialError {
         key: PathBuf,
     },
     /// The certificate's time is over.
-    #[error("the certificate in {} has expired; make a new one", path.display())]
+    #[error("the certificate in {} has expired; make a new one", visible::path(path))]
     Expired {
         /// The file.
         path: PathBuf,
     },
     /// The certificate's time has not come.
-    #[error("the certificate in {} is not valid yet; is this machine's clock right?", path.display())]
+    #[error(
+        "the certificate in {} is not valid yet; is this machine's clock right?",
+        visible::path(path)
+    )]
     NotYetValid {
         /// The file.
         path: PathBuf,
     },
     /// The certificate cannot be understood.
-    #[error("the certificate in {} cannot be used: {source}", path.display())]
+    #[error("the certificate in {} cannot be used: {source}", visible::path(path))]
     Certificate {
         /// The file.
         path: PathBuf,
@@ -137,7 +149,10 @@ pub enum CredentialError {
         source: webpki::Error,
     },
     /// The certificate cannot be an authority's.
-    #[error("the certificate in {} is not a certificate authority's: {source}", path.display())]
+    #[error(
+        "the certificate in {} is not a certificate authority's: {source}",
+        visible::path(path)
+    )]
     Root {
         /// The file.
         path: PathBuf,
@@ -145,7 +160,7 @@ pub enum CredentialError {
         source: rustls::Error,
     },
     /// It holds no token.
-    #[error("what {} holds {source}", path.display())]
+    #[error("what {} holds {source}", visible::path(path))]
     Token {
         /// The file.
         path: PathBuf,
@@ -236,7 +251,19 @@ pub fn token(path: &Path) -> Result<Token, CredentialError> {
 /// # Errors
 /// When the file cannot be used.
 pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
-    let bytes = read(path, Kind::Secret)?;
+    text(path, Kind::Secret)
+}
+
+/// Reads a text that others may see, and must not change.
+///
+/// # Errors
+/// When the file cannot be used.
+pub fn trusted_text(path: &Path) -> Result<String, CredentialError> {
+    text(path, Kind::Trusted)
+}
+
+fn text(path: &Path, kind: Kind) -> Result<String, CredentialError> {
+    let bytes = read(path, kind)?;
     String::from_utf8(bytes).map_err(|_| CredentialError::NoText { path: path.to_owned() })
 }
 
@@ -255,7 +282,7 @@ fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
 /// The permissions looked at are those of the file that is read, whatever its name means later.
 fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
     let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
-    let file = File::open(path).map_err(unreadable)?;
+    let file = user_file::open(path).map_err(unreadable)?;
     let mode = file.metadata().map_err(unreadable)?.permissions().mode() & 0o7777;
     match kind {
         Kind::Secret if mode & 0o027 != 0 => {
@@ -266,13 +293,9 @@ fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
         }
         Kind::Secret | Kind::Trusted => {}
     }
-    let mut bytes = Vec::new();
     let max = CREDENTIAL_FILE_BYTES_MAX;
-    file.take(max + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > max {
-        return Err(CredentialError::TooLong { path: path.to_owned(), max });
-    }
-    Ok(bytes)
+    let bytes = user_file::read_opened(&file, max).map_err(unreadable)?;
+    bytes.ok_or_else(|| CredentialError::TooLong { path: path.to_owned(), max })
 }
 
 /// Refuses a certificate that its peer would refuse for its dates. Who trusts it is the peer's

@@ -47,6 +47,7 @@ pub fn unpack(codes: &[u8], velocities: &[f64]) -> Result<Vec<Outcome>, Malforme
 #[cfg(test)]
 mod tests {
     use osteon_common::outcome::FailureKind;
+    use osteon_fuzz::properties;
     use proptest::prelude::*;
 
     use super::*;
@@ -59,16 +60,14 @@ mod tests {
         proptest::collection::vec(outcome, 0..50)
     }
 
-    proptest! {
-        #[test]
-        fn outcomes_survive_the_wire(first: u64, outcomes in outcomes()) {
+    properties! {
+        fn outcomes_survive_the_wire(first in any::<u64>(), outcomes in outcomes()) {
             let block = to_message(first, &outcomes);
             prop_assert_eq!(from_message(&block).unwrap(), (first, outcomes));
         }
 
-        #[test]
         fn arbitrary_blocks_are_read_or_refused(
-            codes: Vec<u8>,
+            codes in proptest::collection::vec(any::<u8>(), 0..100),
             velocities in proptest::collection::vec(proptest::num::f64::ANY, 0..50),
         ) {
             if let Ok(outcomes) = unpack(&codes, &velocities) {

@@ -9,7 +9,7 @@ use osteon_common::document::Format;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
 use osteon_common::{job_file, results_csv, results_json};
-use osteon_fuzz::{bounded, config, damaged, texts};
+use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::{realizations, results, specification, status, v1};
@@ -270,31 +270,24 @@ fn large_and_deep_messages_take_no_more_than_their_share() {
     }
 }
 
-proptest! {
-    #![proptest_config(config())]
-
-    #[test]
+properties! {
     fn damaged_specifications_are_read_or_refused(bytes in damaged(specifications())) {
         check_specification(&bytes);
     }
 
-    #[test]
     fn damaged_batches_are_read_or_refused(bytes in damaged(batches())) {
         check_batch(&bytes);
     }
 
-    #[test]
     fn damaged_answers_are_read_or_refused(bytes in damaged(answers())) {
         check_answer(&bytes);
     }
 
-    #[test]
     fn damaged_fetches_are_read_or_refused(bytes in damaged(fetches())) {
         check_fetch(&bytes);
     }
 
-    #[test]
-    fn arbitrary_details_of_a_status_do_not_matter(bytes: Vec<u8>) {
+    fn arbitrary_details_of_a_status_do_not_matter(bytes in proptest::collection::vec(any::<u8>(), 0..100)) {
         let status = Status::with_details(Code::InvalidArgument, "no", bytes.into());
         let _ = status::violations(&status);
     }

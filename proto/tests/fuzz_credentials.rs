@@ -6,11 +6,10 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
-use osteon_fuzz::{bounded, bytes, config, damaged, damaged_text, texts};
+use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties, texts};
 use osteon_proto::credential_file::{self, CredentialError};
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::token::{Token, TokenHash};
-use proptest::prelude::*;
 
 fn check_text(text: &str) {
     if let Ok(token) = bounded(text.len(), || Token::parse(text)) {
@@ -95,15 +94,11 @@ fn large_files_take_no_more_than_their_share() {
     check_text(&format!("http://[{}]:1", ":".repeat(500_000)));
 }
 
-proptest! {
-    #![proptest_config(config())]
-
-    #[test]
+properties! {
     fn damaged_tokens_and_addresses_are_read_or_refused(text in damaged_text(short_texts())) {
         check_text(&text);
     }
 
-    #[test]
     fn damaged_files_are_read_or_refused(bytes in damaged(credentials())) {
         check_file(&bytes);
     }

@@ -11,6 +11,7 @@ use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::realization::Ensemble;
 use osteon_common::sampling::{Sampling, pair_count};
 use osteon_common::violations::Violations;
+use osteon_fuzz::properties;
 use osteon_solver::{Isa, Solver, Workspace};
 use proptest::prelude::*;
 
@@ -184,10 +185,9 @@ fn traces_next_to_the_source_end() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+properties! {
+    #![cases(100)]
 
-    #[test]
     fn a_velocity_or_a_typed_failure(setup in setup(), bone in bone()) {
         prop_assume!(is_admissible(&setup));
         let Some(bone) = bone.or_else(|| matched(&setup)) else {

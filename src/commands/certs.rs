@@ -54,9 +54,7 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
 fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Failure> {
     let (certificate, key) = (ca.join("ca.pem"), ca.join("ca-key.pem"));
     credential_file::identity(&certificate, &key).map_err(Failure::bad_input)?;
-    let text = std::fs::read_to_string(&certificate)
-        .with_context(|| format!("cannot read {}", certificate.display()))
-        .map_err(Failure::BadInput)?;
+    let text = credential_file::trusted_text(&certificate).map_err(Failure::bad_input)?;
     let secret = credential_file::secret_text(&key).map_err(Failure::bad_input)?;
     let authority = Authority::from_pem(&text, &secret)
         .with_context(|| format!("{} is not an authority that can sign", certificate.display()))

@@ -3,7 +3,7 @@
 use std::fs;
 
 use anyhow::Context as _;
-use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{BindError, Config, ListenAddress, open_files};
 
 use crate::arguments::CoordinatorArguments;
@@ -33,7 +33,8 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     }
     open_files::raise_limit();
     let listener = door.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
-    let store = SqliteStore::open(&directory).map_err(Failure::failed)?;
+    let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
+    let store = SqliteStore::open_with(&directory, lost).map_err(Failure::failed)?;
     let config = Config {
         audit_fraction: arguments.audit_fraction,
         keep_ended: arguments.keep_ended,

@@ -17,7 +17,7 @@ use crate::output;
 use crate::request::Request;
 use crate::resolved::Format;
 use crate::results_directory::{self, ResultsDirectory};
-use crate::verdict;
+use crate::{verdict, warnings};
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -41,7 +41,9 @@ pub(super) async fn submit(
     format: Format,
 ) -> Result<Ending, Failure> {
     let Submission { job, kind, request, priority } = submission;
-    let specification = job_file::read(job, kind).map_err(Failure::bad_input)?;
+    let (specification, warnings) =
+        job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
+    warnings::say_of_job(&specification, &warnings).await;
     let mut client = Client::connect(coordinator).await?;
     let id = client.submit(&specification, request, priority).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;

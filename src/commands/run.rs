@@ -20,17 +20,22 @@ use crate::request::Request;
 use crate::resolved::{Place, Run};
 use crate::results_directory::{self, ResultsDirectory};
 use crate::signals;
-use crate::verdict;
+use crate::{verdict, warnings};
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
-    let specification = job_file::read(&run.job, run.kind).map_err(Failure::bad_input)?;
+    let (specification, warnings) =
+        job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
     }
     if let Some(reason) = failed_before(&run, &specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
+    if let Place::There(remote) = &run.place {
+        remote.tell();
+    }
+    warnings::say_of_job(&specification, &warnings).await;
     let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.
     let computers = tokio::select! {
@@ -68,7 +73,6 @@ impl Computers {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
             Place::There(remote) => {
-                remote.tell();
                 let client = Client::connect(remote).await?;
                 Self::There(Box::new(client))
             }

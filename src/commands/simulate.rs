@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::case::Case;
 use osteon_common::case_file;
+use osteon_common::plausible::case_warnings;
+use osteon_common::visible;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
 use osteon_study::check::Check;
 
@@ -13,11 +15,13 @@ use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output::{self, ShownSimulation};
 use crate::resolved;
 use crate::results_directory;
+use crate::warnings;
 
 /// Solves the case, writes the traces if they are wanted, prints.
 pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
     let format = resolved::format(arguments.json);
     let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
+    warnings::say_all(&case_warnings(&case));
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = solved.await.map_err(Failure::failed)??;
     let shown = ShownSimulation {
@@ -73,7 +77,9 @@ fn write(
     let path = directory.join("traces.csv");
     results_directory::write_by(&path, |file| csv(traces, positions, file)).map_err(|error| {
         match error.downcast::<io::Error>() {
-            Ok(error) => Failure::unusable_path(error, format!("cannot write {}", path.display())),
+            Ok(error) => {
+                Failure::unusable_path(error, format!("cannot write {}", visible::path(&path)))
+            }
             Err(error) => Failure::Failed(error),
         }
     })?;

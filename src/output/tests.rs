@@ -528,3 +528,52 @@ fn expelled_workers_are_shown_and_forgotten_jobs_listed() {
     let value: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(value, serde_json::json!({ "pruned": ["3", "5"] }));
 }
+
+/// What a coordinator says is shown so that it cannot write on the terminal; programs get it as it is.
+#[test]
+fn what_others_say_is_shown_without_hidden_characters() {
+    use osteon_common::visible::is_hidden;
+    let hostile = "x\u{1b}[2J\u{202e}y";
+    let expelled = [osteon_proto::v1::ExpelledWorker {
+        host: format!("{hostile}\n"),
+        process: 42,
+        job: "7".to_owned(),
+        reason: hostile.to_owned(),
+        elapsed_s: 90.0,
+    }];
+    let jobs = [JobSnapshot {
+        job: hostile.to_owned(),
+        kind: KindMessage::Propagation.into(),
+        state: JobState::Ended.into(),
+        status: JobStatus::Failed.into(),
+        reason: hostile.to_owned(),
+        waiting_for: hostile.to_owned(),
+        ..JobSnapshot::default()
+    }];
+    let specification = specification(JobKind::Identification, &["dispersion"]);
+    let reason = format!("\"failed\", \"reason\": {}", json!(hostile));
+    let json = RESULT.replace("\"converged\"", &reason);
+    assert_ne!(json, RESULT);
+    let directory = Path::new(hostile);
+    let result = ShownResult {
+        kind: JobKind::Identification,
+        specification: &specification,
+        json: &json,
+        directory: Some(directory),
+    };
+    let print = |format: Format| {
+        printed(format, |output| {
+            output.jobs(&jobs, &expelled).unwrap();
+            output.snapshot(&jobs[0]).unwrap();
+            output.pruned(&[hostile.to_owned()]).unwrap();
+            output.submitted(hostile).unwrap();
+            output.result(&result).unwrap();
+        })
+    };
+    let shown = print(Format::Text);
+    assert!(!shown.contains(|c| c != '\n' && is_hidden(c)), "{shown:?}");
+    assert_eq!(shown.matches(r"x\u{1b}[2J\u{202e}y").count(), 11, "{shown}");
+    assert!(shown.contains(r"y\n (process 42)"), "{shown}");
+    let told = print(Format::Json);
+    assert!(told.contains("\\u001b[2J\u{202e}y"), "{told}");
+}

@@ -11,6 +11,7 @@ mod solver;
 
 use std::io::{self, Write};
 
+use osteon_common::visible;
 use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
 
 use self::layout::{INDENT, WIDTH, aligned, glued, wrapped};
@@ -43,7 +44,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
-        self.verbatim(&format!("{job}\n"))
+        self.verbatim(&format!("{}\n", visible::line(job)))
     }
 
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()> {
@@ -68,7 +69,8 @@ impl Output for TextOutput<'_> {
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
-        self.verbatim(&jobs.iter().map(|job| format!("{job}\n")).collect::<String>())
+        let line = |job: &String| format!("{}\n", visible::line(job));
+        self.verbatim(&jobs.iter().map(line).collect::<String>())
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
@@ -95,6 +97,7 @@ impl Output for TextOutput<'_> {
 fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     let line = |worker: &ExpelledWorker| {
         let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
+        let (host, reason) = (visible::line(host), visible::line(reason));
         let ago = span(*elapsed_s);
         wrapped(&format!("expelled {ago} ago: {host} (process {process}) {reason}"))
     };
@@ -167,7 +170,7 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         text.push_str(&format!("\n{}", check::table(check)));
     }
     if let Some(path) = simulation.traces {
-        text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", path.display()))));
+        text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", visible::path(path)))));
     }
     text
 }

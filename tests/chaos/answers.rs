@@ -1,5 +1,7 @@
-//! Workers that answer twice, out of turn, too late, or wrongly, or are of another version.
+//! Workers that answer twice, out of turn, too late, never, or wrongly, or are of another version.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -95,6 +97,43 @@ fn duplicated_and_reordered_answers_change_nothing() {
     story.check_end();
     story.service.kill();
     assert!(end(peer) > 0, "nothing was answered out of turn");
+}
+
+/// A worker that gives signs of life and never answers, until its stay ends; counts its batches.
+async fn silent(url: String, hello: WorkerHello, batches: Arc<AtomicUsize>) {
+    let mut peer = Peer::attach(&url, hello).await.unwrap();
+    while peer.batch().await.is_ok() {
+        batches.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn what_a_worker_never_answers_is_computed_by_another() {
+    // Every batch is computed twice, so the silent workers hold first answers and audits.
+    let mut story = Story::begin(&["--audit-fraction", "1"]);
+    let (url, batches) = (story.service.url().to_owned(), Arc::new(AtomicUsize::new(0)));
+    let peers = [1, 2].map(|process| {
+        let (url, batches) = (url.clone(), Arc::clone(&batches));
+        on_thread(move || silent(url, hello(process), batches))
+    });
+    let says = |seen: &osteon_proto::v1::JobSnapshot| {
+        seen.waiting_for.contains("the answer of peer (process ")
+            && seen.waiting_for.ends_with("; nothing of this job is answered yet")
+    };
+    // Both have as much as a worker may hold: nobody is there to take it over.
+    story.api.until("the job says whom it waits for", &story.job, says);
+    let before = batches.load(Ordering::Relaxed);
+    assert!(before > 0, "they hold nothing");
+    let _honest = story.service.worker(&story.scratch);
+    story.check_end();
+    assert!(batches.load(Ordering::Relaxed) > before, "they were tried no more");
+    assert!(peers.iter().all(|peer| !peer.is_finished()), "a lease has ended");
+    let log = story.service.log();
+    assert!(log.contains("gives signs of life and does not answer"), "{log}");
+    story.service.kill();
+    for peer in peers {
+        end(peer);
+    }
 }
 
 /// A worker that lies about every batch until its stay ends; how it ends.

@@ -207,6 +207,66 @@ fn files_that_cannot_be_used_are_refused_and_left_as_they_are() {
     assert_eq!(Api::new(service.url()).jobs().unwrap().len(), 1);
 }
 
+/// SQLite takes a log that is cut for a shorter one: the jobs behind the cut would be gone without
+/// a word.
+#[test]
+fn a_coordinator_that_lost_accepted_jobs_says_so_and_does_not_start() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 3));
+    let specification = specification(&file, JobKind::Identification);
+    let mut service = Service::start(&scratch, &[]);
+    let mut api = Api::new(service.url());
+    let ids: Vec<_> = (0..3).map(|_| api.submit(&specification, "").unwrap()).collect();
+    assert_eq!(ids, ["1", "2", "3"]);
+    service.kill();
+    let directory = scratch.path("store");
+    let log = directory.join("osteon.sqlite-wal");
+    let whole = fs::read(&log).unwrap();
+    // One byte of the last page is enough: what was written last counts as never written.
+    let mut damaged = whole.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    for bytes in [&whole[..whole.len() - 1], &damaged] {
+        fs::write(&log, bytes).unwrap();
+        refused_by(&directory, &["has lost job 3,", "look at the disk", "--accept-lost-jobs"]);
+    }
+    fs::write(&log, &whole[..32]).unwrap();
+    refused_by(&directory, &["has lost jobs 1 to 3,", "restore the store from a copy"]);
+    // The copy is the way back.
+    fs::write(&log, &whole).unwrap();
+    service.start_again();
+    assert_eq!(Api::new(service.url()).jobs().unwrap().len(), 3);
+}
+
+/// Who goes on without them does so once, and no number is given twice.
+#[test]
+fn lost_jobs_that_are_accepted_are_not_asked_about_again() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(30, 3));
+    let specification = specification(&file, JobKind::Identification);
+    let mut service = Service::start(&scratch, &[]);
+    let mut api = Api::new(service.url());
+    for expected in ["1", "2", "3"] {
+        assert_eq!(api.submit(&specification, "").unwrap(), expected);
+    }
+    service.kill();
+    let directory = scratch.path("store");
+    let log = directory.join("osteon.sqlite-wal");
+    let whole = fs::read(&log).unwrap();
+    fs::write(&log, &whole[..whole.len() - 1]).unwrap();
+    refused_by(&directory, &["has lost job 3,"]);
+    let mut service = Service::start(&scratch, &["--accept-lost-jobs"]);
+    assert!(service.log().contains("has lost job 3,"), "{}", service.log());
+    let mut api = Api::new(service.url());
+    assert_eq!(api.jobs().unwrap().len(), 2);
+    assert_eq!(api.submit(&specification, "").unwrap(), "4");
+    service.kill();
+    let mut service = Service::start(&scratch, &[]);
+    let _worker = service.worker(&scratch);
+    let mut api = Api::new(service.url());
+    assert_eq!(api.end("4").digest, undisturbed("identify", &file));
+    service.end();
+}
+
 #[test]
 fn a_second_coordinator_is_refused_and_the_first_goes_on() {
     let scratch = Scratch::new();

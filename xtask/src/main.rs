@@ -3,6 +3,7 @@
 mod chaos;
 mod digests;
 mod python;
+mod random;
 mod tables;
 
 use std::env;
@@ -27,6 +28,7 @@ enum Action {
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
 const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+const DOCS: Cargo = &["doc", "--workspace", "--no-deps"];
 const TEST: Cargo = &["test", "--workspace"];
 
 const BENCH: &[Cargo] = &[
@@ -38,8 +40,17 @@ const BENCH: &[Cargo] = &[
 /// Name, what it does, and how.
 const TASKS: &[(&str, &str, Action)] = &[
     ("format", "format the code", Action::Cargo(&[&["fmt", "--all"]])),
-    ("lint", "formatting and lints, as CI wants them", Action::Cargo(&[FORMAT, LINT])),
+    (
+        "lint",
+        "formatting, lints and warnings of the documentation, as CI wants them",
+        Action::Function(lint),
+    ),
     ("test", "every test", Action::Cargo(&[TEST])),
+    (
+        "random",
+        "the tests of properties on new random cases: --minutes M (10) --seed S (the clock's)",
+        Action::Function(random::rounds),
+    ),
     (
         "python",
         "tests the gRPC API by a client in Python; takes names of tests",
@@ -47,7 +58,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: formatting, lints, every test, the client in Python",
+        "what CI runs: lint, every test, the client in Python",
         Action::Commands(&["lint", "test", "python"]),
     ),
     (
@@ -66,11 +77,7 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(chaos::storm),
     ),
     ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
-    (
-        "docs",
-        "the documentation of all crates",
-        Action::Cargo(&[&["doc", "--workspace", "--no-deps"]]),
-    ),
+    ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
 ];
 
 fn main() -> ExitCode {
@@ -88,6 +95,16 @@ fn run() -> Result<()> {
     let (name, words) =
         arguments.split_first().map_or(("", &[][..]), |(name, words)| (name.as_str(), words));
     perform(name, words)
+}
+
+/// What is wrong with form, code or documentation, without running any of it.
+fn lint(words: &[String]) -> Result<()> {
+    if !words.is_empty() {
+        bail!("usage: cargo xtask lint");
+    }
+    cargo(&mut cargo_command(FORMAT))?;
+    cargo(&mut cargo_command(LINT))?;
+    cargo(cargo_command(DOCS).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
 /// Does what the command `name` does.

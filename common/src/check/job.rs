@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::accepted::{Interval, WholeRange};
+use crate::accepted::{Interval, WholeRange, written};
 use crate::document::{element_path, entry_path};
 use crate::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
@@ -10,10 +10,15 @@ use crate::job::{
 };
 use crate::limits;
 use crate::parameters::Parameter;
+use crate::plausible::{self, Quantity, short};
+use crate::quantile::quantile;
+use crate::reach;
 use crate::statistics;
+use crate::velocities::Origin;
 use crate::violations::Violations;
+use crate::visible;
 
-use super::{known_wrong, number, setup, whole};
+use super::{known_wrong, number, quantity, setup, whole};
 
 /// Range of `monte_carlo.realizations`.
 pub(crate) const REALIZATIONS: WholeRange = WholeRange::new(1, limits::REALIZATIONS_MAX);
@@ -44,9 +49,18 @@ const REFUSED_MAX: usize = 10;
 /// What `violations` already holds about a field is not said again, so that a front end can
 /// first record what it could not read at all.
 pub fn job(specification: &JobSpecification, violations: &mut Violations) {
+    job_from(specification, None, violations);
+}
+
+/// The same for a job whose measured velocities stand in the file `origin`.
+pub(crate) fn job_from(
+    specification: &JobSpecification,
+    origin: Option<&Origin>,
+    violations: &mut Violations,
+) {
     setup(&specification.setup, violations);
     match (specification.kind, &specification.data) {
-        (JobKind::Identification, Some(given)) => data(given, violations),
+        (JobKind::Identification, Some(given)) => data_from(given, origin, violations),
         (JobKind::Identification, None) if !violations.touches("data") => {
             violations.add("data", no_data());
         }
@@ -66,6 +80,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
     likelihood(specification, violations);
+    within_reach(specification, violations);
 }
 
 /// The message for an identification without data.
@@ -75,22 +90,43 @@ pub(crate) fn no_data() -> String {
 
 /// Records everything that is wrong with measured `data`.
 pub fn data(data: &Data, violations: &mut Violations) {
+    data_from(data, None, violations);
+}
+
+fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut Violations) {
     match data {
-        Data::Velocities(measured) => velocities("data.velocities", measured, violations),
-        Data::Groups(measured) => groups(measured, violations),
+        Data::Velocities(measured) => {
+            velocities("data.velocities", measured, (origin, 0), violations);
+        }
+        Data::Groups(measured) => groups(measured, origin, violations),
         Data::Moments { mean, coefficient_of_variation } => {
-            number("data.mean", *mean, VELOCITY, violations);
-            number(
+            quantity("data.mean", *mean, VELOCITY, &plausible::VELOCITY, violations);
+            if !violations.touches("data.mean")
+                && let Some(refusal) = no_velocity(*mean)
+            {
+                violations.add("data.mean", refusal);
+            }
+            quantity(
                 "data.coefficient_of_variation",
                 *coefficient_of_variation,
                 VARIATION,
+                &plausible::VARIATION,
                 violations,
             );
         }
     }
 }
 
-fn groups(groups: &[Group], violations: &mut Violations) {
+/// The message that refuses what is no velocity of any sound in bone.
+fn no_velocity(value: f64) -> Option<String> {
+    let (from, to) = plausible::VELOCITY.possible();
+    plausible::VELOCITY.is_impossible(value).then(|| {
+        let (from, to) = (short(from), short(to));
+        format!("is {value:?}; no velocity of sound in bone is outside {from} to {to} (m/s)")
+    })
+}
+
+fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations) {
     const FIELD: &str = "data.groups";
     let count = groups.len();
     if count == 0 || count > limits::GROUPS_MAX {
@@ -105,23 +141,35 @@ fn groups(groups: &[Group], violations: &mut Violations) {
         return;
     }
     let mut names = BTreeSet::new();
-    for Group { name, velocities: measured } in groups {
+    for (set, Group { name, velocities: measured }) in groups.iter().enumerate() {
         let field = entry_path(FIELD, name);
-        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX || name.contains(char::is_control)
-        {
+        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
             let most = limits::NAME_BYTES_MAX;
+            violations
+                .add(&field, format!("is not a valid group name: it must have 1 to {most} bytes"));
+        } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
+            let code = u32::from(c);
             violations.add(
                 &field,
-                format!("is not a valid group name: it must have 1 to {most} bytes, none of them a control character"),
+                format!(
+                    "has the character U+{code:04X}, which is not seen or changes how others are: two \
+                     names could look the same; leave it out"
+                ),
             );
         } else if !names.insert(name) {
             violations.add(&field, "is the name of two groups");
         }
-        velocities(&field, measured, violations);
+        velocities(&field, measured, (origin, set), violations);
     }
 }
 
-fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
+/// Checks the velocities of one set, which has a number in the file that they come from.
+fn velocities(
+    field: &str,
+    measured: &[f64],
+    (origin, set): (Option<&Origin>, usize),
+    violations: &mut Violations,
+) {
     if known_wrong(field, violations) {
         return;
     }
@@ -153,7 +201,13 @@ fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
             field,
             format!("all {count} are {velocity:?} m/s; {MOMENTS_NEED} different velocities"),
         );
-    } else if let Some(moments) = statistics::moments(measured) {
+    } else {
+        impossible(field, measured, (origin, set), violations);
+    }
+    if violations.touches(field) {
+        return;
+    }
+    if let Some(moments) = statistics::moments(measured) {
         // Extreme numbers overflow or vanish when they are squared.
         let variation = moments.coefficient_of_variation;
         if !VARIATION.contains(variation) {
@@ -164,15 +218,49 @@ fn velocities(field: &str, measured: &[f64], violations: &mut Violations) {
     }
 }
 
+/// Refuses velocities that are in another unit, all of them or some.
+fn impossible(
+    field: &str,
+    measured: &[f64],
+    (origin, set): (Option<&Origin>, usize),
+    violations: &mut Violations,
+) {
+    let mut ascending = measured.to_vec();
+    ascending.sort_unstable_by(f64::total_cmp);
+    let median = quantile(&ascending, 0.5).unwrap_or(f64::NAN);
+    if let Some(refusal) = no_velocity(median) {
+        let question = plausible::VELOCITY.question(&[median], VELOCITY);
+        let asked_for = plausible::VELOCITY.asked_for();
+        let refusal = question
+            .map_or(refusal, |question| format!("is {}; {asked_for}: {question}", short(median)));
+        violations.add(field, format!("their median {refusal}"));
+        return;
+    }
+    let refused = measured
+        .iter()
+        .enumerate()
+        .filter_map(|(index, &velocity)| Some((index, no_velocity(velocity)?)));
+    for (refusals, (index, refusal)) in refused.enumerate() {
+        if refusals == REFUSED_MAX {
+            violations.add_more(field, "more velocities out of range are not listed");
+            return;
+        }
+        let (element, place) = (element_path(field, index), Origin::place(origin, set, index));
+        violations.add(element, format!("{place}{refusal}; their median is {}", short(median)));
+    }
+}
+
 fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
     let path = format!("parameters.{}", parameter.name());
-    let accepted = Interval::of(parameter);
+    let (accepted, kind) = (Interval::of(parameter), Quantity::of(parameter));
     match range {
-        Range::Fixed(value) => number(&format!("{path}.fixed"), value, accepted, violations),
+        Range::Fixed(value) => {
+            quantity(&format!("{path}.fixed"), value, accepted, &kind, violations);
+        }
         Range::Free { start, lower, upper } => {
             let (start_path, bounds_path) = (format!("{path}.start"), format!("{path}.bounds"));
-            number(&start_path, start, accepted, violations);
-            bounds(&bounds_path, lower, upper, accepted, violations);
+            quantity(&start_path, start, accepted, &kind, violations);
+            bounds(&bounds_path, [lower, upper], accepted, &kind, violations);
             if !known_wrong(&bounds_path, violations) {
                 let within = Interval::from_to(lower, upper, "the bounds");
                 number(&start_path, start, within, violations);
@@ -181,7 +269,13 @@ fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
     }
 }
 
-fn bounds(path: &str, lower: f64, upper: f64, accepted: Interval, violations: &mut Violations) {
+fn bounds(
+    path: &str,
+    [lower, upper]: [f64; 2],
+    accepted: Interval,
+    kind: &Quantity,
+    violations: &mut Violations,
+) {
     if known_wrong(path, violations) {
         return;
     }
@@ -190,9 +284,16 @@ fn bounds(path: &str, lower: f64, upper: f64, accepted: Interval, violations: &m
             violations.add(path, format!("the {name} bound {}", accepted.refusal(value)));
         }
     }
-    if !violations.touches(path) && lower >= upper {
-        let message = format!("the lower bound {lower:?} must be below the upper {upper:?}");
+    if violations.touches(path) {
+        return;
+    }
+    if lower >= upper {
+        let [lower, upper] = [lower, upper].map(written);
+        let message = format!("the lower bound {lower} must be below the upper {upper}");
         violations.add(path, message);
+    } else if let Some(question) = kind.question(&[lower, upper], accepted) {
+        let asked_for = kind.asked_for();
+        violations.add(path, format!("are {lower:?} and {upper:?}; {asked_for}: {question}"));
     }
 }
 
@@ -215,6 +316,17 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
             "parameters",
             format!("the point of starts and fixed values is not admissible: {inadmissible}"),
         );
+    }
+}
+
+/// Data that no point within the bounds can come near to, by the closed form of √(c1111/ρ) and δ.
+fn within_reach(specification: &JobSpecification, violations: &mut Violations) {
+    let fields = ["data", "parameters", "layers", "probe"];
+    if fields.iter().any(|field| known_wrong(field, violations)) {
+        return;
+    }
+    if let Some((field, message)) = reach::unreachable(specification) {
+        violations.add(field, message);
     }
 }
 

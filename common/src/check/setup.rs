@@ -4,12 +4,13 @@ use crate::accepted::{Interval, WholeRange};
 use crate::case::Setup;
 use crate::layers::{Fluid, Layers};
 use crate::limits;
+use crate::plausible;
 use crate::probe::Probe;
 use crate::sampling::pair_count;
 use crate::settings::Method;
 use crate::violations::Violations;
 
-use super::{known_wrong, number, whole};
+use super::{known_wrong, number, quantity, whole};
 
 /// Range of `probe.receivers.count`.
 pub(crate) const RECEIVERS: WholeRange =
@@ -20,6 +21,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     layers(&setup.layers, violations);
     probe(&setup.probe, violations);
     heights(setup, violations);
+    distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
     number(
         "picking.threshold",
@@ -33,28 +35,47 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
 
 fn layers(layers: &Layers, violations: &mut Violations) {
     fluid("layers.coupling", &layers.coupling, violations);
-    number("layers.bone.thickness", layers.bone_thickness, Interval::above(0.0, "m"), violations);
+    quantity(
+        "layers.bone.thickness",
+        layers.bone_thickness,
+        Interval::above(0.0, "m"),
+        &plausible::BONE_THICKNESS,
+        violations,
+    );
     fluid("layers.marrow", &layers.marrow, violations);
 }
 
 fn fluid(path: &str, fluid: &Fluid, violations: &mut Violations) {
-    for (key, value, unit) in [
-        ("thickness", fluid.thickness, "m"),
-        ("density", fluid.density, "kg/m³"),
-        ("sound_speed", fluid.sound_speed, "m/s"),
+    for (key, value, kind) in [
+        ("thickness", fluid.thickness, plausible::FLUID_THICKNESS),
+        ("density", fluid.density, plausible::FLUID_DENSITY),
+        ("sound_speed", fluid.sound_speed, plausible::SOUND_SPEED),
     ] {
-        number(&format!("{path}.{key}"), value, Interval::above(0.0, unit), violations);
+        let accepted = Interval::above(0.0, kind.unit);
+        quantity(&format!("{path}.{key}"), value, accepted, &kind, violations);
     }
 }
 
 fn probe(probe: &Probe, violations: &mut Violations) {
     let (source, receivers) = (&probe.source, &probe.receivers);
     let above_zero = |unit| Interval::above(0.0, unit);
-    number("probe.center_frequency", probe.center_frequency, above_zero("Hz"), violations);
+    quantity(
+        "probe.center_frequency",
+        probe.center_frequency,
+        above_zero("Hz"),
+        &plausible::FREQUENCY,
+        violations,
+    );
     number("probe.amplitude", probe.amplitude, above_zero("N"), violations);
     number("probe.source.x1", source.x1, Interval::finite("m"), violations);
     number("probe.receivers.first_x1", receivers.first_x1, Interval::finite("m"), violations);
-    number("probe.receivers.pitch", receivers.pitch, above_zero("m"), violations);
+    quantity(
+        "probe.receivers.pitch",
+        receivers.pitch,
+        above_zero("m"),
+        &plausible::PITCH,
+        violations,
+    );
     whole("probe.receivers.count", receivers.count.into(), RECEIVERS, violations);
 }
 
@@ -66,8 +87,32 @@ fn heights(setup: &Setup, violations: &mut Violations) {
     } else {
         Interval::between(0.0, top, "m, inside the coupling layer")
     };
-    number("probe.source.x3", setup.probe.source.x3, accepted, violations);
-    number("probe.receivers.x3", setup.probe.receivers.x3, accepted, violations);
+    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+    quantity("probe.source.x3", source, accepted, &plausible::HEIGHT, violations);
+    quantity("probe.receivers.x3", receivers, accepted, &plausible::HEIGHT, violations);
+}
+
+/// The receivers are not metres away. Only differences count along the bone, so it is the distance
+/// that tells the unit.
+fn distance(probe: &Probe, violations: &mut Violations) {
+    const FIELD: &str = "probe.receivers.first_x1";
+    if known_wrong(FIELD, violations) || known_wrong("probe.source.x1", violations) {
+        return;
+    }
+    let (first, source) = (probe.receivers.first_x1, probe.source.x1);
+    let distance = (first - source).abs();
+    if !plausible::DISTANCE.is_impossible(distance) {
+        return;
+    }
+    let (accepted, asked_for) = (Interval::finite("m"), plausible::DISTANCE.asked_for());
+    let question = |value| plausible::DISTANCE.question(&[value], accepted);
+    if let Some(question) = question(first) {
+        violations.add(FIELD, format!("is {first:?}; {asked_for}: {question}"));
+    } else if let Some(question) = question(distance) {
+        let message =
+            format!("is {first:?}, {distance:?} m from the source; {asked_for}: {question}");
+        violations.add(FIELD, message);
+    }
 }
 
 /// All receivers lie on one side of the source, at a distance, and apart from each other.

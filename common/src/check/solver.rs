@@ -2,10 +2,11 @@
 
 use crate::accepted::{Interval, WholeRange};
 use crate::limits;
+use crate::plausible;
 use crate::settings::{Method, SolverSettings};
 use crate::violations::Violations;
 
-use super::{known_wrong, number, whole};
+use super::{known_wrong, number, quantity, whole};
 
 /// Range of `solver.element_order`.
 pub(crate) const ELEMENT_ORDER: WholeRange =
@@ -35,10 +36,12 @@ pub(super) fn solver(solver: &SolverSettings, violations: &mut Violations) {
 
 fn hybrid(solver: &SolverSettings, violations: &mut Violations) {
     let size = Interval::from_to(limits::ELEMENT_SIZE_MIN, limits::ELEMENT_SIZE_MAX, "m");
-    number("solver.element_size", solver.element_size, size, violations);
+    let element_size = solver.element_size;
+    quantity("solver.element_size", element_size, size, &plausible::ELEMENT_SIZE, violations);
     whole("solver.element_order", solver.element_order.into(), ELEMENT_ORDER, violations);
     if let Some(time_step) = solver.time_step {
-        number("solver.time_step", time_step, Interval::above(0.0, "s"), violations);
+        let accepted = Interval::above(0.0, "s");
+        quantity("solver.time_step", time_step, accepted, &plausible::TIME_STEP, violations);
     }
 }
 

@@ -1,15 +1,20 @@
-//! JSON text to a tree. Unlike `serde_json::Value`, it refuses a key that is given twice.
+//! JSON text to a tree. Unlike `serde_json::Value`, it refuses a key that is given twice, and a text
+//! that holds more than a file needs.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
+use super::budget::Budget;
 use super::{Format, Malformed, Node, Value, quoted};
 
 /// The tree of a JSON text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
-    serde_json::from_str(text).map_err(|error| {
+    let mut deserializer = serde_json::Deserializer::from_str(text);
+    let root = Tree { budget: &mut Budget::new() }.deserialize(&mut deserializer);
+    let root = root.and_then(|root| deserializer.end().map(|()| root));
+    root.map_err(|error| {
         let (line, column) = (error.line(), error.column());
         let message = error.to_string();
         let suffix = format!(" at line {line} column {column}");
@@ -22,15 +27,21 @@ pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
     })
 }
 
-impl<'de> Deserialize<'de> for Node {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TreeVisitor).map(|value| Self { line: None, value })
+/// What makes a node.
+struct Tree<'b> {
+    budget: &'b mut Budget,
+}
+
+impl<'de> DeserializeSeed<'de> for Tree<'_> {
+    type Value = Node;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node, D::Error> {
+        self.budget.value().map_err(D::Error::custom)?;
+        deserializer.deserialize_any(self).map(|value| Node { line: None, value })
     }
 }
 
-struct TreeVisitor;
-
-impl<'de> Visitor<'de> for TreeVisitor {
+impl<'de> Visitor<'de> for Tree<'_> {
     type Value = Value;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -62,22 +73,25 @@ impl<'de> Visitor<'de> for TreeVisitor {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut elements: A) -> Result<Value, A::Error> {
+        self.budget.keys(1).map_err(A::Error::custom)?;
         let mut list = Vec::new();
-        while let Some(element) = elements.next_element()? {
+        while let Some(element) = elements.next_element_seed(Tree { budget: &mut *self.budget })? {
             list.push(element);
         }
         Ok(Value::List(list))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        self.budget.keys(1).map_err(A::Error::custom)?;
         let mut seen = BTreeSet::new();
         let mut table = Vec::new();
         while let Some(key) = entries.next_key::<String>()? {
+            self.budget.keys(1).map_err(A::Error::custom)?;
             if !seen.insert(key.clone()) {
                 let key = quoted(&key);
                 return Err(A::Error::custom(format_args!("the key {key} is given twice")));
             }
-            table.push((key, entries.next_value()?));
+            table.push((key, entries.next_value_seed(Tree { budget: &mut *self.budget })?));
         }
         Ok(Value::Table(table))
     }

@@ -1,6 +1,6 @@
 //! TOML text to a tree, with the line of every key and element.
 
-mod nesting;
+mod extent;
 
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
@@ -9,10 +9,9 @@ use super::{Format, Malformed, Node, Value, position};
 
 /// The tree of a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
-    if let Some(offset) = nesting::too_deep(text) {
+    if let Err((offset, excess)) = extent::check(text) {
         let (line, column) = position(text, offset);
-        let message = "too many brackets are open here".to_owned();
-        return Err(Malformed { format: Format::Toml, line, column, message });
+        return Err(Malformed { format: Format::Toml, line, column, message: excess.to_string() });
     }
     let table = DeTable::parse(text).map_err(|error| malformed(text, &error))?;
     let lines = Lines::new(text);

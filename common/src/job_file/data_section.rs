@@ -6,17 +6,33 @@ use crate::check::{self, DATA_FORMS};
 use crate::document::{Value, entry_path};
 use crate::job::{Data, Group, JobKind};
 use crate::reader::{Reader, Table};
-use crate::velocities;
+use crate::velocities::{self, Measured, Origin};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
-/// The measured data, or `None` with the reason recorded; always `None` for a propagation, whose
-/// `[data]` is checked as far as that needs no other file.
+/// The measured data, or `None` with the reason recorded, and the file that they stand in, if any.
+/// Always `None` for a propagation, whose `[data]` is checked as far as that needs no other file.
 pub(super) fn read(
     reader: &mut Reader,
     root: &Table<'_>,
     directory: &Path,
     kind: JobKind,
+) -> (Option<Data>, Option<Origin>) {
+    let mut origin = None;
+    let data = given(reader, root, kind, |path, column| {
+        let (data, stands) = from_file(&directory.join(path), column)?;
+        origin = Some(stands);
+        Ok(data)
+    });
+    (data, origin)
+}
+
+/// The measured data, those of a file by `from_file` with its name and the column of groups.
+fn given(
+    reader: &mut Reader,
+    root: &Table<'_>,
+    kind: JobKind,
+    from_file: impl FnOnce(&str, Option<&str>) -> Result<Data, Vec<velocities::CsvError>>,
 ) -> Option<Data> {
     let keys = ["velocities", "group", "groups", MOMENTS[0], MOMENTS[1]];
     let table = reader.table(root, "data", &keys);
@@ -34,7 +50,7 @@ pub(super) fn read(
         reader.lacks(&table.path("group"), &[table.path("velocities")], message);
     }
     let data = match (table.has("velocities"), table.has("groups"), has_moments) {
-        (true, false, false) => velocities(reader, &table, directory, kind),
+        (true, false, false) => velocities(reader, &table, kind, from_file),
         (false, true, false) => groups(reader, &table),
         (false, false, true) => moments(reader, &table),
         (false, false, false) => {
@@ -101,8 +117,8 @@ fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
 fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
-    directory: &Path,
     kind: JobKind,
+    from_file: impl FnOnce(&str, Option<&str>) -> Result<Data, Vec<velocities::CsvError>>,
 ) -> Option<Data> {
     let path = table.path("velocities");
     let column = column(reader, table);
@@ -115,7 +131,7 @@ fn velocities(
         }
         Value::List(elements) => reader.numbers(&path, elements).map(Data::Velocities),
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match from_file(&directory.join(name), column) {
+        Value::Text(name) => match from_file(name, column) {
             Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
@@ -147,9 +163,18 @@ fn column<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<&'a str> {
     }
 }
 
-fn from_file(path: &Path, column: Option<&str>) -> Result<Data, Vec<velocities::CsvError>> {
-    match column {
-        Some(column) => velocities::read_groups(path, column).map(Data::Groups),
-        None => velocities::read(path).map(Data::Velocities),
-    }
+fn from_file(
+    path: &Path,
+    column: Option<&str>,
+) -> Result<(Data, Origin), Vec<velocities::CsvError>> {
+    Ok(match column {
+        Some(column) => {
+            let Measured { data, origin } = velocities::read_groups(path, column)?;
+            (Data::Groups(data), origin)
+        }
+        None => {
+            let Measured { data, origin } = velocities::read(path)?;
+            (Data::Velocities(data), origin)
+        }
+    })
 }

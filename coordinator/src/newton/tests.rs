@@ -5,10 +5,14 @@ use osteon_common::ensemble::Germs;
 use osteon_common::job::Range;
 use osteon_common::parameters::Point;
 use osteon_common::statistics;
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
+use super::nearest::dot;
 use super::*;
 use crate::search_box::admissible;
+
+mod nearest_of_all;
 
 const SETTINGS: Settings =
     Settings { max_evaluations: 1000, cost_tolerance: 1e-12, size_tolerance: 1e-5 };
@@ -165,10 +169,9 @@ fn a_bone_is_found_in_a_few_evaluations() {
     assert!(evaluations[count - 1] <= 30, "{evaluations:?}");
 }
 
-proptest! {
+properties! {
     /// The answer against the nearest point of the solutions as they are linearised there, by
     /// central differences of the moments themselves.
-    #[test]
     fn the_answer_is_the_nearest_to_the_start(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
@@ -179,7 +182,6 @@ proptest! {
     }
 
     /// Where the closed form is all there is, nothing is left to be learnt: one step, to the point.
-    #[test]
     fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
@@ -190,10 +192,9 @@ proptest! {
     }
 
     /// Whatever is told, it ends, and asks for no more than it may.
-    #[test]
     fn it_ends_whatever_it_is_told(
         start in unit(),
-        seed: u64,
+        seed in any::<u64>(),
         size_tolerance in prop_oneof![Just(0.0), 1e-9..0.5_f64],
     ) {
         let space = all_free(&start);

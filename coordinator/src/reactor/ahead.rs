@@ -166,7 +166,9 @@ fn adopt_batches(state: &mut State, job: JobId, round: u64) {
     for id in held {
         if let Some(batch) = state.batches.get_mut(&id) {
             batch.ahead = false;
-            state.copyable.insert(id);
+            if batch.is_copyable() {
+                state.copyable.insert(id);
+            }
             dispatch::charge(state, id);
         }
     }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use osteon_common::outcome::Solved;
 
-use super::{Effects, checks, jobs, workers};
+use super::{Effects, checks, jobs, overdue, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
@@ -39,7 +39,8 @@ pub(super) fn answered(
     let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
         return;
     };
-    let purpose = held.map(|held| held.purpose);
+    let (purpose, twins) = held.map(|held| (held.purpose, held.twins.clone())).unzip();
+    let twins = twins.unwrap_or_default();
     let (found, expected) = (solved.len(), assignment.indices.count);
     if found as u64 != expected {
         let reason = CloseReason::WrongCount { batch, found, expected };
@@ -47,28 +48,39 @@ pub(super) fn answered(
         return;
     }
     state.prove(worker);
+    if purpose.is_some() {
+        overdue::answered(state, worker, batch, now);
+    }
     match purpose {
         Some(Purpose::Fill) => {
             if let Some(held) = state.settle(batch) {
                 measure(state, &held, elapsed_s, now);
-                if let Some(twin) = held.twin {
-                    revoke(state, twin, now, effects);
-                }
             }
+            take_back(state, twins, now, effects);
             fill(state, &assignment, &solved, &name, now);
             checks::audit(state, &assignment, &name);
         }
         Some(Purpose::Audit { .. }) => {
             state.settle(batch);
+            take_back(state, twins, now, effects);
             checks::compare(state, &assignment, &solved, &name, now, effects);
         }
         Some(Purpose::Judge) => {
+            take_back(state, twins, now, effects);
             checks::judged(state, batch, &assignment, solved, &name, now, effects);
         }
         None => checks::compare(state, &assignment, &solved, &name, now, effects),
     }
     jobs::store_if_complete(state, assignment.job, now, effects);
     workers::dismiss_if_drained(state, worker, now, effects);
+}
+
+/// Takes back the copies of a batch that is answered.
+fn take_back(state: &mut State, copies: Vec<BatchId>, now: Duration, effects: &mut Effects) {
+    for copy in copies {
+        overdue::missed(state, copy, now);
+        revoke(state, copy, now, effects);
+    }
 }
 
 /// Takes back a batch, telling its worker to forget it.
@@ -104,13 +116,16 @@ pub(super) fn orphaned(state: &mut State, batch: BatchId, loss: &Loss) {
         checks::orphaned(state, &settled, loss);
         return;
     }
-    let Batch { assignment, twin, .. } = settled;
+    let Batch { assignment, twins, exclusive, .. } = settled;
     let Some(evaluation) = state.attempt_mut(&assignment) else {
         return;
     };
     let indices = assignment.indices;
     evaluation.lost_over |= loss.cause != Cause::Announced;
-    if twin.is_some() {
+    if !twins.is_empty() {
+        if exclusive {
+            evaluation.blame(indices.first, loss);
+        }
         return;
     }
     if indices.count > 1 || loss.cause == Cause::Announced {
@@ -152,8 +167,14 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     };
     let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
     *known += RATE_WEIGHT * (rate - *known);
-    let seconds = batch.assignment.indices.count as f64 / rate;
-    let took = fairness::thread_time(seconds, worker.hello.threads);
+    let count = batch.assignment.indices.count;
+    let seconds = count as f64 / rate;
+    let threads = worker.hello.threads;
+    let took = fairness::thread_time(seconds, threads);
+    if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
+        // Whatever a worker says, it has not computed for longer than it was waited for.
+        job.pace.learn(count, threads, seconds.min(waited_s));
+    }
     if let Some(job) = state.jobs.get(&batch.assignment.job).filter(|_| !batch.ahead) {
         state.shares.correct(&job.record.client, batch.charged, took);
     }

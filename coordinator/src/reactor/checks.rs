@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use osteon_common::outcome::Solved;
 
-use super::{Effects, dispatch, expulsion, jobs, suspects};
+use super::{Effects, dispatch, expulsion, jobs, overdue, suspects};
 use crate::audit;
 use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
 use crate::evaluation::{Audit, Evaluation};
@@ -21,7 +21,7 @@ const LOST_MAX: u32 = 3;
 /// somebody else.
 pub(super) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
     let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
-    if !state.takes_batches(|name| name != by) {
+    if !state.answers_batches(|name| name != by) {
         return;
     }
     let Assignment { job, indices, .. } = *assignment;
@@ -37,7 +37,7 @@ pub(super) fn any_wait(state: &State) -> bool {
     state.active.iter().any(|id| match state.jobs.get(id).map(|job| &job.stage) {
         Some(Stage::Computing(evaluation)) => {
             !evaluation.audits.is_empty()
-                || evaluation.disputes.iter().any(|dispute| dispute.judge.is_none())
+                || evaluation.disputes.iter().any(|dispute| dispute.judges.is_empty())
         }
         _ => false,
     })
@@ -53,10 +53,14 @@ pub(super) fn hand_check(
     let Some(name) = state.workers.get(&worker).map(|worker| worker.name.clone()) else {
         return false;
     };
+    let on_probation = state.probation.has(&name);
     let active: Vec<JobId> = state.active.iter().copied().collect();
     for job in active {
         if let Some(at) = to_judge(state, job, worker) {
             return hand_dispute(state, job, at, worker, now, effects);
+        }
+        if on_probation {
+            continue;
         }
         let Some(evaluation) = state.evaluation_mut(job) else {
             continue;
@@ -86,7 +90,7 @@ fn to_judge(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
         let standing = |worker: &Worker| suspects::standing(state, worker, &dispute.lost);
         let may = |worker: &&Worker| !worker.draining && !dispute.involves(&worker.name);
         let best = state.workers.values().filter(may).map(standing).min();
-        dispute.judge.is_none() && may(&worker) && best == Some(standing(worker))
+        dispute.judges.is_empty() && may(&worker) && best == Some(standing(worker))
     };
     evaluation.disputes.iter().position(is_for)
 }
@@ -107,7 +111,7 @@ fn hand_dispute(
     let assignment = Assignment { job, round, indices };
     let batch = dispatch::send(state, worker, assignment, Purpose::Judge, now, effects);
     if let Some(evaluation) = state.evaluation_mut(job) {
-        evaluation.disputes[at].judge = batch;
+        evaluation.disputes[at].judges.extend(batch);
     }
     batch.is_some()
 }
@@ -156,7 +160,7 @@ pub(super) fn judged(
     now: Duration,
     effects: &mut Effects,
 ) {
-    let of_batch = |dispute: &Dispute| dispute.judge == Some(batch);
+    let of_batch = |dispute: &Dispute| dispute.judges.contains(&batch);
     let found = |it: &mut Evaluation| it.disputes.iter().position(of_batch);
     let at = state.attempt_mut(assignment).and_then(found);
     state.settle(batch);
@@ -191,6 +195,9 @@ pub(super) fn orphaned(state: &mut State, batch: &Batch, loss: &Loss) {
     let Purpose::Audit { lost } = batch.purpose else {
         return;
     };
+    if !batch.twins.is_empty() {
+        return;
+    }
     if let Some(evaluation) = state.attempt_mut(&batch.assignment)
         && lost + blame < LOST_MAX
         && let Some(by) = evaluation.owner(indices.first)
@@ -202,7 +209,7 @@ pub(super) fn orphaned(state: &mut State, batch: &Batch, loss: &Loss) {
 /// A worker that was to decide is lost.
 pub(super) fn judge_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &Loss) {
     if let Some(evaluation) = state.attempt_mut(assignment)
-        && let Some(dispute) = evaluation.disputes.iter_mut().find(|it| it.judge == Some(batch))
+        && let Some(dispute) = evaluation.disputes.iter_mut().find(|it| it.judges.contains(&batch))
     {
         dispute.lost.add(loss);
     }
@@ -233,7 +240,7 @@ fn give_up_audits(state: &mut State, job: JobId) {
         return;
     }
     let mut audits = std::mem::take(&mut evaluation.audits);
-    audits.retain(|audit| state.takes_batches(|name| *name != audit.by));
+    audits.retain(|audit| state.answers_batches(|name| *name != audit.by));
     if let Some(evaluation) = state.evaluation_mut(job) {
         evaluation.audits = audits;
     }
@@ -246,10 +253,11 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     };
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
-        let nobody = !state.takes_batches(|name| !dispute.involves(name));
+        let nobody = !state.answers_batches(|name| !dispute.involves(name));
         let others = |name: &WorkerName| !dispute.involves(name);
         let lethal = suspects::hopeless(state, &dispute.lost, others, now);
-        dispute.judge.is_none() && (lethal || (nobody && !patient))
+        let waited_for = |judge| overdue::is_waited_for(state, judge, now);
+        !dispute.judges.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.contradiction()?);

@@ -40,7 +40,7 @@ fn copy(
     if !state.copyable.first().is_some_and(|oldest| old(state, oldest)) {
         return;
     }
-    let idle = |worker: &Worker| !worker.draining && idle(state, worker);
+    let idle = |worker: &Worker| state.is_sound(worker) && idle(state, worker);
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {
@@ -54,11 +54,29 @@ fn copy(
             return;
         };
         let copy = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
-        for (one, other) in [(copy, Some(slowest)), (Some(slowest), copy)] {
-            if let Some((id, batch)) = one.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
-                batch.twin = other;
-                state.copyable.remove(&id);
-            }
+        if let Some(copy) = copy {
+            join(state, slowest, copy);
         }
+    }
+}
+
+/// Makes a batch that was just sent a copy of another, and of the copies of that.
+pub(super) fn join(state: &mut State, of: BatchId, copy: BatchId) {
+    let Some(original) = state.batches.get(&of) else {
+        return;
+    };
+    let mut twins = original.twins.clone();
+    twins.push(of);
+    for id in &twins {
+        if let Some(twin) = state.batches.get_mut(id) {
+            twin.twins.push(copy);
+        }
+    }
+    for id in twins.iter().chain([&copy]) {
+        state.copyable.remove(id);
+        state.overdue.remove(id);
+    }
+    if let Some(batch) = state.batches.get_mut(&copy) {
+        batch.twins = twins;
     }
 }

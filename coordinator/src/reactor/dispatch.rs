@@ -5,8 +5,10 @@
 //! is sized from the worker's measured rate to the target time, and to at most a quarter of the
 //! worker's share of what remains of the evaluation, so that all workers end together; but while
 //! its share allows, no batch is smaller than the worker's threads, be it longer than the target
-//! or more than the quarter. A worker that has nothing to do gets a copy of a batch that is late,
-//! then what may be done ahead (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to be computed alone is not refilled.
+//! or more than the quarter. What is overdue goes to another worker before anything else (`overdue.rs`).
+//! A worker that has nothing to do gets a copy of a batch that is late, then what may be done ahead
+//! (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to
+//! be computed alone is not refilled. A worker on probation gets one realization at a time.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -14,7 +16,7 @@ use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
-use super::{Effects, ahead, checks, copies, suspects};
+use super::{Effects, ahead, checks, copies, overdue, suspects};
 use crate::effect::Effect;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
@@ -33,7 +35,8 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
     if state.draining {
         return;
     }
-    let kept = suspects::hand_out(state, now, effects);
+    let mut kept = suspects::hand_out(state, now, effects);
+    overdue::hand_out(state, &mut kept, now, effects);
     while work_waits(state) && hand_one(state, &kept, now, effects) {}
     copies::of_late_ones(state, now, effects);
     if kept.is_empty() && !work_waits(state) {
@@ -43,7 +46,7 @@ pub(super) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) 
 }
 
 /// Whether there is anything to hand out but suspects.
-fn work_waits(state: &State) -> bool {
+pub(super) fn work_waits(state: &State) -> bool {
     next_job(state).is_some() || checks::any_wait(state)
 }
 
@@ -56,7 +59,8 @@ fn hand_one(
     effects: &mut Effects,
 ) -> bool {
     let mut free = free_workers(state, kept);
-    if !checks::any_wait(state) {
+    let first = free.first().and_then(|first| state.workers.get(first));
+    if !checks::any_wait(state) && first.is_some_and(|first| state.is_sound(first)) {
         // What one of them may not have, no other may.
         free.truncate(1);
     }
@@ -65,18 +69,22 @@ fn hand_one(
     })
 }
 
-/// The workers with credit, those that hold least first; of equal ones the first.
-fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
+/// The workers with credit, those that hold least first; of equal ones the first. Those on probation
+/// come last, and only if they hold nothing.
+pub(super) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
     let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
     let free = state
         .workers
         .iter()
         .filter(|(id, worker)| !worker.draining && !kept.contains(id))
         .filter(|(_, worker)| !worker.in_flight.iter().any(exclusive))
-        .map(|(id, worker)| (held(state, worker), worker.in_flight.len(), *id));
-    let mut free: Vec<(usize, usize, WorkerId)> = free.collect();
+        .map(|(id, worker)| {
+            (!state.is_sound(worker), held(state, worker), worker.in_flight.len(), *id)
+        });
+    let mut free: Vec<(bool, usize, usize, WorkerId)> = free.collect();
     free.sort_unstable();
-    let free = free.into_iter().filter(|(held, ..)| *held < BATCHES_IN_FLIGHT_MAX);
+    let most = |on_probation| if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
+    let free = free.into_iter().filter(|(on_probation, held, ..)| *held < most(*on_probation));
     free.map(|(.., worker)| worker).collect()
 }
 
@@ -97,7 +105,13 @@ fn hand_batch(state: &mut State, worker: WorkerId, now: Duration, effects: &mut 
     let Some(attached) = state.workers.get(&worker) else {
         return false;
     };
-    let size = batch_size(state, attached, job, evaluation.queued());
+    let size = if state.is_sound(attached) {
+        batch_size(state, attached, job, evaluation.queued())
+    } else if !state.probation.rests(&attached.name, now) || !state.answers_batches(|_| true) {
+        1
+    } else {
+        return false;
+    };
     let Some(evaluation) = state.evaluation_mut(job) else {
         return false;
     };
@@ -160,7 +174,7 @@ pub(super) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u
     let weight = |worker: &Worker| {
         worker.rates.get(&job).copied().unwrap_or(f64::from(worker.hello.threads) * per_thread)
     };
-    let total: f64 = state.workers.values().filter(|worker| !worker.draining).map(weight).sum();
+    let total: f64 = state.workers.values().filter(|it| state.is_sound(it)).map(weight).sum();
     let share = queued as f64 * weight(attached) / total;
     let threads = f64::from(attached.hello.threads);
     let most = (share / SHARE_DIVISOR).max(threads.min(share)).ceil();
@@ -200,8 +214,10 @@ pub(super) fn send(
         purpose,
         worker,
         sent: now,
+        begun: now,
         charged: Duration::ZERO,
-        twin: None,
+        twins: Vec::new(),
+        retries: 0,
         exclusive: false,
         ahead: false,
     };

@@ -65,7 +65,7 @@ fn forget(state: &mut State, id: JobId, name: &WorkerName, now: Duration, effect
             evaluation.disputes.retain_mut(|dispute| {
                 let stays = dispute.forget(name);
                 if !stays {
-                    over.extend(dispute.judge);
+                    over.append(&mut dispute.judges);
                 }
                 stays
             });

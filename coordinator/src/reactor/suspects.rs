@@ -26,9 +26,10 @@ use crate::worker_name::WorkerName;
 /// How long the losses of a host are remembered when no more come.
 const MEMORY: Duration = Duration::from_secs(600);
 
-/// How little may be expected of a worker, the least last: whether its host's workers are lost over
-/// whatever they hold, whether one was lost over this, whether it has not answered anything yet.
-type Standing = (bool, bool, bool);
+/// How little may be expected of a worker, the least last: whether it does not answer what it
+/// holds, whether its host's workers are lost over whatever they hold, whether one was lost over
+/// this, whether it has not answered anything yet.
+pub(super) type Standing = (bool, bool, bool, bool);
 
 /// Hands out suspects, each alone to a worker that holds nothing. Returns those who must not be
 /// refilled, so that they hold nothing soon.
@@ -155,11 +156,11 @@ pub(super) fn hopeless(
     losses.last().is_some_and(long) && enough(state, losses, of)
 }
 
-fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
+pub(super) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
     let untried = |worker: &Worker| {
-        let (failing, lost, _) = standing(state, worker, losses);
+        let (silent, failing, lost, _) = standing(state, worker, losses);
         let stayed = losses.first().is_some_and(|first| worker.attached < first);
-        !worker.draining && !failing && (stayed || !lost) && of(&worker.name)
+        !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
     };
     losses.are_enough(|| state.workers.values().any(untried))
 }
@@ -167,7 +168,8 @@ fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> b
 /// How little may be expected of a worker at something over which these were lost.
 pub(super) fn standing(state: &State, worker: &Worker, losses: &Losses) -> Standing {
     let host = worker.name.host();
-    (state.is_failing(host), losses.are_of(host), !worker.proven)
+    let silent = state.probation.has(&worker.name);
+    (silent, state.is_failing(host), losses.are_of(host), !worker.proven)
 }
 
 fn computing(state: &State, job: JobId) -> Option<&Evaluation> {

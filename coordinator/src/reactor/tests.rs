@@ -22,6 +22,7 @@ mod dispatch;
 mod fairness;
 mod jobs;
 mod lost;
+mod overdue;
 mod prune;
 mod reread;
 mod workers;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Effects, checks, expulsion, jobs, prune, suspects, workers};
+use super::{Effects, checks, expulsion, jobs, overdue, prune, suspects, workers};
 use crate::effect::{CloseReason, Effect};
 use crate::ids::{JobId, WorkerId};
 use crate::snapshot;
@@ -15,6 +15,7 @@ pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     excuse(state, now);
     expire(state, now, effects);
     beat(state, now, effects);
+    overdue::tick(state, now, effects);
     checks::give_up(state, now, effects);
     if !state.draining {
         suspects::tick(state, now, effects);
@@ -37,8 +38,12 @@ fn excuse(state: &mut State, now: Duration) {
     for worker in state.workers.values_mut() {
         excused(&mut worker.heard);
         excused(&mut worker.answered);
+        excused(&mut worker.missed.since);
     }
-    state.batches.values_mut().for_each(|batch| excused(&mut batch.sent));
+    for batch in state.batches.values_mut() {
+        excused(&mut batch.sent);
+        excused(&mut batch.begun);
+    }
     for job in state.jobs.values_mut() {
         for evaluation in job.evaluations_mut() {
             evaluation.suspects.values_mut().for_each(|losses| losses.excuse(excused));

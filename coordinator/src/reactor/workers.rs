@@ -6,12 +6,12 @@ use std::time::Duration;
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
-use super::{Effects, ahead, batches, suspects};
+use super::{Effects, ahead, batches, overdue, suspects};
 use crate::effect::{CloseReason, Effect};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
 use crate::losses::{Cause, Loss};
-use crate::state::{State, Worker};
+use crate::state::{Missed, State, Worker};
 use crate::worker_name::WorkerName;
 
 pub(super) fn hello(
@@ -33,6 +33,7 @@ pub(super) fn hello(
     state.next_lease += 1;
     let name = name(&hello);
     suspects::forgive(state, &name);
+    state.probation.attach(&name, now);
     state.workers.insert(
         worker,
         Worker {
@@ -43,6 +44,7 @@ pub(super) fn hello(
             heard: now,
             answered: now,
             proven: false,
+            missed: Missed::default(),
             beat: now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
@@ -90,6 +92,11 @@ pub(super) fn close(
     effects: &mut Effects,
 ) {
     let cause = cause(&reason);
+    if matches!(reason, CloseReason::Unanswering { .. })
+        && let Some(name) = state.workers.get(&worker).map(|worker| worker.name.clone())
+    {
+        overdue::begin_probation(state, &name, now, now);
+    }
     effects.push(Effect::Close { worker, reason });
     lost(state, worker, cause, now);
 }

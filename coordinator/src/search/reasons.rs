@@ -3,7 +3,7 @@
 use osteon_common::job::{JobSpecification, Objective, SearchMethod};
 use osteon_common::results::{Evaluation, Status};
 
-use super::Ending;
+use super::{Ending, advice};
 use crate::ask::Stop;
 use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
@@ -101,11 +101,10 @@ fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) 
                  change the starts or the bounds of [parameters]"
             .to_owned(),
         Some(row) => format!(
-            "no feasible point among the {} evaluated; at the first {}; change the starts of \
-             [parameters], raise [solver] refinement, or allow a larger \
-             [monte_carlo] max_failed_fraction",
+            "no feasible point among the {} evaluated; at the first {}; {}",
             evidence.evaluations,
-            failed(row, specification)
+            failed(row, specification),
+            advice::after_failures(row, specification)
         ),
     }
 }

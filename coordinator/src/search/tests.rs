@@ -10,6 +10,7 @@ use osteon_common::realization::Ensemble;
 
 use super::*;
 
+mod advice;
 mod likelihood;
 mod sets;
 

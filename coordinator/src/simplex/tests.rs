@@ -1,5 +1,6 @@
 //! Standard functions, and the shapes that have made other simplexes lie.
 
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -235,9 +236,8 @@ fn equal_costs_keep_the_order_of_their_making() {
     assert_eq!(twice[0].stop, Stop::Settled);
 }
 
-proptest! {
+properties! {
     /// Asks stay in the box, ends come, and telling the same costs again leads to the same state.
-    #[test]
     fn any_costs_lead_to_an_end(
         start in proptest::collection::vec(0.0..=1.0, 0..8),
         costs in proptest::collection::vec(
@@ -314,12 +314,11 @@ fn most_points_are_foreseen() {
     check(&[0.2, 0.75], 8, rosenbrock, 0.9);
 }
 
-proptest! {
+properties! {
     // All but those after which a whole simplex is put into order.
-    #[test]
     fn with_room_enough_every_point_of_a_step_is_foreseen(
         start in proptest::collection::vec(0.0_f64..=1.0, 1..4),
-        seed: u64,
+        seed in any::<u64>(),
     ) {
         // Any number at any point, infinite ones among them.
         let cost = |at: &[f64]| {

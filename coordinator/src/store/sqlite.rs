@@ -22,11 +22,14 @@ use crate::ids::JobId;
 use crate::search::{Ending, Summary};
 use crate::worker_name::WorkerName;
 
+mod acknowledged;
 mod columns;
 mod opening;
 mod schema;
 mod summary;
 
+pub use acknowledged::LostJobs;
+use acknowledged::Mark;
 use columns::{
     JobColumns, end_checksum, evaluation, evaluation_checksum, expulsion_checksum, job_checksum,
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
@@ -43,6 +46,8 @@ pub struct SqliteStore {
     path: PathBuf,
     /// Held until the end; says whose the store is.
     lock: File,
+    /// Which jobs were acknowledged.
+    mark: Mark,
 }
 
 impl Drop for SqliteStore {
@@ -57,11 +62,28 @@ impl SqliteStore {
     ///
     /// # Errors
     /// When the directory cannot be made or written, another coordinator has the store open, a
-    /// version of osteon with another format or another program wrote it, it is damaged, or
-    /// SQLite refuses.
+    /// version of osteon with another format or another program wrote it, it is damaged, jobs that
+    /// were acknowledged are missing, or SQLite refuses.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
+        Self::open_with(directory, LostJobs::Refuse)
+    }
+
+    /// As [`open`](Self::open), and what to do when acknowledged jobs are missing.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); missing jobs that are accepted are none.
+    pub fn open_with(directory: &Path, lost: LostJobs) -> Result<Self, StoreError> {
         let (connection, lock, path) = opening::open(directory)?;
-        Ok(Self { connection, path, lock })
+        let known = last_known(&connection).map_err(|source| opening::refusal(&path, source))?;
+        let found = Mark::find(directory)?;
+        let last = acknowledged::checked(&found, known, &path, lost)?;
+        opening::checkpoint_at_end(&connection)
+            .map_err(|source| opening::refusal(&path, source))?;
+        if last > known {
+            never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
+        }
+        let mark = Mark::open(directory, &found, last)?;
+        Ok(Self { connection, path, lock, mark })
     }
 
     /// Makes a directory for a store, if there is none: other users cannot enter it.
@@ -245,7 +267,11 @@ impl Store for SqliteStore {
             columns.priority,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        Ok(())
+        // From here on the job may be acknowledged; its client hears of it after this.
+        self.mark.acknowledge(record.job).inspect_err(|_| {
+            // It is refused. If it cannot be removed it is a job that nobody asks for.
+            let _ = self.connection.execute("DELETE FROM job WHERE id = ?1", params![record.job.0]);
+        })
     }
 
     fn put_evaluation(
@@ -394,6 +420,21 @@ impl Store for SqliteStore {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))
     }
+}
+
+/// The highest identifier that the database knows, be it of a job that was forgotten; 0: none.
+fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
+    let stored: Option<u64> =
+        connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?;
+    let forgotten: i32 = connection.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
+    Ok(stored.unwrap_or(0).max(u64::try_from(forgotten).unwrap_or(0)))
+}
+
+/// Makes durable that no job gets an identifier up to `last`.
+fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
+    let last = i32::try_from(last).unwrap_or(i32::MAX);
+    connection.pragma_update(None, LAST_FORGOTTEN, last)?;
+    connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }
 
 /// What is shown of a job whose end is damaged: one such row must not keep all others from being

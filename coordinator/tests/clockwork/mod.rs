@@ -59,6 +59,8 @@ struct Worker {
     /// What is not begun of each batch.
     queue: VecDeque<(BatchId, u32)>,
     batches: BTreeMap<BatchId, Held>,
+    /// It never answers one in so many of its batches.
+    swallows: Option<u64>,
 }
 
 struct Held {
@@ -76,6 +78,7 @@ pub(crate) struct Ended {
 
 pub(crate) struct Clockwork {
     times: Times,
+    realization: Duration,
     now: Duration,
     number: u64,
     agenda: BTreeMap<(Duration, u64), Happening>,
@@ -84,26 +87,47 @@ pub(crate) struct Clockwork {
     workers: BTreeMap<WorkerId, Worker>,
     unfinished: BTreeSet<JobId>,
     ends: BTreeMap<JobId, (Duration, EndRecord)>,
+    /// Batches that were sent.
+    pub(crate) sent: u64,
+    /// Batches that were never answered.
+    pub(crate) swallowed: u64,
 }
 
 impl Clockwork {
     /// Workers of so many threads.
     pub(crate) fn new(threads: &[u32], times: Times) -> Self {
+        Self::with(threads, times, REALIZATION, Config::default())
+    }
+
+    /// Workers of so many threads, whose realizations take so long on average.
+    pub(crate) fn with(
+        threads: &[u32],
+        times: Times,
+        realization: Duration,
+        config: Config,
+    ) -> Self {
         let mut clockwork = Self {
             times,
+            realization,
             now: Duration::ZERO,
             number: 0,
             agenda: BTreeMap::new(),
-            state: State::new(Config::default(), Duration::ZERO),
+            state: State::new(config, Duration::ZERO),
             store: MemoryStore::new(),
             workers: BTreeMap::new(),
             unfinished: BTreeSet::new(),
             ends: BTreeMap::new(),
+            sent: 0,
+            swallowed: 0,
         };
         for (process, &threads) in (1..).zip(threads) {
             let worker = WorkerId(process.into());
-            let idle =
-                Worker { idle_threads: threads, queue: VecDeque::new(), batches: BTreeMap::new() };
+            let idle = Worker {
+                idle_threads: threads,
+                queue: VecDeque::new(),
+                batches: BTreeMap::new(),
+                swallows: None,
+            };
             clockwork.workers.insert(worker, idle);
             let hello = Hello { threads, ..fake::hello(process) };
             clockwork.react(Event::Hello { worker, hello });
@@ -112,8 +136,13 @@ impl Clockwork {
         clockwork
     }
 
+    /// A worker gives signs of life and never answers one in `n` of its batches.
+    pub(crate) fn swallow(&mut self, worker: u64, n: u64) {
+        self.workers.get_mut(&WorkerId(worker)).unwrap().swallows = Some(n);
+    }
+
     /// Runs jobs, each of a client of its own, to their ends.
-    pub(crate) fn run(mut self, specifications: &[JobSpecification]) -> Vec<Ended> {
+    pub(crate) fn run(&mut self, specifications: &[JobSpecification]) -> Vec<Ended> {
         for (number, specification) in (1..).zip(specifications) {
             self.unfinished.insert(JobId(number));
             let mut request = fake::submission(specification, "");
@@ -153,7 +182,12 @@ impl Clockwork {
             }
             Happening::Event(event) => self.react(event),
             Happening::Batch(worker, batch, work) => {
+                self.sent += 1;
                 let known = self.workers.get_mut(&worker).unwrap();
+                if known.swallows.is_some_and(|n| self.sent.is_multiple_of(n)) {
+                    self.swallowed += 1;
+                    return;
+                }
                 known.queue.push_back((batch, work.count));
                 known.batches.insert(batch, Held { work, begun: Duration::MAX, realized: 0 });
                 self.begin(worker);
@@ -190,7 +224,7 @@ impl Clockwork {
             *left -= 1;
             let held = known.batches.get_mut(batch).unwrap();
             held.begun = held.begun.min(self.now);
-            begun.push((*batch, time(self.times, &held.work, *left)));
+            begun.push((*batch, time(self.times, self.realization, &held.work, *left)));
             if *left == 0 {
                 known.queue.pop_front();
             }
@@ -235,11 +269,11 @@ impl Clockwork {
 }
 
 /// How long the realization of a batch takes that has `left` after it.
-fn time(times: Times, work: &Work, left: u32) -> Duration {
+fn time(times: Times, realization: Duration, work: &Work, left: u32) -> Duration {
     let index = work.first + u64::from(work.count - 1 - left);
     let noise = work.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));
     match times {
-        Times::Equal => REALIZATION,
-        Times::Spread => REALIZATION / 2 + REALIZATION * (noise % 1024) as u32 / 1024,
+        Times::Equal => realization,
+        Times::Spread => realization / 2 + realization * (noise % 1024) as u32 / 1024,
     }
 }

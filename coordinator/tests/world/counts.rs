@@ -1,5 +1,7 @@
 //! What schedules have seen.
 
+use std::time::Duration;
+
 /// How often what happened.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
@@ -43,6 +45,10 @@ pub(crate) struct Counts {
     pub(crate) pauses: u64,
     /// Deaths of a node that dies over whatever it gets.
     pub(crate) bad_deaths: u64,
+    /// Batches that a worker with signs of life never answered.
+    pub(crate) swallowed: u64,
+    /// How long a schedule without a bad node took, in its own time.
+    pub(crate) longest: Duration,
 }
 
 impl Counts {
@@ -68,6 +74,8 @@ impl Counts {
         self.dropped += other.dropped;
         self.pruned += other.pruned;
         self.bad_deaths += other.bad_deaths;
+        self.swallowed += other.swallowed;
+        self.longest = self.longest.max(other.longest);
         self.pauses += other.pauses;
         self.damaged += other.damaged;
     }

@@ -3,19 +3,27 @@
 use std::time::Duration;
 
 use osteon_coordinator::event::{Event, Hello};
-use osteon_coordinator::ids::WorkerId;
+use osteon_coordinator::ids::{BatchId, WorkerId};
 
-use super::{Happening, Worker, World};
+use super::{HOUR, Happening, Worker, World};
 use crate::fake;
 
 /// Numbers of processes of the bad node are above this one.
 const BAD_PROCESSES: u32 = 1_000_000;
+/// And those of workers that do not answer above this one.
+const SILENT_PROCESSES: u32 = 2_000_000;
 
 impl World {
     /// Whether there is a bad node, and when the coordinator is told to stop or stands still.
     pub(super) fn plan_faults(&mut self) {
         if self.draw(4) == 0 {
             self.within(500, Happening::ArriveBad);
+            self.most = HOUR;
+        }
+        if self.draw(3) == 0 {
+            // Half of them never answer anything.
+            let swallows = [1, 1, 2, 5][self.draw(4) as usize];
+            self.within(500, Happening::ArriveSilent(SILENT_PROCESSES, swallows));
         }
         if self.draw(3) == 0 {
             self.within(3000, Happening::Drain);
@@ -42,7 +50,11 @@ impl World {
         for (worker, process) in workers {
             let known = self.workers.get_mut(&worker).unwrap();
             known.heard = until;
-            if !known.bad && !self.expelled.contains(&process) && self.draw(2) == 0 {
+            if !known.bad
+                && known.swallows == 0
+                && !self.expelled.contains(&process)
+                && self.draw(2) == 0
+            {
                 self.after(1, Happening::GiveUp(worker));
             }
         }
@@ -54,6 +66,23 @@ impl World {
             self.react(Event::StreamEnded { worker });
             self.within(400, Happening::Return(gone.process));
         }
+    }
+
+    /// A process that gives signs of life, and never answers one in `swallows` of its batches.
+    pub(super) fn arrive_silent(&mut self, process: u32, swallows: u64) {
+        let worker = WorkerId(self.number());
+        let hello = Hello { host: "silent".to_owned(), threads: 2, ..fake::hello(process) };
+        let known = Worker { process, swallows, heard: self.now, ..Worker::default() };
+        self.workers.insert(worker, known);
+        self.react(Event::Hello { worker, hello });
+    }
+
+    /// Whether a batch is one of those that its worker never answers.
+    pub(super) fn swallows(&mut self, worker: WorkerId, batch: BatchId) -> bool {
+        let swallows = self.workers[&worker].swallows;
+        let swallowed = swallows > 0 && batch.0.is_multiple_of(swallows);
+        self.counts.swallowed += u64::from(swallowed);
+        swallowed
     }
 
     /// A process on a node that is not in order.

@@ -31,6 +31,9 @@ pub(crate) use counts::Counts;
 const TICK: Duration = Duration::from_millis(100);
 /// No schedule takes longer than this, in its own time.
 const HOUR: Duration = Duration::from_secs(3600);
+/// Nor one without a bad node longer than this: the longest outage of the store, and a few minutes. It
+/// is less than the time after which a worker that does not answer has lost its lease.
+const MINUTES: Duration = Duration::from_secs(300);
 /// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
 const LOST_ALONE_MAX: u32 = 2;
 
@@ -49,6 +52,8 @@ enum Happening {
     GiveUp(WorkerId),
     /// A worker attaches that dies over whatever it gets.
     ArriveBad,
+    /// A process attaches that gives signs of life, and never answers one in so many batches.
+    ArriveSilent(u32, u64),
     /// A worker's message arrives.
     Message(WorkerId, Event),
     /// A worker answers a batch that is settled again, and differently.
@@ -92,6 +97,8 @@ struct Worker {
     stalled: bool,
     /// It dies over whatever it gets.
     bad: bool,
+    /// It never answers one in so many of its batches; 0: it answers all.
+    swallows: u64,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
 }
@@ -106,6 +113,8 @@ pub(crate) struct World {
     clients: Vec<Client>,
     submissions: BTreeMap<Token, usize>,
     cancellations: BTreeMap<Token, usize>,
+    /// How long it may take.
+    most: Duration,
     /// When the store takes nothing.
     outage: Range<Duration>,
     /// Processes that lie now and then, some of them on second thoughts only.
@@ -143,11 +152,14 @@ impl World {
             let Some(((at, _), happening)) = world.agenda.pop_first() else {
                 panic!("nothing will ever happen again");
             };
-            assert!(at < HOUR, "still not done: {:?}", world.state);
+            assert!(at < world.most, "still not done: {:?}", world.state);
             world.now = at;
             world.happen(happening);
         }
         world.check_results();
+        if world.most == MINUTES {
+            world.counts.longest = world.now;
+        }
         world.counts
     }
 
@@ -187,6 +199,7 @@ impl World {
             submissions: BTreeMap::new(),
             cancellations: BTreeMap::new(),
             counts: Counts { outages: u64::from(!outage.is_empty()), ..Counts::default() },
+            most: MINUTES,
             outage,
             liars,
             lies: BTreeSet::new(),
@@ -259,6 +272,7 @@ impl World {
             Happening::Submit(client) => self.submit(client),
             Happening::Arrive => self.arrive(),
             Happening::ArriveBad => self.arrive_bad(),
+            Happening::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
             Happening::Return(process) => self.attach(process),
             Happening::Pause => self.pause(),
             Happening::GiveUp(worker) => self.give_up(worker),
@@ -394,7 +408,12 @@ impl World {
 
     /// Another worker comes in the place of one that is gone.
     fn replace(&mut self, gone: &Worker) {
-        let other = if gone.bad { Happening::ArriveBad } else { Happening::Arrive };
+        let other = match gone.swallows {
+            0 if gone.bad => Happening::ArriveBad,
+            0 => Happening::Arrive,
+            // It comes back, or another process of its host.
+            swallows => Happening::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
+        };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
@@ -514,6 +533,9 @@ impl World {
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
         if bad {
             self.within(50, Happening::Break(worker));
+            return;
+        }
+        if self.swallows(worker, batch) {
             return;
         }
         let right = self.answer(worker, batch, &work);

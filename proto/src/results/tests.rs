@@ -1,5 +1,6 @@
 //! Results over the wire.
 
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -113,19 +114,17 @@ prop_compose! {
     }
 }
 
-proptest! {
-    #[test]
+properties! {
     fn results_survive_the_wire(result in result()) {
         let outcomes = result.best.as_ref().map(|best| best.outcomes.clone());
         let message = to_message(&result);
         prop_assert_eq!(from_message(&message, outcomes.unwrap_or_default()), Ok(result));
     }
 
-    #[test]
     fn evaluations_survive_the_wire(
-        number: u64,
-        group: u32,
-        start: u32,
+        number in any::<u64>(),
+        group in any::<u32>(),
+        start in any::<u32>(),
         varied in proptest::option::of(0_usize..7),
         point in point(),
         moments in proptest::option::of(moments()),

@@ -1,5 +1,6 @@
 use osteon_common::case::Setup;
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -34,18 +35,18 @@ fn parameters() -> impl Strategy<Value = [Range; 7]> {
 fn data() -> impl Strategy<Value = Data> {
     prop_oneof![
         // The first keeps the others from being all equal.
-        proptest::collection::vec(1000.0..6000.0, 1..20).prop_map(|mut velocities| {
-            velocities.insert(0, 999.0);
+        proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
+            velocities.insert(0, 1999.0);
             Data::Velocities(velocities)
         }),
         proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
             let group = |(i, name): (usize, &String)| Group {
                 name: format!("{name}{i}"),
-                velocities: vec![999.0, 1000.0 + i as f64],
+                velocities: vec![1999.0, 2000.0 + i as f64],
             };
             Data::Groups(names.iter().enumerate().map(group).collect())
         }),
-        (1000.0..6000.0, 0.001..0.5).prop_map(|(mean, coefficient_of_variation)| {
+        (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
             Data::Moments { mean, coefficient_of_variation }
         }),
     ]
@@ -116,8 +117,7 @@ prop_compose! {
     }
 }
 
-proptest! {
-    #[test]
+properties! {
     fn specifications_survive_the_wire(specification in specification()) {
         let message = to_message(&specification);
         prop_assert_eq!(from_message(&message), Ok(specification));
@@ -239,6 +239,86 @@ fn each_fault_is_named_by_its_path() {
         });
         assert_eq!(fields, ["monte_carlo.scrambles"], "{sampling} {scrambles} of 2747");
     }
+}
+
+/// All that is said about a message after `change`.
+fn refusal(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
+    let mut message = message();
+    change(&mut message);
+    let violations = from_message(&message).unwrap_err();
+    violations.iter().map(ToString::to_string).collect()
+}
+
+/// Gives other data.
+fn moments(message: &mut v1::JobSpecification, mean: f64, variation: f64) {
+    message.data = Some(v1::Data {
+        mean: Some(mean),
+        coefficient_of_variation: Some(variation),
+        ..v1::Data::default()
+    });
+}
+
+/// Gives another range of e_L.
+fn modulus(message: &mut v1::JobSpecification, start: f64, lower: f64, upper: f64) {
+    let range = v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper });
+    let range = Some(v1::ParameterRange { range: Some(range) });
+    message.parameters.as_mut().unwrap().longitudinal_young_modulus = range;
+}
+
+#[test]
+fn other_units_are_asked_about() {
+    assert_eq!(
+        refusal(|m| moments(m, 3.8, 2.7)),
+        [
+            "data.mean: is 3.8; values are in m/s: did you mean 3.8 km/s (3.8e3)?",
+            "data.coefficient_of_variation: is 2.7; values are pure numbers: did you mean 2.7 % (0.027)?",
+        ]
+    );
+    let velocities = vec![3.8, 3.9, 4.0];
+    assert_eq!(
+        refusal(|m| m.data = Some(v1::Data { velocities, ..v1::Data::default() })),
+        ["data.velocities: their median is 3.9; values are in m/s: did you mean 3.9 km/s (3.9e3)?"]
+    );
+    assert_eq!(
+        refusal(|m| modulus(m, 20.0, 12.0, 25.0)),
+        [
+            "parameters.longitudinal_young_modulus.start: is 20.0; values are in Pa: did you mean 20 GPa \
+             (20e9)?",
+            "parameters.longitudinal_young_modulus.bounds: are 12.0 and 25.0; values are in Pa: did you \
+             mean 12 and 25 GPa (12e9 and 25e9)?",
+        ]
+    );
+    let bone = Some(v1::BoneLayer { thickness: Some(4.0) });
+    assert_eq!(
+        refusal(|m| m.layers = Some(v1::Layers { bone, ..v1::Layers::default() })),
+        ["layers.bone.thickness: is 4.0; values are in m: did you mean 4 mm (4e-3)?"]
+    );
+    let center_frequency = Some(1.0);
+    assert_eq!(
+        refusal(|m| m.probe = Some(v1::Probe { center_frequency, ..v1::Probe::default() })),
+        ["probe.center_frequency: is 1.0; values are in Hz: did you mean 1 MHz (1e6)?"]
+    );
+}
+
+#[test]
+fn data_out_of_reach_are_refused() {
+    assert_eq!(
+        refusal(|m| moments(m, 1100.0, 0.027)),
+        [
+            "data.mean: is 1100.0; the bounds of [parameters] allow mean velocities of about 2400 m/s and \
+          more: check the units of data and parameters, or widen the bounds"
+        ]
+    );
+    assert_eq!(
+        refusal(|m| moments(m, 3906.0, 0.6)),
+        [
+            "data.coefficient_of_variation: is 0.6; the bounds of parameters.dispersion allow coefficients \
+          of variation of about 0.0053 to 0.092: check the data, or widen the bounds"
+        ]
+    );
+    let mut reachable = message();
+    moments(&mut reachable, 3900.0, 0.12);
+    assert!(from_message(&reachable).is_ok(), "the nearest point is a result, too");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use osteon_common::job::{JobKind, JobSpecification, Objective, Range};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results_json;
+use osteon_common::{results_json, visible};
 use serde_json::Value;
 
 use super::layout::{aligned, glued, wrapped};
@@ -15,7 +15,7 @@ use crate::verdict;
 /// The table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
     let Ok(value) = serde_json::from_str::<Value>(shown.json) else {
-        return format!("the stored result is not valid JSON:\n{}\n", shown.json);
+        return format!("the stored result is not valid JSON:\n{}\n", visible::lines(shown.json));
     };
     let mut text = String::new();
     match shown.kind {
@@ -27,10 +27,10 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
         text.push_str(&format!("\n{}", wrapped(&solver)));
     }
     if let Some(digest) = value["digest"].as_str() {
-        text.push_str(&format!("\ndigest {digest}\n"));
+        text.push_str(&format!("\ndigest {}\n", visible::line(digest)));
     }
     if let Some(directory) = shown.directory {
-        text.push_str(&wrapped(&format!("files in {}", directory.display())));
+        text.push_str(&wrapped(&format!("files in {}", visible::path(directory))));
     }
     text
 }
@@ -95,7 +95,7 @@ fn headline(value: &Value, specification: &JobSpecification) -> String {
     // A case file may follow the first line of a reason; it must stay as it is.
     let (first, rest) = reason.split_once('\n').unwrap_or((&reason, ""));
     let first = wrapped(&format!("{headline}: {first}"));
-    if rest.is_empty() { first } else { format!("{first}{}\n", rest.trim_end()) }
+    if rest.is_empty() { first } else { format!("{first}{}\n", visible::lines(rest.trim_end())) }
 }
 
 fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {

@@ -1,5 +1,6 @@
 //! Conditions that the nearest point, and no other, meets.
 
+use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
@@ -29,11 +30,10 @@ fn problem() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Rows)> {
     })
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+properties! {
+    #![cases(2000)]
 
     /// A convex set's nearest point x: no way to another of its points y begins towards the start.
-    #[test]
     fn of_the_solutions_it_is_the_nearest((start, other, rows) in problem()) {
         let right = [0, 1].map(|i| dot(&rows[i], &other));
         let at = nearest(&start, &rows, right);
@@ -49,7 +49,6 @@ proptest! {
     /// Least squares over the box: their gradient points out of the box, or nowhere. The multipliers
     /// are as large as what is missed over SOFTNESS, up to 1e11, and so rounding moves what is
     /// inside the box by 1e-5.
-    #[test]
     fn without_a_solution_it_is_the_least_squares(
         (start, _, rows) in problem(),
         right in prop::array::uniform2(-6.0..6.0_f64),

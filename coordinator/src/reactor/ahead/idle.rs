@@ -169,7 +169,7 @@ fn spare(state: &State, worker: &Worker) -> u64 {
     };
     let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
     let failing = state.is_failing(worker.name.host());
-    if worker.draining || full || failing || worker.in_flight.iter().any(taken) {
+    if !state.is_sound(worker) || full || failing || worker.in_flight.iter().any(taken) {
         return 0;
     }
     u64::from(worker.hello.threads).saturating_sub(realizations_held(state, worker))

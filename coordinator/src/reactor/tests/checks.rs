@@ -15,7 +15,7 @@ fn rig(realizations: u64, workers: u32) -> Rig {
 }
 
 /// An answer of one realization that is `off` the right one.
-fn wrong(worker: u64, batch: u64, index: u64, off: Solved) -> Event {
+pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: Solved) -> Event {
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
     let outcome = Ok(f64::from_bits(right.to_bits() + off_by as u64));
@@ -23,7 +23,7 @@ fn wrong(worker: u64, batch: u64, index: u64, off: Solved) -> Event {
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s: 0.1 }
 }
 
-const ONE_BIT: Solved = Solved { outcome: Ok(1.0), estimated_error: 0.0 };
+pub(super) const ONE_BIT: Solved = Solved { outcome: Ok(1.0), estimated_error: 0.0 };
 
 #[test]
 fn an_audited_batch_is_computed_by_another_worker() {

@@ -2,9 +2,8 @@
 //! them: a typed refusal or a record, never a panic, within a bound of processor time. What is read
 //! is put and read again, alike.
 
-use osteon_fuzz::{bounded, bytes, config, damaged};
+use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
 use osteon_proto::results;
-use proptest::test_runner::{Config, TestRunner};
 
 use super::summary::summary_checksum;
 use super::tests::{end, evaluation, job, summary};
@@ -88,41 +87,44 @@ fn check_history(store: &mut SqliteStore, damage: &[u8]) {
 }
 
 /// Every seed as it is, then many damaged ones.
-fn run(seeds: Vec<Vec<u8>>, mut check: impl FnMut(&mut SqliteStore, &[u8])) {
+fn run(seeds: Vec<Vec<u8>>, mut check_one: impl FnMut(&mut SqliteStore, &[u8])) {
     let directory = tempfile::tempdir().unwrap();
     let store = std::cell::RefCell::new(store(directory.path()));
     for seed in &seeds {
-        check(&mut store.borrow_mut(), seed);
+        check_one(&mut store.borrow_mut(), seed);
     }
-    let check = std::cell::RefCell::new(check);
-    let config = Config { source_file: Some(file!()), ..config() };
-    let tested = TestRunner::new(config).run(&damaged(seeds), |damage| {
-        (check.borrow_mut())(&mut store.borrow_mut(), &damage);
+    let check_one = std::cell::RefCell::new(check_one);
+    check(&here!(), CASES, damaged(seeds), |damage| {
+        (check_one.borrow_mut())(&mut store.borrow_mut(), &damage);
         Ok(())
     });
-    tested.unwrap();
 }
 
-#[test]
-fn damaged_evaluations_are_refused_or_read() {
-    for column in 0..COLUMNS.len() {
-        run(bytes("store"), |store, damage| check_evaluation(store, column, damage));
+/// A name by which `cargo xtask random` finds them.
+mod on_random_cases {
+    use super::*;
+
+    #[test]
+    fn damaged_evaluations_are_refused_or_read() {
+        for column in 0..COLUMNS.len() {
+            run(bytes("store"), |store, damage| check_evaluation(store, column, damage));
+        }
     }
-}
 
-#[test]
-fn damaged_specifications_are_refused_or_read() {
-    let mut seeds = bytes("store");
-    let records = [1, 2].map(job);
-    let encoded = |record: &JobRecord| specification::to_message(&record.specification);
-    seeds.extend(records.iter().map(|record| encoded(record).encode_to_vec()));
-    run(seeds, check_specification);
-}
+    #[test]
+    fn damaged_specifications_are_refused_or_read() {
+        let mut seeds = bytes("store");
+        let records = [1, 2].map(job);
+        let encoded = |record: &JobRecord| specification::to_message(&record.specification);
+        seeds.extend(records.iter().map(|record| encoded(record).encode_to_vec()));
+        run(seeds, check_specification);
+    }
 
-#[test]
-fn damaged_histories_are_refused_or_read() {
-    let mut seeds = bytes("store");
-    let rows = summary(1).history.iter().map(results::evaluation_to_message).collect();
-    seeds.push(v1::HistoryBlock { rows, groups: Vec::new() }.encode_to_vec());
-    run(seeds, check_history);
+    #[test]
+    fn damaged_histories_are_refused_or_read() {
+        let mut seeds = bytes("store");
+        let rows = summary(1).history.iter().map(results::evaluation_to_message).collect();
+        seeds.push(v1::HistoryBlock { rows, groups: Vec::new() }.encode_to_vec());
+        run(seeds, check_history);
+    }
 }

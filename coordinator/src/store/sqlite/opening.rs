@@ -7,6 +7,8 @@ use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use osteon_common::user_file;
+use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
 use super::schema::{FROM_FORMAT_2, FROM_FORMAT_3, FROM_FORMAT_4, SCHEMA};
@@ -25,9 +27,12 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest text of a lock that is shown, bytes.
 const HOLDER_BYTES_MAX: u64 = 256;
 
+/// While this is set a connection leaves the log as it is when it ends.
+const NO_CHECKPOINT_AT_END: DbConfig = DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE;
+
 /// Mode of a new directory, and of a new file: measurements are nobody else's business.
 const DIRECTORY_MODE: u32 = 0o700;
-const FILE_MODE: u32 = 0o600;
+pub(super) const FILE_MODE: u32 = 0o600;
 /// The bits of a mode that concern others than the owner.
 const OTHERS: u32 = 0o077;
 
@@ -107,12 +112,19 @@ pub(super) fn open_file(path: &Path, journal: Journal) -> Result<Connection, Sto
     let refused = |source| refusal(path, source);
     let mut connection = Connection::open(path).map_err(refused)?;
     connection.busy_timeout(BUSY_TIMEOUT).map_err(refused)?;
+    // What is refused stays as it is: of a log that is cut, too, somebody may want to see the rest.
+    connection.set_db_config(NO_CHECKPOINT_AT_END, true).map_err(refused)?;
     // Before all else: then the write-ahead log needs no memory shared with others.
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
     check_format(&connection, path)?;
     check_pages(&connection, path)?;
     prepare(&mut connection, journal).map_err(refused)?;
     Ok(connection)
+}
+
+/// From now on the file is complete, and the log gone, when the connection ends.
+pub(super) fn checkpoint_at_end(connection: &Connection) -> rusqlite::Result<()> {
+    connection.set_db_config(NO_CHECKPOINT_AT_END, false).map(drop)
 }
 
 /// Refuses what this program did not write, or cannot bring up to date.
@@ -194,7 +206,7 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     let failed = |error| unmade(&path, error, |path, error| StoreError::Lock { path, error });
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
-    let mut file = options.open(&path).map_err(failed)?;
+    let mut file = user_file::open_with(&mut options, &path).map_err(failed)?;
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {

@@ -8,6 +8,7 @@ use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, GroupEnding, Role, Status};
 
+use super::acknowledged::Found;
 use super::columns::checksum;
 use super::opening::{FILE, FORMAT, Journal, open_file};
 use super::*;
@@ -321,7 +322,8 @@ fn with_a_rollback_journal_everything_is_the_same() {
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
-    let mut store = SqliteStore { connection, path, lock };
+    let mark = Mark::open(directory.path(), &Found::Nothing, 0).unwrap();
+    let mut store = SqliteStore { connection, path, lock, mark };
     store.put_evaluation(&evaluation(1, 0), true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);

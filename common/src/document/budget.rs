@@ -1,0 +1,71 @@
+//! How much a document may hold: a tree takes many times the memory of the text it is made of.
+
+use std::fmt;
+
+use crate::limits::{DOCUMENT_KEYS_MAX, DOCUMENT_VALUES_MAX, TOML_TOKENS_MAX};
+
+/// What there is too much of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Excess {
+    /// Brackets that are open.
+    Nesting,
+    /// Values.
+    Values,
+    /// Keys, tables and lists.
+    Keys,
+    /// Words, marks, spaces, comments and line ends.
+    Tokens,
+}
+
+impl fmt::Display for Excess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const NEEDED: &str = "more than any job needs";
+        match self {
+            Self::Nesting => f.write_str("too many brackets are open here"),
+            Self::Values => {
+                write!(f, "here begins the value after {DOCUMENT_VALUES_MAX} others, {NEEDED}")
+            }
+            Self::Keys => write!(
+                f,
+                "here begins the key, table or list after {DOCUMENT_KEYS_MAX} others, {NEEDED}"
+            ),
+            Self::Tokens => write!(
+                f,
+                "before here are {TOML_TOKENS_MAX} words, marks, spaces, comments and line ends, \
+                 {NEEDED}; data.velocities may name a CSV file"
+            ),
+        }
+    }
+}
+
+/// What of it is left.
+#[derive(Debug)]
+pub(super) struct Budget {
+    values: usize,
+    keys: usize,
+}
+
+impl Budget {
+    /// Nothing used.
+    pub(super) fn new() -> Self {
+        Self { values: DOCUMENT_VALUES_MAX, keys: DOCUMENT_KEYS_MAX }
+    }
+
+    /// One more value.
+    ///
+    /// # Errors
+    /// When it is one too many.
+    pub(super) fn value(&mut self) -> Result<(), Excess> {
+        self.values = self.values.checked_sub(1).ok_or(Excess::Values)?;
+        Ok(())
+    }
+
+    /// So many more keys, tables or lists.
+    ///
+    /// # Errors
+    /// When they are too many.
+    pub(super) fn keys(&mut self, count: usize) -> Result<(), Excess> {
+        self.keys = self.keys.checked_sub(count).ok_or(Excess::Keys)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,283 @@
+//! What a number in a file can mean: the range in which a physical value lies, and the units that
+//! people write in place of the one that is asked for.
+//!
+//! A number that no bone and no probe has is refused where one of those units explains it; one
+//! that is only unusual is computed with, after a [warning](Warning).
+
+mod warnings;
+
+use crate::accepted::Interval;
+use crate::parameters::Parameter;
+
+pub(crate) use self::warnings::job_warnings_from;
+pub use self::warnings::{Warning, case_warnings, job_warnings};
+
+/// A unit in place of the one that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct OtherUnit {
+    /// As printed after a number.
+    name: &'static str,
+    /// It is 10 to this power of the unit that is asked for.
+    exponent: i32,
+}
+
+/// What is known beforehand about one kind of number. All of it is about values above 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Quantity {
+    /// The unit that is asked for; empty for pure numbers.
+    pub(crate) unit: &'static str,
+    /// Of several units that explain a number, the one counts that brings it nearest to this.
+    typical: f64,
+    /// What is outside (from, to) is worth a warning.
+    usual: (f64, f64),
+    /// What is below the first or not below the second is refused if another unit explains it. At least
+    /// ten times beyond whatever can be meant.
+    possible: (f64, f64),
+    /// Units that explain numbers outside.
+    units: &'static [OtherUnit],
+}
+
+/// How far beyond the usual range a number may lie that another unit explains.
+const EXPLAINED: f64 = 10.0;
+
+const fn other(name: &'static str, exponent: i32) -> OtherUnit {
+    OtherUnit { name, exponent }
+}
+
+const LENGTHS: &[OtherUnit] = &[other("mm", -3), other("µm", -6)];
+const SPEEDS: &[OtherUnit] = &[other("km/s", 3), other("mm/s", -3)];
+const PER_CENT: &[OtherUnit] = &[other("%", -2)];
+const DENSITIES: &[OtherUnit] = &[other("g/cm³", 3)];
+
+/// A measured velocity of the first arriving signal.
+pub(crate) const VELOCITY: Quantity = Quantity {
+    unit: "m/s",
+    typical: 4000.0,
+    usual: (1000.0, 8000.0),
+    possible: (100.0, 20_000.0),
+    units: SPEEDS,
+};
+/// The coefficient of variation of measured velocities.
+pub(crate) const VARIATION: Quantity =
+    Quantity { unit: "", typical: 0.03, usual: (1e-4, 0.5), possible: (0.0, 1.0), units: PER_CENT };
+/// Thickness of the bone.
+pub(crate) const BONE_THICKNESS: Quantity = Quantity {
+    unit: "m",
+    typical: 4e-3,
+    usual: (0.2e-3, 30e-3),
+    possible: (0.0, 1.0),
+    units: LENGTHS,
+};
+/// Thickness of a fluid. One that is far too thick has no echo and does no harm.
+pub(crate) const FLUID_THICKNESS: Quantity = Quantity {
+    unit: "m",
+    typical: 10e-3,
+    usual: (0.0, 0.3),
+    possible: (0.0, f64::INFINITY),
+    units: LENGTHS,
+};
+/// Density of a fluid; next to nothing stands for a vacuum.
+pub(crate) const FLUID_DENSITY: Quantity = Quantity {
+    unit: "kg/m³",
+    typical: 1000.0,
+    usual: (100.0, 15_000.0),
+    possible: (0.0, f64::INFINITY),
+    units: DENSITIES,
+};
+/// Speed of sound in a fluid.
+pub(crate) const SOUND_SPEED: Quantity = Quantity {
+    unit: "m/s",
+    typical: 1500.0,
+    usual: (300.0, 3500.0),
+    possible: (10.0, 1e5),
+    units: SPEEDS,
+};
+/// Centre frequency of the pulse.
+pub(crate) const FREQUENCY: Quantity = Quantity {
+    unit: "Hz",
+    typical: 1e6,
+    usual: (20e3, 20e6),
+    possible: (2e3, f64::INFINITY),
+    units: &[other("MHz", 6), other("kHz", 3)],
+};
+/// Height of source or receivers above the bone.
+pub(crate) const HEIGHT: Quantity = Quantity {
+    unit: "m",
+    typical: 2e-3,
+    usual: (0.0, 50e-3),
+    possible: (0.0, 1.0),
+    units: &[other("mm", -3)],
+};
+/// Distance of the first receiver from the source, along the bone.
+pub(crate) const DISTANCE: Quantity = Quantity {
+    unit: "m",
+    typical: 15e-3,
+    usual: (1e-3, 0.5),
+    possible: (0.0, 3.0),
+    units: LENGTHS,
+};
+/// Distance of neighbouring receivers.
+pub(crate) const PITCH: Quantity = Quantity {
+    unit: "m",
+    typical: 1e-3,
+    usual: (50e-6, 20e-3),
+    possible: (0.0, 0.1),
+    units: LENGTHS,
+};
+/// Size of the hybrid method's elements.
+pub(crate) const ELEMENT_SIZE: Quantity = Quantity {
+    unit: "m",
+    typical: 0.5e-3,
+    usual: (0.0, 10e-3),
+    possible: (0.0, 0.1),
+    units: LENGTHS,
+};
+/// Time step of the hybrid method. One that is far too long fails at once.
+pub(crate) const TIME_STEP: Quantity = Quantity {
+    unit: "s",
+    typical: 1e-8,
+    usual: (1e-12, 1e-6),
+    possible: (0.0, f64::INFINITY),
+    units: &[other("ns", -9), other("µs", -6)],
+};
+const DENSITY: Quantity = Quantity {
+    unit: "kg/m³",
+    typical: 1800.0,
+    usual: (300.0, 6000.0),
+    possible: (10.0, f64::INFINITY),
+    units: DENSITIES,
+};
+/// Young and shear moduli.
+pub(crate) const MODULUS: Quantity = Quantity {
+    unit: "Pa",
+    typical: 10e9,
+    usual: (100e6, 1e12),
+    possible: (1e6, f64::INFINITY),
+    units: &[other("GPa", 9), other("MPa", 6)],
+};
+const POISSON_RATIO: Quantity =
+    Quantity { unit: "", typical: 0.35, usual: (-0.5, 1.0), possible: (0.0, 5.0), units: PER_CENT };
+const DISPERSION: Quantity =
+    Quantity { unit: "", typical: 0.1, usual: (2e-3, 0.7), possible: (0.0, 1.0), units: PER_CENT };
+
+impl Quantity {
+    /// What a parameter of the mean model, or the dispersion, is.
+    pub(crate) fn of(parameter: Parameter) -> Self {
+        match parameter {
+            Parameter::Density => DENSITY,
+            Parameter::LongitudinalYoungModulus
+            | Parameter::LongitudinalShearModulus
+            | Parameter::TransverseYoungModulus => MODULUS,
+            Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
+                POISSON_RATIO
+            }
+            Parameter::Dispersion => DISPERSION,
+        }
+    }
+
+    /// Whether no bone and no probe has such a value.
+    pub(crate) fn is_impossible(&self, value: f64) -> bool {
+        let (from, to) = self.possible;
+        !(from..to).contains(&value)
+    }
+
+    /// The unit that is asked for, in words.
+    pub(crate) fn asked_for(&self) -> String {
+        match self.unit {
+            "" => "values are pure numbers".to_owned(),
+            unit => format!("values are in {unit}"),
+        }
+    }
+
+    /// From which value on, and below which, anything can be.
+    pub(crate) fn possible(&self) -> (f64, f64) {
+        self.possible
+    }
+
+    /// The question whether impossible `values` of one field are in another unit; `None` if one of them
+    /// is possible, or no unit explains them all.
+    ///
+    /// `accepted` is what the field accepts besides.
+    pub(crate) fn question(&self, values: &[f64], accepted: Interval) -> Option<String> {
+        let impossible = |&value: &f64| value > 0.0 && self.is_impossible(value);
+        let (from, to) = self.usual;
+        let meant = |si: f64| {
+            (from / EXPLAINED..=to * EXPLAINED).contains(&si)
+                && !self.is_impossible(si)
+                && accepted.contains(si)
+        };
+        if !values.iter().all(impossible) {
+            return None;
+        }
+        self.asked(values, meant)
+    }
+
+    /// What is unusual about a value that can be computed with.
+    pub(crate) fn doubt(&self, value: f64) -> Option<String> {
+        let (from, to) = self.usual;
+        if (from..=to).contains(&value) || value.is_nan() {
+            return None;
+        }
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        let usual = if from > 0.0 || value < from {
+            format!("{} to {}{unit}", short(from), short(to))
+        } else {
+            format!("up to {}{unit}", short(to))
+        };
+        let meant = |si: f64| (from..=to).contains(&si);
+        let asked = Some(value).filter(|&value| value > 0.0);
+        let asked = asked.and_then(|value| self.asked(&[value], meant));
+        let question = asked.map(|question| format!("; {question}")).unwrap_or_default();
+        Some(format!("is {}{unit}; usual is {usual}{question}", short(value)))
+    }
+
+    /// The question whether `values` are in the unit that brings all of them to what is `meant`.
+    fn asked(&self, values: &[f64], meant: impl Fn(f64) -> bool) -> Option<String> {
+        let explains = |unit: &&OtherUnit| values.iter().all(|&value| meant(unit.si(value)));
+        let distance = |unit: &OtherUnit| {
+            let first = values.first().map_or(f64::NAN, |&value| unit.si(value));
+            libm::log(first / self.typical).abs()
+        };
+        let unit = self
+            .units
+            .iter()
+            .filter(explains)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let listed = |written: &dyn Fn(f64) -> String| {
+            values.iter().map(|&value| written(value)).collect::<Vec<_>>().join(" and ")
+        };
+        let here = listed(&|value| value.to_string());
+        let si = listed(&|value| unit.written(value));
+        Some(format!("did you mean {here} {} ({si})?", unit.name))
+    }
+}
+
+impl OtherUnit {
+    /// `value` of this unit, in the unit that is asked for, correctly rounded.
+    fn si(self, value: f64) -> f64 {
+        // A number with an exponent always parses.
+        format!("{value}e{}", self.exponent).parse().unwrap_or(f64::NAN)
+    }
+
+    /// The same as it may be typed.
+    fn written(self, value: f64) -> String {
+        if self.exponent == -2 {
+            short(self.si(value))
+        } else {
+            format!("{value}e{}", self.exponent)
+        }
+    }
+}
+
+/// A number of a sentence, with four digits.
+pub(crate) fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    let magnitude = rounded.abs();
+    if magnitude != 0.0 && magnitude.is_finite() && !(1e-4..1e7).contains(&magnitude) {
+        return format!("{rounded:e}");
+    }
+    rounded.to_string()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! What is worth a warning before anything is computed.
+
+use std::fmt;
+
+use crate::case::{Case, Setup};
+use crate::document::entry_path;
+use crate::job::{Data, JobSpecification, Range};
+use crate::layers::Fluid;
+use crate::parameters::Parameter;
+use crate::quantile::quantile;
+use crate::settings::Method;
+use crate::velocities::Origin;
+
+use super::{Quantity, short};
+
+/// A velocity farther from the median than this factor is no scatter.
+const OUTLIER: f64 = 3.0;
+/// Most such velocities that are listed of one set.
+const OUTLIERS_LISTED_MAX: usize = 5;
+/// Most groups that are warned of one by one.
+const GROUPS_LISTED_MAX: usize = 5;
+
+/// Something unusual that can be computed with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// Path of the field in the user's file.
+    pub field: String,
+    /// What was found, what is usual, and what may be meant.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.field, self.message)
+    }
+}
+
+/// What is unusual about a case that has passed its checks.
+pub fn case_warnings(case: &Case) -> Vec<Warning> {
+    let mut warnings = Warnings::default();
+    warnings.setup(&case.setup);
+    warnings.number("bone.density", case.bone.density, &super::DENSITY);
+    let diagonal = (0..6).map(|i| case.bone.elasticity.rows()[i][i]);
+    let largest = diagonal.fold(0.0, f64::max);
+    if let Some(doubt) = super::MODULUS.doubt(largest) {
+        warnings.add("bone", format!("the largest stiffness {doubt}"));
+    }
+    warnings.0
+}
+
+/// What is unusual about a job that has passed its checks.
+pub fn job_warnings(specification: &JobSpecification) -> Vec<Warning> {
+    job_warnings_from(specification, None)
+}
+
+/// The same of a job whose measured velocities stand in the file `origin`.
+pub(crate) fn job_warnings_from(
+    specification: &JobSpecification,
+    origin: Option<&Origin>,
+) -> Vec<Warning> {
+    let mut warnings = Warnings::default();
+    warnings.setup(&specification.setup);
+    for parameter in Parameter::ALL {
+        warnings.parameter(parameter, specification.range(parameter));
+    }
+    if let Some(data) = &specification.data {
+        warnings.data(data, origin);
+    }
+    warnings.0
+}
+
+#[derive(Debug, Default)]
+struct Warnings(Vec<Warning>);
+
+impl Warnings {
+    fn add(&mut self, field: &str, message: impl Into<String>) {
+        self.0.push(Warning { field: field.to_owned(), message: message.into() });
+    }
+
+    fn number(&mut self, field: &str, value: f64, kind: &Quantity) {
+        if let Some(doubt) = kind.doubt(value) {
+            self.add(field, doubt);
+        }
+    }
+
+    fn setup(&mut self, setup: &Setup) {
+        let (layers, probe, solver) = (&setup.layers, &setup.probe, &setup.solver);
+        self.fluid("layers.coupling", &layers.coupling);
+        self.number("layers.bone.thickness", layers.bone_thickness, &super::BONE_THICKNESS);
+        self.fluid("layers.marrow", &layers.marrow);
+        self.number("probe.center_frequency", probe.center_frequency, &super::FREQUENCY);
+        self.number("probe.source.x3", probe.source.x3, &super::HEIGHT);
+        self.number("probe.receivers.x3", probe.receivers.x3, &super::HEIGHT);
+        let distance = (probe.receivers.first_x1 - probe.source.x1).abs();
+        if let Some(doubt) = super::DISTANCE.doubt(distance) {
+            self.add("probe.receivers.first_x1", format!("its distance from the source {doubt}"));
+        }
+        self.number("probe.receivers.pitch", probe.receivers.pitch, &super::PITCH);
+        if let (Method::Hybrid, Some(time_step)) = (solver.method, solver.time_step) {
+            self.number("solver.time_step", time_step, &super::TIME_STEP);
+        }
+    }
+
+    fn fluid(&mut self, path: &str, fluid: &Fluid) {
+        self.number(&format!("{path}.thickness"), fluid.thickness, &super::FLUID_THICKNESS);
+        self.number(&format!("{path}.density"), fluid.density, &super::FLUID_DENSITY);
+        self.number(&format!("{path}.sound_speed"), fluid.sound_speed, &super::SOUND_SPEED);
+    }
+
+    /// Bounds may be as wide as they like; what is fixed, or begun with, is meant.
+    fn parameter(&mut self, parameter: Parameter, range: Range) {
+        let key = match range {
+            Range::Fixed(_) => "fixed",
+            Range::Free { .. } => "start",
+        };
+        let field = format!("parameters.{}.{key}", parameter.name());
+        self.number(&field, range.start(), &Quantity::of(parameter));
+    }
+
+    fn data(&mut self, data: &Data, origin: Option<&Origin>) {
+        match data {
+            Data::Moments { mean, coefficient_of_variation } => {
+                self.number("data.mean", *mean, &super::VELOCITY);
+                let variation = *coefficient_of_variation;
+                self.number("data.coefficient_of_variation", variation, &super::VARIATION);
+            }
+            Data::Velocities(velocities) => {
+                self.velocities("data.velocities", velocities, (origin, 0));
+            }
+            Data::Groups(groups) => {
+                let mut warned = 0;
+                for (set, group) in groups.iter().enumerate() {
+                    let mut of_group = Self::default();
+                    let field = entry_path("data.groups", &group.name);
+                    of_group.velocities(&field, &group.velocities, (origin, set));
+                    warned += usize::from(!of_group.0.is_empty());
+                    if warned <= GROUPS_LISTED_MAX {
+                        self.0.append(&mut of_group.0);
+                    }
+                }
+                let more = warned.saturating_sub(GROUPS_LISTED_MAX);
+                if more > 0 {
+                    self.add("data.groups", format!("{more} more groups are unusual"));
+                }
+            }
+        }
+    }
+
+    /// The median and the scatter of a set, and velocities that belong to no scatter.
+    fn velocities(
+        &mut self,
+        field: &str,
+        velocities: &[f64],
+        (origin, set): (Option<&Origin>, usize),
+    ) {
+        let mut ascending = velocities.to_vec();
+        ascending.sort_unstable_by(f64::total_cmp);
+        let Some(median) = quantile(&ascending, 0.5) else { return };
+        if let Some(doubt) = super::VELOCITY.doubt(median) {
+            self.add(field, format!("their median {doubt}"));
+        }
+        let outside = |velocity: f64| velocity > OUTLIER * median || velocity < median / OUTLIER;
+        let outliers: Vec<(usize, f64)> = velocities
+            .iter()
+            .copied()
+            .enumerate()
+            .filter(|&(_, velocity)| outside(velocity))
+            .collect();
+        if outliers.is_empty() {
+            return;
+        }
+        let listed: Vec<String> = outliers
+            .iter()
+            .take(OUTLIERS_LISTED_MAX)
+            .map(|&(index, velocity)| match origin.and_then(|origin| origin.line(set, index)) {
+                Some(line) => format!("{} (line {line})", short(velocity)),
+                None => format!("{} (number {})", short(velocity), index + 1),
+            })
+            .collect();
+        let more = match outliers.len() - listed.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let file = origin.map(|origin| format!("{}: ", origin.path().display()));
+        self.add(
+            field,
+            format!(
+                "{}{}{more} m/s: more than a factor {OUTLIER} from the median {} m/s; in other units, \
+                 or a slip of the decimal point?",
+                file.unwrap_or_default(),
+                listed.join(", "),
+                short(median)
+            ),
+        );
+    }
+}

@@ -1,0 +1,337 @@
+//! Batches that are out much longer than they should be, whatever they are computed for, and the
+//! workers that hold them.
+//!
+//! A worker may give signs of life and never answer. So what is overdue is given to another worker
+//! too, and the first answer counts; if that one is overdue in its turn, to one more. Each waits
+//! twice as long as the one before, so that realizations that are slow everywhere are computed a
+//! few times at most. Where other work waits, a job has one such copy out at a time: its answer
+//! shows how long the others should take.
+//!
+//! Who misses batches in a row is on probation until it answers one (`probation.rs`).
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use super::suspects::{self, Standing};
+use super::{Effects, ahead, batches, copies, dispatch};
+use crate::dispute::Dispute;
+use crate::evaluation::Evaluation;
+use crate::fairness;
+use crate::ids::{BatchId, JobId, WorkerId};
+use crate::losses::Losses;
+use crate::state::{Assignment, Batch, Purpose, State, Worker};
+use crate::worker_name::WorkerName;
+
+/// No batch is overdue before. A worker, a network or a machine may falter for a second or two
+/// without anything being wrong.
+const OVERDUE_MIN: Duration = Duration::from_secs(3);
+/// Nor before it has taken so many times as long as it should: a machine may have other things to
+/// do, and one point may take some times as long as another.
+const OVERDUE_FACTOR: u32 = 4;
+/// Batches with the same indices at a time. The last of so many would be sent after six minutes at the
+/// soonest.
+pub(crate) const COPIES_MAX: usize = 8;
+/// Copies that are sent on one event; the others follow on the next.
+const SENT_AT_ONCE_MAX: usize = 64;
+/// So many batches in a row that others answered, over [`OVERDUE_MIN`] at least, put a worker on
+/// probation. It holds two at a time, so one moment of standing still is not enough.
+const MISSED_MAX: u32 = 3;
+/// A worker that holds something overdue for so long is on probation too: there may be nobody else
+/// to answer it.
+const SILENT_MAX: Duration = Duration::from_secs(60);
+
+/// Looks for batches that are overdue.
+pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
+    state.probation.forget(now);
+    let late = state.batches.keys().filter(|id| is_overdue(state, **id, now));
+    let late: Vec<BatchId> = late.copied().collect();
+    for id in &late {
+        accuse(state, *id, now);
+    }
+    let waits = |id: &BatchId| {
+        state.batches.get(id).is_some_and(|batch| {
+            let newest = batch.twins.iter().all(|twin| twin < id);
+            newest && !batch.ahead && batch.twins.len() + 1 < COPIES_MAX
+        })
+    };
+    state.overdue = late.into_iter().filter(waits).collect();
+    for id in Vec::from_iter(state.overdue.iter().copied()) {
+        give_up_audit(state, id, now, effects);
+    }
+}
+
+/// Whether a batch should have been answered long ago.
+fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
+    state.batches.get(&id).is_some_and(|batch| {
+        let waited = now.saturating_sub(batch.begun);
+        let factor = 2_u32.saturating_pow(batch.retries);
+        // Most are young; of the others it is found out how long they should take.
+        waited >= OVERDUE_MIN * factor
+            && waited >= expected(state, id).unwrap_or_default() * OVERDUE_FACTOR * factor
+    })
+}
+
+/// Whether the answer to a batch may be hoped for: it is not overdue, or its worker is not known for
+/// not answering.
+pub(super) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
+    let worker = state.batches.get(&id).and_then(|batch| state.workers.get(&batch.worker));
+    worker.is_some_and(|worker| !state.probation.has(&worker.name) || !is_overdue(state, id, now))
+}
+
+/// Time that a batch should take with what its worker was sent before it, by the rate of the worker
+/// and by the pace of the job, whichever is slower; `None` if nothing is known of the job.
+fn expected(state: &State, id: BatchId) -> Option<Duration> {
+    let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
+    let alone = |id: &BatchId| {
+        let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
+        let pace = state.jobs.get(&job)?.pace.expected(indices.count, worker.hello.threads);
+        let rate = worker.rates.get(&job);
+        pace.max(rate.map(|rate| fairness::thread_time(indices.count as f64 / rate, 1)))
+    };
+    let before = worker.in_flight.iter().filter(|held| **held < id);
+    let before: Duration = before.filter_map(alone).sum();
+    Some(before + alone(&id)?)
+}
+
+/// Puts a worker on probation that holds something overdue for too long.
+fn accuse(state: &mut State, id: BatchId, now: Duration) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    // While nobody has answered anything, it may be that it takes so long.
+    let long = now.saturating_sub(batch.begun) >= SILENT_MAX && expected(state, id).is_some();
+    if let Some(worker) =
+        state.workers.get(&batch.worker).filter(|worker| long && state.is_sound(worker))
+    {
+        let name = worker.name.clone();
+        begin_probation(state, &name, now, now);
+    }
+}
+
+/// Takes back an audit that is overdue when nobody else is there for it: an answer that nobody
+/// checks is believed.
+fn give_up_audit(state: &mut State, id: BatchId, now: Duration, effects: &mut Effects) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    let audit = matches!(batch.purpose, Purpose::Audit { .. });
+    if !audit || state.answers_batches(|name| may_have(state, id, name)) {
+        return;
+    }
+    let mut given_up = batch.twins.clone();
+    given_up.push(id);
+    for id in given_up {
+        missed(state, id, now);
+        batches::revoke(state, id, now, effects);
+    }
+}
+
+/// Has other workers compute what is overdue, before anything else is handed out. Adds those to
+/// `kept` that must not be refilled, so that they hold nothing soon.
+pub(super) fn hand_out(
+    state: &mut State,
+    kept: &mut BTreeSet<WorkerId>,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    if state.overdue.is_empty() {
+        return;
+    }
+    let busy = dispatch::work_waits(state);
+    let mut free = dispatch::free_workers(state, kept);
+    let mut sent = 0;
+    for id in Vec::from_iter(state.overdue.iter().copied()) {
+        let Some((job, alone)) = state.batches.get(&id).map(|it| (it.assignment.job, it.exclusive))
+        else {
+            continue;
+        };
+        // Since time was looked at last it may have become known that the job is slow.
+        if sent >= SENT_AT_ONCE_MAX
+            || (free.is_empty() && !alone)
+            || !is_overdue(state, id, now)
+            || (busy && has_scout(state, job, now))
+        {
+            continue;
+        }
+        let Some(taker) = (if alone { taker_alone(state, id) } else { taker(state, id, &free) })
+        else {
+            continue;
+        };
+        if alone && holds_anything(state, taker) {
+            kept.insert(taker);
+        } else {
+            send(state, id, taker, now, effects);
+            free.retain(|free| *free != taker);
+            sent += 1;
+        }
+    }
+}
+
+/// Whether a job has a copy of an overdue batch out that is not overdue itself.
+fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
+    let scout = state.jobs.get(&job).and_then(|job| job.scout);
+    scout.is_some_and(|scout| state.batches.contains_key(&scout) && !is_overdue(state, scout, now))
+}
+
+fn holds_anything(state: &State, worker: WorkerId) -> bool {
+    state.workers.get(&worker).is_none_or(|worker| dispatch::held(state, worker) > 0)
+}
+
+/// The one of these workers that is to have a copy of a batch.
+fn taker(state: &State, id: BatchId, free: &[WorkerId]) -> Option<WorkerId> {
+    let rank = |(worker, taker): &(&Worker, WorkerId)| {
+        let doubtful = worker.missed.count > 0 || !worker.proven;
+        (doubtful, is_of_holder(state, id, worker), dispatch::held(state, worker), *taker)
+    };
+    let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
+    let fit = free.filter(|(worker, _)| is_fit(state, id, worker));
+    fit.min_by_key(rank).map(|(_, taker)| taker)
+}
+
+/// The worker that is to have a copy of a suspect, be it busy or not.
+fn taker_alone(state: &State, id: BatchId) -> Option<WorkerId> {
+    let batch = state.batches.get(&id)?;
+    let losses = attempt(state, batch)?.suspects.get(&batch.assignment.indices.first);
+    let nobody = Losses::default();
+    let losses = losses.unwrap_or(&nobody);
+    if suspects::enough(state, losses, |_| true) {
+        return None;
+    }
+    let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Standing, bool, usize, WorkerId) {
+        let standing = suspects::standing(state, worker, losses);
+        (standing, is_of_holder(state, id, worker), dispatch::held(state, worker), **taker)
+    };
+    let fit = |worker: &Worker| is_fit(state, id, worker) && !state.is_failing(worker.name.host());
+    let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
+    fit.min_by_key(rank).map(|(taker, _)| *taker)
+}
+
+fn is_fit(state: &State, id: BatchId, worker: &Worker) -> bool {
+    state.is_sound(worker) && may_have(state, id, &worker.name)
+}
+
+/// The names of the workers that hold a batch and its copies.
+fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
+    let twins = state.batches.get(&id).into_iter().flat_map(|batch| &batch.twins).copied();
+    let batches = twins.chain([id]).filter_map(|id| state.batches.get(&id));
+    batches.filter_map(|batch| Some(&state.workers.get(&batch.worker)?.name))
+}
+
+fn is_of_holder(state: &State, id: BatchId, worker: &Worker) -> bool {
+    holders(state, id).any(|holder| holder.host() == worker.name.host())
+}
+
+/// Whether a worker may have a copy of a batch: who holds one may not, nor who is to be checked by
+/// it, nor who has already said what is to be decided.
+fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
+    let Some(batch) = state.batches.get(&id) else {
+        return false;
+    };
+    let Some(evaluation) = attempt(state, batch) else {
+        return false;
+    };
+    let about = |it: &&Dispute| it.judges.contains(&id);
+    let in_question = match batch.purpose {
+        Purpose::Fill => false,
+        Purpose::Audit { .. } => {
+            evaluation.owner(batch.assignment.indices.first).is_none_or(|by| by == *name)
+        }
+        Purpose::Judge => evaluation.disputes.iter().find(about).is_none_or(|it| it.involves(name)),
+    };
+    !in_question && holders(state, id).all(|holder| holder != name)
+}
+
+/// The evaluation that a batch is about, while this attempt at it is under way.
+fn attempt<'a>(state: &'a State, batch: &Batch) -> Option<&'a Evaluation> {
+    let job = state.jobs.get(&batch.assignment.job)?;
+    job.evaluations().find(|found| found.round == batch.assignment.round)
+}
+
+/// Sends a worker a copy of an overdue batch.
+fn send(state: &mut State, id: BatchId, to: WorkerId, now: Duration, effects: &mut Effects) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    let Batch { assignment, purpose, exclusive, retries, worker, .. } = *batch;
+    if exclusive {
+        ahead::give_back(state, to, now, effects);
+    }
+    let Some(copy) = dispatch::send(state, to, assignment, purpose, now, effects) else {
+        return;
+    };
+    tracing::info!(job = %assignment.job, first = assignment.indices.first, overdue = %worker, %to,
+        "a batch is overdue; another worker computes the same");
+    if let Some(batch) = state.batches.get_mut(&copy) {
+        batch.exclusive = exclusive;
+        batch.retries = retries + 1;
+    }
+    copies::join(state, id, copy);
+    if let Some(evaluation) = state.attempt_mut(&assignment) {
+        match purpose {
+            Purpose::Fill => {}
+            Purpose::Audit { .. } => evaluation.audits_out += 1,
+            Purpose::Judge => {
+                for dispute in &mut evaluation.disputes {
+                    if dispute.judges.contains(&id) {
+                        dispute.judges.push(copy);
+                    }
+                }
+            }
+        }
+    }
+    if let Some(job) = state.jobs.get_mut(&assignment.job) {
+        job.scout = Some(copy);
+    }
+}
+
+/// A batch is taken back from its worker because another has answered it, or because nobody waits
+/// for it any longer: that counts, if the worker should have answered it long ago.
+pub(super) fn missed(state: &mut State, id: BatchId, now: Duration) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    let waited = now.saturating_sub(batch.begun);
+    let expected = expected(state, id).unwrap_or_default();
+    if waited < (state.config.batch_target / 2).max(expected * OVERDUE_FACTOR) {
+        return;
+    }
+    let (sent, begun) = (batch.sent, batch.begun);
+    let Some(worker) = state.workers.get_mut(&batch.worker) else {
+        return;
+    };
+    let missed = &mut worker.missed;
+    if missed.count == 0 {
+        missed.since = begun;
+    }
+    missed.count = missed.count.saturating_add(1);
+    let many = missed.count >= MISSED_MAX && now.saturating_sub(missed.since) >= OVERDUE_MIN;
+    let name = worker.name.clone();
+    if many || state.probation.has(&name) {
+        begin_probation(state, &name, sent, now);
+    }
+}
+
+/// Puts a worker on probation that does not answer what it was sent at `sent`, or notes one more
+/// reason for it.
+pub(super) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
+    if state.probation.miss(name, sent, now) {
+        tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
+            holds; until it does it gets one realization at a time");
+    }
+}
+
+/// A worker has answered a batch that it holds.
+pub(super) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
+    let Some(worker) = state.workers.get_mut(&worker) else {
+        return;
+    };
+    worker.missed.count = 0;
+    if state.probation.end(&worker.name) {
+        tracing::info!(worker = %worker.name, "this worker answers again");
+    }
+    for later in worker.in_flight.iter().filter(|held| **held > batch) {
+        if let Some(later) = state.batches.get_mut(later) {
+            later.begun = now;
+        }
+    }
+}

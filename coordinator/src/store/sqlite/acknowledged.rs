@@ -1,0 +1,244 @@
+//! A mark beside the database: the highest job that a client was told is accepted.
+//!
+//! A write-ahead log that is cut short or damaged in its tail is a shorter log to SQLite: what was
+//! behind is gone, and nothing says so. The mark is outside of the log. It is written after a job is
+//! durable and before its client hears of it, so it is never ahead of the database, wherever a
+//! process dies; a database that knows fewer jobs than the mark has lost some.
+//!
+//! The file has two slots in blocks of their own, written in turn, each with a checksum: a write that
+//! was torn leaves the other one. It has its full length from the beginning, so a write is one to a
+//! place that the disk has given already.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
+use std::os::unix::fs::{FileExt as _, OpenOptionsExt as _};
+use std::path::{Path, PathBuf};
+
+use osteon_common::user_file;
+
+use super::opening::FILE_MODE;
+use crate::ids::JobId;
+use crate::store::StoreError;
+
+/// Name of the file in the store's directory.
+pub(super) const MARK: &str = "osteon.acknowledged";
+/// Size of a slot, bytes: no disk or file system writes less than this at once and more than one.
+const SLOT_BYTES: usize = 4096;
+const SLOTS: u64 = 2;
+const LENGTH: u64 = SLOTS * SLOT_BYTES as u64;
+
+/// What to do with a database that knows fewer jobs than were acknowledged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LostJobs {
+    /// Refuse it.
+    #[default]
+    Refuse,
+    /// Go on without them. Their identifiers are not given again.
+    Accept,
+}
+
+/// The mark of an open store.
+#[derive(Debug)]
+pub(super) struct Mark {
+    file: File,
+    path: PathBuf,
+    /// Highest acknowledged job; 0: none.
+    last: u64,
+    /// The slot that holds it.
+    slot: u64,
+}
+
+/// What the file of a mark says.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// There is no such file.
+    Nothing,
+    /// It cannot be read as a mark.
+    Damaged,
+    /// This job, in this slot.
+    Job { last: u64, slot: u64 },
+}
+
+impl Mark {
+    /// What the mark in `directory` says.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub(super) fn find(directory: &Path) -> Result<Found, StoreError> {
+        let path = directory.join(MARK);
+        match user_file::read(&path, LENGTH) {
+            Ok(Some(bytes)) => Ok(found(&bytes)),
+            Ok(None) => Ok(Found::Damaged),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Found::Nothing),
+            Err(error) => Err(StoreError::Mark { path, error }),
+        }
+    }
+
+    /// Opens the mark in `directory`, which said `found`; a new one, of the job `last`, takes the
+    /// place of one that is not there, is damaged, or says another.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn open(directory: &Path, found: &Found, last: u64) -> Result<Self, StoreError> {
+        let path = directory.join(MARK);
+        let open = || -> io::Result<(File, u64)> {
+            let slot = match *found {
+                Found::Job { last: said, slot } if said == last => slot,
+                _ => {
+                    make(directory, &path, last)?;
+                    0
+                }
+            };
+            let file = user_file::open_with(OpenOptions::new().read(true).write(true), &path)?;
+            Ok((file, slot))
+        };
+        match open() {
+            Ok((file, slot)) => Ok(Self { file, path, last, slot }),
+            Err(error) => Err(StoreError::Mark { path, error }),
+        }
+    }
+
+    /// Makes durable that `job` is acknowledged, if that is not known already.
+    ///
+    /// # Errors
+    /// When it is not durable.
+    pub(super) fn acknowledge(&mut self, job: JobId) -> Result<(), StoreError> {
+        if job.0 <= self.last {
+            return Ok(());
+        }
+        let slot = (self.slot + 1) % SLOTS;
+        let write = || -> io::Result<()> {
+            self.file.write_all_at(&text(job.0), slot * SLOT_BYTES as u64)?;
+            self.file.sync_data()
+        };
+        write().map_err(|error| StoreError::Mark { path: self.path.clone(), error })?;
+        (self.last, self.slot) = (job.0, slot);
+        Ok(())
+    }
+}
+
+/// The highest acknowledged job of a database that knows of `known`.
+///
+/// # Errors
+/// When the mark `found` says that jobs are missing, or says nothing, unless that is accepted.
+pub(super) fn checked(
+    found: &Found,
+    known: u64,
+    store: &Path,
+    lost: LostJobs,
+) -> Result<u64, StoreError> {
+    let path = store.to_owned();
+    let (refusal, last) = match *found {
+        // A new store, or a copy of the database alone.
+        Found::Nothing => return Ok(known),
+        Found::Job { last, .. } if last <= known => return Ok(known),
+        Found::Job { last, .. } => {
+            (StoreError::LostJobs { path, first: JobId(known + 1), last: JobId(last) }, last)
+        }
+        Found::Damaged => (StoreError::MarkDamaged { path: store.with_file_name(MARK) }, known),
+    };
+    match lost {
+        LostJobs::Refuse => Err(refusal),
+        LostJobs::Accept => {
+            tracing::error!("{refusal}: that is accepted, the coordinator goes on");
+            Ok(last)
+        }
+    }
+}
+
+/// Makes the file in one step: nobody finds a part of it.
+fn make(directory: &Path, path: &Path, last: u64) -> io::Result<()> {
+    let part = path.with_extension("acknowledged.part");
+    let mut options = OpenOptions::new();
+    let options = options.write(true).create(true).truncate(false).mode(FILE_MODE);
+    let mut file = user_file::open_with(options, &part)?;
+    file.set_len(0)?;
+    // Both slots: what an older file said is not wanted any more.
+    file.write_all(&text(last))?;
+    file.write_all(&text(last))?;
+    file.sync_all()?;
+    fs::rename(&part, path)?;
+    File::open(directory)?.sync_all()
+}
+
+/// A slot: a line for people, with its checksum, and space up to its length.
+fn text(last: u64) -> Vec<u8> {
+    let line = format!("last acknowledged job {last}");
+    let checksum = blake3::hash(line.as_bytes());
+    let mut bytes = format!("{line} blake3 {checksum}\n").into_bytes();
+    bytes.resize(SLOT_BYTES - 1, b' ');
+    bytes.push(b'\n');
+    bytes
+}
+
+/// The highest job of the slots that are whole.
+fn found(bytes: &[u8]) -> Found {
+    let slots = bytes.chunks(SLOT_BYTES).zip(0_u64..);
+    let whole = slots.filter_map(|(bytes, slot)| {
+        let line = str::from_utf8(bytes).ok()?.lines().next()?;
+        let (line, _) = line.split_once(" blake3 ")?;
+        let last: u64 = line.strip_prefix("last acknowledged job ")?.parse().ok()?;
+        (text(last) == bytes).then_some((last, slot))
+    });
+    match whole.max() {
+        Some((last, slot)) if bytes.len() as u64 == LENGTH => Found::Job { last, slot },
+        _ => Found::Damaged,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(directory: &Path) -> Found {
+        Mark::find(directory).unwrap()
+    }
+
+    #[test]
+    fn a_mark_says_the_last_job_whatever_a_torn_write_leaves() {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = directory.path();
+        assert_eq!(said(directory), Found::Nothing);
+        let mut mark = Mark::open(directory, &Found::Nothing, 0).unwrap();
+        assert_eq!(said(directory), Found::Job { last: 0, slot: 1 });
+        let path = directory.join(MARK);
+        for job in 1..5 {
+            let before = fs::read(&path).unwrap();
+            mark.acknowledge(JobId(job)).unwrap();
+            let Found::Job { last, slot } = said(directory) else { panic!("damaged") };
+            assert_eq!(last, job);
+            let after = fs::read(&path).unwrap();
+            // Any part of the slot may have reached the disk.
+            for cut in (0..SLOT_BYTES).step_by(7) {
+                let torn = usize::try_from(slot).unwrap() * SLOT_BYTES + cut;
+                let mut bytes = before.clone();
+                let begin = usize::try_from(slot).unwrap() * SLOT_BYTES;
+                bytes[begin..torn].copy_from_slice(&after[begin..torn]);
+                let Found::Job { last, .. } = found(&bytes) else { panic!("{cut}") };
+                assert!(last == job || last == job - 1, "{cut}: {last}");
+            }
+        }
+        drop(mark);
+        // The next life goes on in the other slot.
+        let found = said(directory);
+        let mut mark = Mark::open(directory, &found, 4).unwrap();
+        mark.acknowledge(JobId(3)).unwrap();
+        assert_eq!(said(directory), found);
+        mark.acknowledge(JobId(5)).unwrap();
+        assert!(matches!(said(directory), Found::Job { last: 5, .. }));
+    }
+
+    #[test]
+    fn what_is_no_mark_is_damaged() {
+        let whole = [text(7), text(8)].concat();
+        assert_eq!(found(&whole), Found::Job { last: 8, slot: 1 });
+        let mut other = whole.clone();
+        other[23] = b'9';
+        assert_eq!(found(&other), Found::Job { last: 8, slot: 1 });
+        let mut neither = other.clone();
+        neither[SLOT_BYTES + 23] = b'9';
+        for bytes in [&neither[..], b"", &whole[..SLOT_BYTES], &[b'\0'; 2 * SLOT_BYTES]] {
+            assert_eq!(found(bytes), Found::Damaged);
+        }
+    }
+}

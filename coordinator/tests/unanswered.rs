@@ -1,0 +1,115 @@
+//! What workers cost that give signs of life and do not answer: in virtual time. Every result is that
+//! of a plain loop, to the bit.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
+#![expect(clippy::print_stdout, reason = "what is measured tells how near the bounds are")]
+
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod clockwork;
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod fake;
+
+use std::time::Duration;
+
+use clockwork::{Clockwork, Times};
+use osteon_common::job::JobSpecification;
+use osteon_coordinator::config::Config;
+
+const REALIZATION: Duration = Duration::from_millis(1);
+/// An answer that does not come is waited for so long, where others may give it.
+const OVERDUE: Duration = Duration::from_secs(3);
+/// And then it takes so long until the others have given it.
+const SOON: Duration = Duration::from_millis(500);
+
+/// What a job took.
+#[derive(Debug)]
+struct Run {
+    time: Duration,
+    sent: u64,
+    swallowed: u64,
+}
+
+/// Runs a job over `sound` workers of two threads; before each of them attaches one that does not
+/// answer one in `n` of its batches, if there is such an `n`.
+fn run(sound: usize, swallow: Option<u64>, audit_fraction: f64, job: &JobSpecification) -> Run {
+    let config = Config { audit_fraction, ..Config::default() };
+    let faulty = if swallow.is_some() { sound } else { 0 };
+    let mut clockwork =
+        Clockwork::with(&vec![2; faulty + sound], Times::Equal, REALIZATION, config);
+    for worker in 1..=faulty as u64 {
+        clockwork.swallow(worker, swallow.unwrap());
+    }
+    let ended = clockwork.run(std::slice::from_ref(job));
+    // As text: an unknown standard error is NaN, which equals nothing.
+    assert_eq!(format!("{:?}", ended[0].result), format!("{:?}", fake::plain_run(job)));
+    Run { time: ended[0].at, sent: clockwork.sent, swallowed: clockwork.swallowed }
+}
+
+fn jobs() -> [JobSpecification; 3] {
+    [
+        fake::identification(4, 150, 3),
+        fake::identification(400, 60, 3),
+        fake::propagation(20_000, 5),
+    ]
+}
+
+#[test]
+fn workers_that_never_answer_cost_seconds() {
+    for job in jobs() {
+        for sound in [1, 2, 4] {
+            for audit_fraction in [0.0, 0.01, 1.0] {
+                let undisturbed = run(sound, None, audit_fraction, &job);
+                let disturbed = run(sound, Some(1), audit_fraction, &job);
+                println!("{sound} sound, audits {audit_fraction}: {undisturbed:?}, {disturbed:?}");
+                assert!(disturbed.swallowed >= 2 * sound as u64, "{disturbed:?}");
+                // Each misses three, and then one now and then.
+                let delay = disturbed.time.saturating_sub(undisturbed.time);
+                assert!(delay < 8 * (OVERDUE + SOON), "{delay:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn each_batch_that_is_not_answered_costs_seconds() {
+    for job in jobs() {
+        for sound in [1, 2, 4] {
+            for audit_fraction in [0.0, 0.3] {
+                let undisturbed = run(sound, None, audit_fraction, &job);
+                let disturbed = run(sound, Some(7), audit_fraction, &job);
+                println!("{sound} sound, audits {audit_fraction}: {undisturbed:?}, {disturbed:?}");
+                assert!(disturbed.swallowed > 0, "{disturbed:?}");
+                let delay = disturbed.time.saturating_sub(undisturbed.time);
+                let bound = (OVERDUE + SOON) * disturbed.swallowed as u32;
+                assert!(delay < bound, "{delay:?} and not {bound:?}");
+            }
+        }
+    }
+}
+
+/// Batches that a job of realizations of this length takes on four workers, and its time.
+fn slow(realization: Duration, job: &JobSpecification) -> (u64, Duration) {
+    let mut clockwork = Clockwork::with(&[2; 4], Times::Spread, realization, Config::default());
+    let ended = clockwork.run(std::slice::from_ref(job));
+    assert_eq!(format!("{:?}", ended[0].result), format!("{:?}", fake::plain_run(job)));
+    (clockwork.sent, ended[0].at)
+}
+
+#[test]
+fn realizations_that_are_slow_everywhere_are_not_computed_many_times() {
+    for job in [fake::identification(40, 10, 3), fake::propagation(400, 5), fake::propagation(3, 5)]
+    {
+        // Where nothing is ever overdue, copies are for idle workers only.
+        let (usual, _) = slow(Duration::from_millis(100), &job);
+        for seconds in [1, 5, 30] {
+            let (sent, time) = slow(Duration::from_secs(seconds), &job);
+            println!("{seconds} s: {sent} batches in {time:?}, usually {usual}");
+            assert!(sent as f64 <= 1.5 * usual as f64 + 8.0, "{sent} and not {usual}");
+        }
+    }
+}

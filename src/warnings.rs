@@ -1,0 +1,215 @@
+//! What is said before anything is computed: unusual numbers, and data that the bounds do not reach.
+//!
+//! Nothing of it changes a job: the point nearest to such data is a result, too.
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::job::{JobKind, JobSpecification, Range};
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::plausible::Warning;
+use osteon_common::reach::{self, Reach};
+use osteon_common::results::Moments;
+use osteon_common::sampling::pair_count;
+use osteon_common::settings::SolverSettings;
+use osteon_solver::{Failure, Solver, Workspace};
+
+use crate::progress::say;
+
+/// Setups with more (frequency, wavenumber) pairs are not solved ahead: it would take more than a moment.
+const PAIRS_MAX: f64 = 2e5;
+/// Share by which a mean may be off the velocities of mean models: g_L, which the closed form does not
+/// know, and the dispersion move it by less.
+const MEAN_MARGIN: f64 = 0.01;
+/// The same of a coefficient of variation, whose closed form is a rough one.
+const VARIATION_MARGIN: f64 = 0.05;
+/// Standard errors by which measured moments may be off.
+const ERRORS: f64 = 3.0;
+/// Most groups that are named.
+const GROUPS_LISTED_MAX: usize = 5;
+
+/// Says everything that there is to say about a job that is about to be submitted.
+pub(crate) async fn say_of_job(specification: &JobSpecification, warnings: &[Warning]) {
+    say_all(warnings);
+    let specification = specification.clone();
+    // It takes some milliseconds of this thread's time, in which a signal shall be heard.
+    let lines = tokio::task::spawn_blocking(move || out_of_reach(&specification)).await;
+    for line in lines.unwrap_or_default() {
+        say(&format!("warning: {line}"));
+    }
+}
+
+/// Says what is unusual.
+pub(crate) fn say_all(warnings: &[Warning]) {
+    for warning in warnings {
+        say(&format!("warning: {warning}"));
+    }
+}
+
+/// Which data of an identification no point within the bounds reaches, by the solver's velocities of the
+/// slowest and the fastest mean model.
+fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
+    let Some(data) = &specification.data else { return Vec::new() };
+    let solver = SolverSettings::default();
+    let setup = Setup { solver, ..specification.setup };
+    if specification.kind != JobKind::Identification || pair_count(&setup) > PAIRS_MAX {
+        return Vec::new();
+    }
+    let solved = Solved::of(specification, &setup);
+    let mut lines = Vec::new();
+    if let Err(failure) = &solved.start {
+        lines.push(format!(
+            "the mean model of the starts has no velocity ({}): {}",
+            failure.kind.name(),
+            failure.detail
+        ));
+    }
+    let names: Vec<&str> = data.names().collect();
+    let mut missed = 0;
+    for set in 0..data.sets() {
+        let count = data.velocities(set).map(<[f64]>::len);
+        let of_set = solved.missed(specification, data.moments(set), count);
+        missed += usize::from(!of_set.is_empty());
+        if missed > GROUPS_LISTED_MAX {
+            continue;
+        }
+        let of = names.get(set).map(|name| format!(" of the group {name:?}")).unwrap_or_default();
+        lines.extend(of_set.into_iter().map(|(moment, rest)| format!("the {moment}{of} {rest}")));
+    }
+    if missed > GROUPS_LISTED_MAX {
+        let more = missed - GROUPS_LISTED_MAX;
+        lines.push(format!("{more} more groups are out of reach of the bounds"));
+    }
+    lines
+}
+
+/// Velocities of mean models, m/s, and what the closed form says of coefficients of variation.
+struct Solved {
+    slowest: Option<(Point, f64)>,
+    fastest: Option<(Point, f64)>,
+    start: Result<f64, Failure>,
+    variation: (f64, f64),
+}
+
+impl Solved {
+    fn of(specification: &JobSpecification, setup: &Setup) -> Self {
+        let ranges = &specification.parameters;
+        let solver = Solver::new(setup);
+        let mut workspace = Workspace::default();
+        let mut velocity = |point: &Point| {
+            let elasticity = point.constants().elasticity().ok()?;
+            let bone = Bone { density: point.density(), elasticity };
+            Some(solver.arrival(&bone, &mut workspace).map(|arrival| arrival.velocity))
+        };
+        let mut corner = |point: Option<Point>| {
+            let point = point?;
+            Some((point, velocity(&point)?.ok()?))
+        };
+        let (slowest, fastest) =
+            (corner(Some(reach::slowest(ranges))), corner(reach::fastest(ranges)));
+        let start = velocity(&specification.start()).unwrap_or(Ok(f64::NAN));
+        Self { slowest, fastest, start, variation: Reach::of(ranges, setup).variation }
+    }
+
+    /// Which moments of data, of so many velocities, are out of reach, each with the rest of a sentence.
+    fn missed(
+        &self,
+        specification: &JobSpecification,
+        data: Moments,
+        count: Option<usize>,
+    ) -> Vec<(&'static str, String)> {
+        let ranges = &specification.parameters;
+        let count = count.map_or(f64::INFINITY, |count| count as f64);
+        let (mean, variation) = (data.mean, data.coefficient_of_variation);
+        // A velocity goes with the root of a stiffness, so its mean lies below that of the mean model.
+        let most = self.variation.1;
+        let error = ERRORS * variation / count.sqrt();
+        let margins = (MEAN_MARGIN + error + 0.5 * most * most, MEAN_MARGIN + error);
+        let mut missed = Vec::new();
+        let velocities = self.velocities();
+        if let Some((point, slowest)) = &self.slowest
+            && mean < slowest * (1.0 - margins.0)
+        {
+            let cure = widened(ranges, point);
+            missed.push(("mean", beyond(&rounded(mean), "below", &velocities, &cure)));
+        }
+        if let Some((point, fastest)) = &self.fastest
+            && mean > fastest * (1.0 + margins.1)
+        {
+            let cure = widened(ranges, point);
+            missed.push(("mean", beyond(&rounded(mean), "above", &velocities, &cure)));
+        }
+        let margin = VARIATION_MARGIN + ERRORS / (2.0 * count).sqrt();
+        let (least, most) = self.variation;
+        let side = if variation < least * (1.0 - margin) {
+            Some(("below", "lower"))
+        } else if variation > most * (1.0 + margin) {
+            Some(("above", "upper"))
+        } else {
+            None
+        };
+        if let Some((side, bound)) = side {
+            let cure = match ranges[Parameter::Dispersion as usize] {
+                Range::Free { .. } => format!("widen the {bound} bound of parameters.dispersion"),
+                Range::Fixed(_) => "free parameters.dispersion".to_owned(),
+            };
+            let reached = format!("about {least:.2e} to {most:.2e}");
+            let reached = beyond(&format!("{variation:.3e}"), side, &reached, &cure);
+            missed.push(("coefficient of variation", reached));
+        }
+        missed
+    }
+
+    /// The velocities that are reached, as far as they are known.
+    fn velocities(&self) -> String {
+        let [slowest, fastest] =
+            [&self.slowest, &self.fastest].map(|end| end.as_ref().map(|&(_, velocity)| velocity));
+        match (slowest, fastest) {
+            (Some(slowest), Some(fastest)) => {
+                format!("{} to {} m/s", rounded(slowest), rounded(fastest))
+            }
+            (Some(slowest), None) => format!("{} m/s and more", rounded(slowest)),
+            (None, Some(fastest)) => format!("up to {} m/s", rounded(fastest)),
+            (None, None) => "nothing".to_owned(),
+        }
+    }
+}
+
+fn rounded(velocity: f64) -> String {
+    format!("{velocity:.0}")
+}
+
+fn beyond(value: &str, side: &str, reached: &str, cure: &str) -> String {
+    format!(
+        "is {value}, {side} what points within the bounds reach ({reached}): the search will end at its \
+         bounds; {cure}"
+    )
+}
+
+/// Which bounds to widen to get beyond a corner of them.
+fn widened(ranges: &[Range; 7], corner: &Point) -> String {
+    let (mut lower_bounds, mut upper_bounds) = (Vec::new(), Vec::new());
+    for parameter in Parameter::ALL {
+        // Neither has much to do with the mean.
+        if matches!(parameter, Parameter::LongitudinalShearModulus | Parameter::Dispersion) {
+            continue;
+        }
+        let Range::Free { lower, upper, .. } = ranges[parameter as usize] else { continue };
+        let value = corner.get(parameter);
+        if value.to_bits() == lower.to_bits() {
+            lower_bounds.push(parameter.name());
+        } else if value.to_bits() == upper.to_bits() {
+            upper_bounds.push(parameter.name());
+        }
+    }
+    let of = |side: &str, names: Vec<&str>| {
+        (!names.is_empty()).then(|| format!("the {side} bound of {}", names.join(" or ")))
+    };
+    let bounds: Vec<String> =
+        [of("lower", lower_bounds), of("upper", upper_bounds)].into_iter().flatten().collect();
+    if bounds.is_empty() {
+        return "free more parameters".to_owned();
+    }
+    format!("widen {}", bounds.join(", or "))
+}
+
+#[cfg(test)]
+mod tests;
