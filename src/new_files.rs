@@ -39,7 +39,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
                 // The first error is the one to tell.
                 drop(fs::remove_file(&earlier.path));
             }
-            let context = format!("cannot write {}", file.path.display());
+            let context = format!("cannot write {}", visible::path(&file.path));
             return Err(Failure::unusable_path(error, context));
         }
     }
@@ -53,8 +53,10 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
     made.map_err(|error| {
-        let directory = visible::path(path);
-        Failure::unusable_path(error, format!("cannot create the directory {directory}"))
+        Failure::unusable_path(
+            error,
+            format!("cannot create the directory {}", visible::path(path)),
+        )
     })
 }
 

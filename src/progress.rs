@@ -61,9 +61,7 @@ impl Progress {
     pub(crate) fn show(&mut self, snapshot: &JobSnapshot) {
         let observed = self.observer.observe(snapshot, self.begun.elapsed());
         if let Some(bar) = &self.bar {
-            let lines = display::lines(snapshot, &observed, terminal_width());
-            let lines: Vec<_> = lines.iter().map(|line| visible::line(line)).collect();
-            bar.set_message(lines.join("\n"));
+            bar.set_message(display::lines(snapshot, &observed, terminal_width()).join("\n"));
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_INTERVAL_S) {
             self.last_line = Instant::now();
             say(&line(snapshot, &observed, usize::MAX));
@@ -152,5 +150,20 @@ fn shown(event: &[u8]) -> String {
     match text.strip_suffix('\n') {
         Some(line) => format!("{}\n", visible::line(line)),
         None => visible::line(&text).into_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_event_of_the_log_is_one_line() {
+        assert_eq!(
+            shown(b"WARN lost host=a\x1b[2J\n INFO b\n"),
+            "WARN lost host=a\\u{1b}[2J\\n INFO b\n"
+        );
+        assert_eq!(shown("Größe \u{202e}\n".as_bytes()), "Größe \\u{202e}\n");
+        assert_eq!(shown(b"\xff\n"), "\u{fffd}\n");
     }
 }

@@ -33,6 +33,9 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     if let Some(reason) = failed_before(&run, &specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
+    if let Place::There(remote) = &run.place {
+        remote.tell();
+    }
     warnings::say_of_job(&specification, &warnings).await;
     let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.
@@ -71,7 +74,6 @@ impl Computers {
         Ok(match place {
             Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
             Place::There(remote) => {
-                remote.tell();
                 let client = Client::connect(remote).await?;
                 Self::There(Box::new(client))
             }

@@ -97,6 +97,7 @@ impl Output for TextOutput<'_> {
 fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     let line = |worker: &ExpelledWorker| {
         let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
+        let (host, reason) = (visible::line(host), visible::line(reason));
         let ago = span(*elapsed_s);
         wrapped(&format!("expelled {ago} ago: {host} (process {process}) {reason}"))
     };

@@ -1,6 +1,7 @@
 //! What is shown of a job while it computes: parts of different weight, of which as many are shown as
 //! the width allows.
 
+use osteon_common::visible;
 use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
 /// What one snapshot does not tell.
@@ -113,7 +114,7 @@ fn best(snapshot: &JobSnapshot) -> Vec<Part> {
 }
 
 fn waiting(snapshot: &JobSnapshot) -> Option<Part> {
-    let text = format!("waiting: {}", snapshot.waiting_for);
+    let text = format!("waiting: {}", visible::line(&snapshot.waiting_for));
     (!snapshot.waiting_for.is_empty()).then_some(Part { rank: 1, joint: ", ", text })
 }
 

@@ -25,9 +25,9 @@ pub(super) fn glued(text: &str) -> String {
 /// The lines of `text` wrapped between words, with a final newline; lines that continue another are
 /// indented. A word that is longer than a line, such as a path, stays whole.
 pub(super) fn wrapped(text: &str) -> String {
-    let text = visible::lines(text);
-    let lines =
-        text.lines().flat_map(|line| words(line, WIDTH, WIDTH - INDENT).into_iter().enumerate());
+    let lines = text.lines().flat_map(|line| {
+        words(&visible::line(line), WIDTH, WIDTH - INDENT).into_iter().enumerate()
+    });
     let indented = lines.map(|(place, line)| {
         let indent = if place == 0 { 0 } else { INDENT };
         format!("{:indent$}{line}\n", "")
@@ -39,9 +39,9 @@ pub(super) fn wrapped(text: &str) -> String {
 /// row would be too long.
 pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
     // Names and reasons of others are among them.
-    let visible_cells =
+    let cells =
         |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
-    let rows: Vec<[String; COLUMNS]> = rows.iter().map(visible_cells).collect();
+    let rows: Vec<[String; COLUMNS]> = rows.iter().map(cells).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].width()).max().unwrap_or(0);
     let widths: [usize; COLUMNS] = std::array::from_fn(width);
     let before: usize = widths.iter().take(COLUMNS.saturating_sub(1)).map(|width| width + 2).sum();

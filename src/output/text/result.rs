@@ -95,7 +95,7 @@ fn headline(value: &Value, specification: &JobSpecification) -> String {
     // A case file may follow the first line of a reason; it must stay as it is.
     let (first, rest) = reason.split_once('\n').unwrap_or((&reason, ""));
     let first = wrapped(&format!("{headline}: {first}"));
-    if rest.is_empty() { first } else { format!("{first}{}\n", rest.trim_end()) }
+    if rest.is_empty() { first } else { format!("{first}{}\n", visible::lines(rest.trim_end())) }
 }
 
 fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
