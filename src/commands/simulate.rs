@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use osteon_common::case::Case;
 use osteon_common::case_file;
 use osteon_common::plausible::case_warnings;
-use osteon_common::visible;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
 use osteon_study::check::Check;
 
