@@ -83,7 +83,7 @@ impl Embedded {
 async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordinator, Failure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(Failure::failed)?;
-    let store: Box<dyn Store> = match store {
+    let store: Box<dyn Store + Send> = match store {
         StorePlace::Memory => Box::new(MemoryStore::new()),
         StorePlace::Directory(path) => Box::new(SqliteStore::open(&path).map_err(Failure::failed)?),
     };

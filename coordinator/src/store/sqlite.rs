@@ -15,15 +15,17 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    DamagedRecord, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError,
-    StoredJob,
+    Between, DamagedRecord, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store,
+    StoreError, StoredJob,
 };
 use crate::ids::JobId;
 use crate::search::{Ending, Summary};
 use crate::worker_name::WorkerName;
 
+mod backup;
 mod columns;
 mod opening;
+mod owned;
 mod schema;
 mod summary;
 
@@ -61,6 +63,7 @@ impl SqliteStore {
     /// SQLite refuses.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let (connection, lock, path) = opening::open(directory)?;
+        backup::remove_leftover(&path)?;
         Ok(Self { connection, path, lock })
     }
 
@@ -89,7 +92,7 @@ impl SqliteStore {
     ) -> Result<(), StoreError> {
         let sql = format!(
             "SELECT id, request_id, accepted_ns, specification, fingerprint, checksum, client,
-             priority FROM job WHERE {condition} ORDER BY id"
+             priority, name FROM job WHERE {condition} ORDER BY id"
         );
         let refused = |source| self.refused(source);
         let mut statement = self.connection.prepare(&sql).map_err(refused)?;
@@ -168,7 +171,7 @@ impl SqliteStore {
 /// What `PRAGMA auto_vacuum` says of a file whose free pages can be given back one by one.
 const AUTO_VACUUM_INCREMENTAL: i64 = 2;
 
-impl Store for SqliteStore {
+impl Store for &SqliteStore {
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.read_jobs("true", [], &mut |record| {
             let end = match self.end(record.job) {
@@ -232,8 +235,8 @@ impl Store for SqliteStore {
         let encoded = specification::to_message(&record.specification).encode_to_vec();
         let columns = job_columns(record, &encoded);
         let sql = "INSERT OR IGNORE INTO job (id, request_id, accepted_ns, specification,
-                   fingerprint, checksum, client, priority)
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+                   fingerprint, checksum, client, priority, name)
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
         let values = params![
             record.job.0,
             columns.request_id,
@@ -243,6 +246,7 @@ impl Store for SqliteStore {
             job_checksum(&columns),
             columns.client,
             columns.priority,
+            columns.name,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
@@ -394,6 +398,10 @@ impl Store for SqliteStore {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))
     }
+
+    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+        backup::copy(self, between)
+    }
 }
 
 /// What is shown of a job whose end is damaged: one such row must not keep all others from being
@@ -408,8 +416,8 @@ fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
 /// The job of a row, and its identifier; `None` if it is damaged.
 fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
     let job = JobId(row.get(0)?);
-    let (request_id, fingerprint, client): (String, String, String) =
-        (row.get(1)?, row.get(4)?, row.get(6)?);
+    let (request_id, fingerprint, client, name): (String, String, String, String) =
+        (row.get(1)?, row.get(4)?, row.get(6)?, row.get(8)?);
     let (encoded, checksum) = (row.get_ref(3)?.as_blob()?, row.get_ref(5)?.as_blob()?);
     let columns = JobColumns {
         job,
@@ -419,6 +427,7 @@ fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
         fingerprint: &fingerprint,
         client: &client,
         priority: row.get(7)?,
+        name: &name,
     };
     let intact = checksum == job_checksum(&columns);
     let (accepted, priority) = (Duration::from_nanos(columns.accepted_ns), columns.priority);
@@ -432,6 +441,7 @@ fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
         fingerprint,
         client,
         priority,
+        name,
     });
     Ok((job, record))
 }
@@ -445,6 +455,7 @@ fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobColumns<'a> {
         fingerprint: &record.fingerprint,
         client: &record.client,
         priority: record.priority,
+        name: &record.name,
     }
 }
 

@@ -52,6 +52,7 @@ pub(super) struct JobColumns<'a> {
     pub(super) fingerprint: &'a str,
     pub(super) client: &'a str,
     pub(super) priority: u32,
+    pub(super) name: &'a str,
 }
 
 /// Older formats had no client and no priority: without either there is no field.
@@ -67,6 +68,9 @@ pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
     ];
     if !columns.client.is_empty() || columns.priority > 0 {
         fields.extend([columns.client.as_bytes(), &priority]);
+    }
+    if !columns.name.is_empty() {
+        fields.push(columns.name.as_bytes());
     }
     checksum(&fields)
 }

@@ -10,7 +10,8 @@ pub(super) const SCHEMA: &str = "
         fingerprint TEXT NOT NULL,       -- of the numerics of its evaluations
         checksum BLOB NOT NULL,
         client TEXT NOT NULL DEFAULT '',
-        priority INTEGER NOT NULL DEFAULT 0
+        priority INTEGER NOT NULL DEFAULT 0,
+        name TEXT NOT NULL DEFAULT ''    -- what people call it
     );
     CREATE TABLE evaluation (
         job INTEGER NOT NULL REFERENCES job(id),
@@ -81,5 +82,6 @@ pub(super) const FROM_FORMAT_3: &str = "
 /// instance is the same.
 pub(super) const FROM_FORMAT_4: &str = "
     ALTER TABLE expulsion ADD COLUMN instance INTEGER NOT NULL DEFAULT 0;
+    ALTER TABLE job ADD COLUMN name TEXT NOT NULL DEFAULT '';
     UPDATE format SET version = 5;
 ";

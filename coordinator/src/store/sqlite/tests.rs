@@ -33,6 +33,7 @@ pub(super) fn job(id: u64) -> JobRecord {
         fingerprint: "osteon 1.2.3 numerics 4".to_owned(),
         client: if id == 2 { "somebody@there".to_owned() } else { String::new() },
         priority: if id == 3 { 9 } else { 0 },
+        name: if id == 2 { "Müller, left tibia".to_owned() } else { String::new() },
     }
 }
 
@@ -406,7 +407,8 @@ fn an_expulsion_of_format_4_is_one_without_an_instance() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(directory.path()).unwrap();
     store.put_expulsion(&record).unwrap();
-    let back = "ALTER TABLE expulsion DROP COLUMN instance; UPDATE format SET version = 4;";
+    let back = "ALTER TABLE expulsion DROP COLUMN instance; ALTER TABLE job DROP COLUMN name;
+                UPDATE format SET version = 4;";
     store.connection.execute_batch(back).unwrap();
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
