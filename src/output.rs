@@ -2,6 +2,7 @@
 
 mod json;
 mod text;
+mod times;
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,7 +10,9 @@ use std::path::Path;
 use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results_json;
-use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
+use osteon_proto::v1::{
+    BackupEnd, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+};
 use osteon_solver::{Arrival, Failure};
 use osteon_study::check::Check;
 use serde_json::{Value, json};
@@ -66,6 +69,18 @@ pub(crate) trait Output {
     fn submitted(&mut self, job: &str) -> io::Result<()>;
     /// All jobs, and the workers that are expelled.
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()>;
+    /// The attached workers, those that went last, and those that are expelled.
+    fn workers(
+        &mut self,
+        workers: &ListWorkersResponse,
+        expelled: &[ExpelledWorker],
+    ) -> io::Result<()>;
+    /// One worker as of now.
+    fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
+    /// That a coordinator serves, or why it does not.
+    fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
+    /// The copy of a store in a file.
+    fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()>;
     /// The jobs that are forgotten.
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()>;
     /// One job as of now.

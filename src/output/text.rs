@@ -3,12 +3,16 @@
 mod check;
 mod groups;
 mod identified;
+pub(super) mod operators;
 mod result;
 mod solver;
 
 use std::io::{self, Write};
+use std::path::Path;
 
-use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
+use osteon_proto::v1::{
+    BackupEnd, ExpelledWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
+};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::client;
@@ -43,20 +47,29 @@ impl Output for TextOutput<'_> {
             self.verbatim("no jobs\n")?;
             return self.verbatim(&expelled_lines(expelled));
         }
-        let header = ["ID", "KIND", "STATE", "TIME", "WORKERS", "PROGRESS"];
-        let mut rows = vec![header.map(str::to_owned)];
-        for job in jobs {
-            rows.push([
-                job.job.clone(),
-                kind_name(job).to_owned(),
-                status_name(job).unwrap_or_else(|| state_name(job)).to_owned(),
-                span(job.elapsed_s),
-                job.workers.to_string(),
-                progress(job),
-            ]);
-        }
-        self.verbatim(&aligned(&rows))?;
+        self.verbatim(&operators::jobs(jobs))?;
         self.verbatim(&expelled_lines(expelled))
+    }
+
+    fn workers(
+        &mut self,
+        workers: &ListWorkersResponse,
+        expelled: &[ExpelledWorker],
+    ) -> io::Result<()> {
+        self.verbatim(&operators::workers(workers))?;
+        self.verbatim(&expelled_lines(expelled))
+    }
+
+    fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
+        self.verbatim(&operators::attached(std::slice::from_ref(worker)))
+    }
+
+    fn health(&mut self, not_serving: Option<&str>) -> io::Result<()> {
+        self.verbatim(&not_serving.map_or("serving\n".to_owned(), |reason| format!("{reason}\n")))
+    }
+
+    fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()> {
+        self.verbatim(&format!("{} ({} bytes)\n", file.display(), copy.length))
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
@@ -64,7 +77,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
-        let state = status_name(snapshot).unwrap_or_else(|| state_name(snapshot));
+        let state = operators::state(snapshot);
         let time = span(snapshot.elapsed_s);
         let line = match progress(snapshot).as_str() {
             "" => format!("{time:>7}  {state}\n"),

@@ -264,7 +264,10 @@ impl Worker {
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
         }
-        let reason = self.endpoint.explained(status.message());
+        let reason = match self.ever_attached {
+            true => status.message().to_owned(),
+            false => self.endpoint.explained(status),
+        };
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument
