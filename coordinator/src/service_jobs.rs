@@ -198,7 +198,9 @@ impl Jobs for JobsService {
         &self,
         request: Request<CancelRequest>,
     ) -> Result<Response<CancelResponse>, Status> {
+        let user = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
         let job = job(&request.into_inner().job)?;
+        tracing::info!(%job, user, "job is to be cancelled");
         let cancelled = self.snapshot(event::Request::Cancel(job));
         let snapshot = match timeout(END_PATIENCE, cancelled).await {
             Ok(snapshot) => snapshot?,

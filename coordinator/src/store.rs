@@ -363,6 +363,18 @@ pub trait Store {
         Ok(jobs)
     }
 
+    /// A copy of the whole store, as it is when this returns: a SQLite file that is open for
+    /// reading and that nobody else can find. `None` if `between` ended it. The copy is made in
+    /// pieces; after each of them `between` may use the store, and what it changes is in the copy.
+    ///
+    /// # Errors
+    /// When the store is no file, cannot be read, or the copy cannot be written beside it.
+    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+        // Where nothing is copied there is nothing between.
+        let _ = between;
+        Err(StoreError::NoFile)
+    }
+
     /// Shows `visit` all jobs, in the order of their identifiers. One is in memory at a time.
     ///
     /// # Errors
@@ -458,16 +470,4 @@ pub trait Store {
     /// # Errors
     /// When that is not durable.
     fn forget_expulsions(&mut self) -> Result<(), StoreError>;
-
-    /// A copy of the whole store, as it is when this returns: a SQLite file that is open for
-    /// reading and that nobody else can find. `None` if `between` ended it. The copy is made in
-    /// pieces; after each of them `between` may use the store, and what it changes is in the copy.
-    ///
-    /// # Errors
-    /// When the store is no file, cannot be read, or the copy cannot be written beside it.
-    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
-        // Where nothing is copied there is nothing between.
-        let _ = between;
-        Err(StoreError::NoFile)
-    }
 }

@@ -138,3 +138,88 @@ fn table(header: &[&str], mut rows: Vec<Vec<String>>) -> String {
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use osteon_proto::v1::JobStatus;
+
+    use super::*;
+
+    fn worker(number: u64) -> WorkerSnapshot {
+        WorkerSnapshot {
+            worker: number,
+            host: "node-7".to_owned(),
+            process: 4711,
+            threads: 64,
+            version: "0.1.0".to_owned(),
+            attach_time: Some(timestamp::to_message(Duration::from_secs(1_790_000_000))),
+            silent_s: 0.5,
+            realizations_per_second: 2811.4,
+            batches: 2,
+            oldest_batch_s: Some(0.25),
+            standing: WorkerStanding::Ok.into(),
+        }
+    }
+
+    #[test]
+    fn workers_are_a_table_and_those_that_went_a_line_each() {
+        let idle = WorkerSnapshot {
+            realizations_per_second: 0.0,
+            batches: 0,
+            oldest_batch_s: None,
+            standing: WorkerStanding::Draining.into(),
+            ..worker(12)
+        };
+        let gone = DepartedWorker {
+            worker: 3,
+            host: "node-8".to_owned(),
+            process: 5,
+            depart_time: Some(timestamp::to_message(Duration::from_secs(1_790_000_060))),
+            reason: "its connection ended".to_owned(),
+            batches: 2,
+        };
+        let list = ListWorkersResponse { workers: vec![worker(1), idle], departed: vec![gone] };
+        let expected = "\
+NUMBER  HOST    PROCESS  THREADS  VERSION  ATTACHED              HEARD      RATE    BATCHES  OLDEST  STANDING
+1       node-7  4711     64       0.1.0    2026-09-21T14:13:20Z  0.5 s ago  2811/s  2        0.2 s   ok
+12      node-7  4711     64       0.1.0    2026-09-21T14:13:20Z  0.5 s ago  0/s     0                draining
+left 2026-09-21T14:14:20Z: node-8 (process 5), worker 3: its connection ended; others compute the 2 batches it held
+";
+        assert_eq!(workers(&list), expected);
+        assert_eq!(workers(&ListWorkersResponse::default()), "no workers\n");
+    }
+
+    #[test]
+    fn a_column_that_says_nothing_is_left_out_and_names_write_no_lines_of_their_own() {
+        let mut hostile = worker(1);
+        hostile.version = "1\n2 \u{1b}[31m".to_owned();
+        hostile.oldest_batch_s = None;
+        let table = attached(&[hostile]);
+        assert_eq!(table.lines().count(), 2, "{table}");
+        assert!(table.contains("1?2 ?[31m") && !table.contains("OLDEST"), "{table}");
+    }
+
+    #[test]
+    fn a_state_says_what_a_person_would_say() {
+        let job = |kind: JobKind, stands: JobState, status: JobStatus, workers| JobSnapshot {
+            kind: kind.into(),
+            state: stands.into(),
+            status: status.into(),
+            workers,
+            ..JobSnapshot::default()
+        };
+        use JobState::{Ended, Running};
+        let (search, propagation) = (JobKind::Identification, JobKind::Propagation);
+        for (job, expected) in [
+            (job(search, Running, JobStatus::Unspecified, 1), "running"),
+            (job(search, Running, JobStatus::Unspecified, 0), "waiting"),
+            (job(search, Ended, JobStatus::Converged, 0), "converged"),
+            (job(propagation, Ended, JobStatus::Converged, 0), "done"),
+            (job(propagation, Ended, JobStatus::Failed, 0), "failed"),
+        ] {
+            assert_eq!(state(&job), expected);
+        }
+    }
+}
