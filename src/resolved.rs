@@ -232,31 +232,8 @@ impl Resolved {
                 let coordinator = remote(arguments.client.clone())?;
                 resolve_submit(arguments, coordinator)
             }
-            Command::Jobs(JobsArguments { command: None, client, json }) => {
-                Self::Jobs { coordinator: remote(client)?, format: format(json) }
-            }
-            Command::Jobs(JobsArguments {
-                command: Some(JobsCommand::Prune(prune)),
-                client,
-                json,
-            }) => Self::Prune {
-                older_than: prune.older_than,
-                keep_last: prune.keep_last,
-                coordinator: remote(prune.client.or(client))?,
-                format: format(json || prune.json),
-            },
-            Command::Workers(WorkersArguments { command: None, client, json }) => {
-                Self::Workers { coordinator: remote(client)?, format: format(json) }
-            }
-            Command::Workers(WorkersArguments {
-                command: Some(WorkersCommand::Drain(drain)),
-                client,
-                json,
-            }) => Self::DrainWorker {
-                worker: drain.worker,
-                coordinator: remote(drain.client.or(client))?,
-                format: format(json || drain.json),
-            },
+            Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
+            Command::Workers(arguments) => resolve_workers(arguments, remote)?,
             Command::Health(arguments) => Self::Health {
                 coordinator: remote(arguments.client)?,
                 limit: Duration::from_secs_f64(arguments.timeout),
@@ -325,6 +302,39 @@ fn resolve_run(
         }
     };
     Ok(Run { kind, job, place, name: name.unwrap_or_default(), out, format: format(json) })
+}
+
+/// `jobs` and what is below it.
+fn resolve_jobs(
+    arguments: JobsArguments,
+    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
+) -> Result<Resolved, Failure> {
+    let JobsArguments { command, client, json } = arguments;
+    Ok(match command {
+        None => Resolved::Jobs { coordinator: remote(client)?, format: format(json) },
+        Some(JobsCommand::Prune(prune)) => Resolved::Prune {
+            older_than: prune.older_than,
+            keep_last: prune.keep_last,
+            coordinator: remote(prune.client.or(client))?,
+            format: format(json || prune.json),
+        },
+    })
+}
+
+/// `workers` and what is below it.
+fn resolve_workers(
+    arguments: WorkersArguments,
+    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
+) -> Result<Resolved, Failure> {
+    let WorkersArguments { command, client, json } = arguments;
+    Ok(match command {
+        None => Resolved::Workers { coordinator: remote(client)?, format: format(json) },
+        Some(WorkersCommand::Drain(drain)) => Resolved::DrainWorker {
+            worker: drain.worker,
+            coordinator: remote(drain.client.or(client))?,
+            format: format(json || drain.json),
+        },
+    })
 }
 
 fn resolve_worker(
