@@ -318,13 +318,19 @@ fn transport(uri: String, timeout: Duration) -> Result<Transport, tonic::transpo
 
 /// Whether the operating system says that nobody listens there.
 fn is_refused(error: &(dyn std::error::Error + 'static)) -> bool {
-    let mut causes = std::iter::successors(Some(error), |error| error.source());
-    causes.any(|cause| {
-        let io = cause.downcast_ref::<io::Error>();
-        io.is_some_and(|io| {
-            matches!(io.kind(), io::ErrorKind::ConnectionRefused | io::ErrorKind::NotFound)
-        })
-    })
+    let mut cause = Some(error);
+    while let Some(error) = cause {
+        let io = error.downcast_ref::<io::Error>();
+        if io.is_some_and(|io| io.kind() == io::ErrorKind::ConnectionRefused) {
+            return true;
+        }
+        // An I/O error hides the error that it was made of from the chain of causes.
+        cause = match io.and_then(io::Error::get_ref) {
+            Some(hidden) => Some(hidden),
+            None => error.source(),
+        };
+    }
+    false
 }
 
 /// The last cause of an error: for a transport error it is the operating system's.
