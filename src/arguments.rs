@@ -1,5 +1,7 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
+mod operators;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -7,6 +9,8 @@ use clap::{Args, Parser, Subcommand};
 use osteon_proto::endpoint::Endpoint;
 
 use crate::program;
+
+pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -36,6 +40,12 @@ pub(crate) enum Command {
     Submit(SubmitArguments),
     /// List the jobs of a coordinator
     Jobs(JobsArguments),
+    /// List the workers of a coordinator
+    Workers(WorkersArguments),
+    /// Say whether a coordinator serves: exit code 0 if so, else 1
+    Health(HealthArguments),
+    /// Copy the store of a coordinator while it runs
+    Backup(BackupArguments),
     /// Follow a job until it ends
     ///
     /// The limit of evaluations that is shown includes those that measure derivatives at the best
@@ -75,6 +85,9 @@ pub(crate) struct RunArguments {
     /// What is shown to the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
+    /// What people call the job, for `osteon jobs` and logs (at most 256 bytes)
+    #[arg(long, value_name = "TEXT", value_parser = job_name)]
+    pub(crate) name: Option<String>,
     /// Keep the results here; the same command resumes the run, or shows its results again
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -143,7 +156,8 @@ pub(crate) struct CoordinatorArguments {
     /// Its private key (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
     pub(crate) tls_key: Option<PathBuf>,
-    /// Clients need a token from this list: lines of NAME ROLE HASH, made by `osteon token`
+    /// Clients need a token from this list: lines of NAME ROLE HASH, made by `osteon token`; read
+    /// again, with the certificates, at SIGHUP
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
     /// File with one more client token, of role admin
@@ -189,16 +203,17 @@ pub(crate) struct WorkerArguments {
 /// What is shown to a coordinator, and how it is known.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CredentialArguments {
-    /// Certificates of the authorities that may have signed the coordinator's (PEM); for https
+    /// Certificates of the authorities that may have signed the coordinator's (PEM); for https [env:
+    /// OSTEON_TLS_CA]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_ca: Option<PathBuf>,
-    /// Client certificate (PEM)
+    /// Client certificate (PEM) [env: OSTEON_TLS_CERT]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_cert: Option<PathBuf>,
-    /// Its private key (PEM)
+    /// Its private key (PEM) [env: OSTEON_TLS_KEY]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_key: Option<PathBuf>,
-    /// File with an access token
+    /// File with an access token [env: OSTEON_TOKEN_FILE]
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
 }
@@ -244,6 +259,9 @@ pub(crate) struct SubmitArguments {
     /// Submitting again with the same ID gives the same job (at most 256 bytes)
     #[arg(long, value_name = "ID", value_parser = request_id)]
     pub(crate) request_id: Option<String>,
+    /// What people call the job, for `osteon jobs` and logs (at most 256 bytes)
+    #[arg(long, value_name = "TEXT", value_parser = job_name)]
+    pub(crate) name: Option<String>,
     /// Rank among your own jobs, 0 to 9: a higher one goes first
     #[arg(long, value_name = "P", default_value_t = 0,
           value_parser = clap::value_parser!(u32).range(0..=i64::from(osteon_common::limits::PRIORITY_MAX)))]
@@ -485,6 +503,21 @@ fn age(text: &str) -> Result<Duration, String> {
         .filter(|age| *age <= AGE_S_MAX)
         .and_then(|age| Duration::try_from_secs_f64(age).ok())
         .ok_or_else(|| "it must be a number with a unit, s, min, h or d: 90min, 30d".to_owned())
+}
+
+fn job_name(text: &str) -> Result<String, String> {
+    let max = osteon_common::limits::NAME_BYTES_MAX;
+    if text.len() > max || text.chars().any(char::is_control) {
+        return Err(format!("it must have at most {max} bytes and no control characters"));
+    }
+    Ok(text.to_owned())
+}
+
+fn probe_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.1..=60.0).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0.1 to 60 (s)".to_owned()),
+    }
 }
 
 fn request_id(text: &str) -> Result<String, String> {

@@ -1,5 +1,7 @@
 //! A client of the service of jobs: every wait has an end, every error names the coordinator.
 
+pub(crate) mod operators;
+
 use std::pin::pin;
 use std::time::Duration;
 
@@ -20,7 +22,7 @@ use tonic::{Code, Response, Status};
 
 use crate::progress::say;
 use crate::request::Request;
-use crate::resolved::VARIABLE;
+use crate::environment::COORDINATOR;
 
 use self::parts::Parts;
 
@@ -156,9 +158,18 @@ impl Remote {
     /// Says where the work is done, unless the command line says it.
     pub(crate) fn tell(&self) {
         if self.from_environment {
-            say(&format!("running on {} ({VARIABLE})", self.endpoint));
+            say(&format!("running on {} ({COORDINATOR})", self.endpoint));
         }
     }
+}
+
+/// What is told of a job besides its specification.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct SubmitOptions {
+    /// Rank among the user's own jobs.
+    pub(crate) priority: u32,
+    /// What people call it; may be empty.
+    pub(crate) name: String,
 }
 
 /// A connection to a coordinator.
@@ -206,13 +217,14 @@ impl Client {
         &mut self,
         specification: &JobSpecification,
         request: &Request,
-        priority: u32,
+        options: SubmitOptions,
     ) -> Result<String, ClientError> {
         let message = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
             request_id: request.id.clone(),
             client: request.client.clone(),
-            priority,
+            priority: options.priority,
+            name: options.name,
         };
         let (begun, mut uncertain) = (Instant::now(), false);
         loop {
@@ -410,8 +422,19 @@ async fn answered_within<T>(
     };
     match unless_silent(timeout(limit, call), notice).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
-        Ok(Err(status)) => Err(refused(endpoint, &status)),
+        Ok(Err(status)) => Err(unanswered(endpoint, &status)),
         Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),
+    }
+}
+
+/// What the status says that a call ended with before its answer came.
+fn unanswered(endpoint: &Endpoint, status: &Status) -> ClientError {
+    match refused(endpoint, status) {
+        ClientError::Lost { endpoint, .. } => {
+            let reason = endpoint.explained(status);
+            ClientError::Lost { endpoint, reason }
+        }
+        error => error,
     }
 }
 
@@ -422,7 +445,7 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
     if let Some(failure) = TlsFailure::of(status) {
         return ConnectError::Tls { endpoint: endpoint.clone(), failure }.into();
     }
-    let (endpoint, reason) = (endpoint.clone(), endpoint.explained(status.message()));
+    let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
     // What the coordinator itself answers has no source: that is an error of the transport.
     let answered = std::error::Error::source(status).is_none();
     match status.code() {

@@ -4,6 +4,7 @@ mod certs;
 mod coordinator;
 mod draw;
 mod jobs;
+mod operators;
 mod run;
 mod simulate;
 mod study;
@@ -36,8 +37,8 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Worker { config, files } => worker::serve(config, &files).await,
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
-        Resolved::Submit { job, kind, request, priority, coordinator, format } => {
-            let submission = jobs::Submission { job: &job, kind, request: &request, priority };
+        Resolved::Submit { job, kind, request, options, coordinator, format } => {
+            let submission = jobs::Submission { job: &job, kind, request: &request, options };
             let left = "the job may be accepted all the same (see `osteon jobs`)";
             unless_interrupted(jobs::submit(submission, &coordinator, format), left).await
         }
@@ -60,6 +61,20 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Fetch { job, coordinator, out } => {
             let left = "run the same command again to fetch the results";
             unless_interrupted(jobs::fetch(&job, &coordinator, &out), left).await
+        }
+        Resolved::Workers { coordinator, format } => {
+            unless_interrupted(operators::workers(&coordinator, format), NOTHING_LEFT).await
+        }
+        Resolved::DrainWorker { worker, coordinator, format } => {
+            let left = "the worker may be drained all the same (see `osteon workers`)";
+            unless_interrupted(operators::drain(worker, &coordinator, format), left).await
+        }
+        Resolved::Health { coordinator, limit, format } => {
+            unless_interrupted(operators::health(&coordinator, limit, format), NOTHING_LEFT).await
+        }
+        Resolved::Backup { directory, coordinator, format } => {
+            let made = operators::backup(&directory, &coordinator, format);
+            unless_interrupted(made, "no copy was kept").await
         }
     }
 }

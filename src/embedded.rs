@@ -84,7 +84,7 @@ impl Embedded {
 async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordinator, Failure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(Failure::failed)?;
-    let store: Box<dyn Store> = match store {
+    let store: Box<dyn Store + Send> = match store {
         StorePlace::Memory => Box::new(MemoryStore::new()),
         // This process submits its job again: one that is lost is computed anew.
         StorePlace::Directory(path) => {

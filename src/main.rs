@@ -10,9 +10,11 @@ mod commands;
 mod door;
 mod embedded;
 mod ending;
+mod environment;
 #[cfg(test)]
 mod fuzz;
 mod instruction_set;
+mod log_filter;
 mod new_files;
 mod output;
 mod program;
@@ -32,7 +34,6 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 use osteon_common::visible;
-use tracing_subscriber::EnvFilter;
 
 use crate::arguments::Arguments;
 use crate::ending::{Ending, Failure};
@@ -54,7 +55,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<Ending, Failure> {
     let resolved = Resolved::from_arguments(arguments)?;
-    trace(resolved.default_log_level());
+    trace(resolved.default_log_level())?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -67,13 +68,16 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
 }
 
 /// Logs go to stderr; `RUST_LOG` overrides the level.
-fn trace(default_level: &str) {
-    let filter =
-        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_level));
+///
+/// # Errors
+/// When `RUST_LOG` cannot be meant.
+fn trace(default_level: &str) -> Result<(), Failure> {
+    let filter = log_filter::read(std::env::var_os(log_filter::VARIABLE), default_level)?;
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(progress::LogWriter)
         .with_ansi(false)
         .with_target(false)
         .init();
+    Ok(())
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod json;
 mod text;
+mod times;
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,7 +11,9 @@ use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results_json;
 use osteon_common::sampling::NominalSampling;
-use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
+use osteon_proto::v1::{
+    BackupEnd, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+};
 use osteon_solver::{Arrival, Failure};
 use osteon_study::check::Check;
 use serde_json::{Value, json};
@@ -68,6 +71,18 @@ pub(crate) trait Output {
     fn submitted(&mut self, job: &str) -> io::Result<()>;
     /// All jobs, and the workers that are expelled.
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()>;
+    /// The attached workers, those that went last, and those that are expelled.
+    fn workers(
+        &mut self,
+        workers: &ListWorkersResponse,
+        expelled: &[ExpelledWorker],
+    ) -> io::Result<()>;
+    /// One worker as of now.
+    fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
+    /// That a coordinator serves, or why it does not.
+    fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
+    /// The copy of a store in a file.
+    fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()>;
     /// The jobs that are forgotten.
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()>;
     /// One job as of now.

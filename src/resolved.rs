@@ -1,6 +1,5 @@
 //! What the command line means: environment and defaults resolved, files not yet read.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -14,18 +13,16 @@ use osteon_worker::WorkerConfig;
 use crate::arguments::{
     Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
     DrawArguments, JobsArguments, JobsCommand, RunArguments, SimulateArguments, Study,
-    SubmitArguments, TokenArguments, WorkerArguments,
+    SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
-use crate::client::Remote;
+use crate::client::{Remote, SubmitOptions};
 use crate::ending::Failure;
+use crate::environment::Environment;
 use crate::instruction_set;
 use crate::request::Request;
 
 /// Worker processes of a run on this machine, unless given.
 const WORKERS_DEFAULT: u32 = 2;
-
-/// Where the environment names the coordinator.
-pub(crate) const VARIABLE: &str = "OSTEON_COORDINATOR";
 
 /// Format of what goes to stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,8 +75,8 @@ pub(crate) enum Resolved {
         kind: JobKind,
         /// The request that stands for it.
         request: Request,
-        /// Rank among the user's own jobs.
-        priority: u32,
+        /// What is told besides.
+        options: SubmitOptions,
         /// Where to.
         coordinator: Remote,
         /// How to print.
@@ -98,6 +95,40 @@ pub(crate) enum Resolved {
         older_than: Option<Duration>,
         /// So many that ended last are kept.
         keep_last: Option<u64>,
+        /// Of whom.
+        coordinator: Remote,
+        /// How to print.
+        format: Format,
+    },
+    /// `workers`.
+    Workers {
+        /// Of whom.
+        coordinator: Remote,
+        /// How to print.
+        format: Format,
+    },
+    /// `workers drain`.
+    DrainWorker {
+        /// Number of the worker.
+        worker: u64,
+        /// Of whom.
+        coordinator: Remote,
+        /// How to print.
+        format: Format,
+    },
+    /// `health`.
+    Health {
+        /// Of whom.
+        coordinator: Remote,
+        /// Longest wait for the answer.
+        limit: Duration,
+        /// How to print.
+        format: Format,
+    },
+    /// `backup`.
+    Backup {
+        /// Where to.
+        directory: PathBuf,
         /// Of whom.
         coordinator: Remote,
         /// How to print.
@@ -137,6 +168,8 @@ pub(crate) struct Run {
     pub(crate) job: PathBuf,
     /// Who computes.
     pub(crate) place: Place,
+    /// What people call the job; may be empty.
+    pub(crate) name: String,
     /// Where results are kept, if anywhere.
     pub(crate) out: Option<PathBuf>,
     /// How to print.
@@ -165,17 +198,16 @@ impl Resolved {
     pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, Failure> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let cores = u32::try_from(cores).unwrap_or(1);
-        let environment = environment(std::env::var_os(VARIABLE))?;
-        let coordinator = |flag| resolve_coordinator(flag, environment.as_deref());
+        let environment = Environment::of_process()?;
         let remote = |client: ClientArguments| {
             let from_environment = client.coordinator.is_none();
-            let endpoint = coordinator(client.coordinator)?;
-            let files = client.credentials.into();
+            let endpoint = environment.needed(client.coordinator)?;
+            let files = environment.files(client.credentials.into(), &endpoint);
             Ok::<_, Failure>(Remote { endpoint, files, from_environment })
         };
         let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
         let run = |kind, run| {
-            let run = resolve_run(kind, run, cores, environment.as_deref())?;
+            let run = resolve_run(kind, run, cores, &environment)?;
             if matches!(run.place, Place::Here { .. }) {
                 // Workers read it again; a wrong one is told here, at once.
                 isa()?;
@@ -190,9 +222,10 @@ impl Resolved {
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {
-                let endpoint = coordinator(arguments.coordinator.clone())?;
+                let endpoint = environment.needed(arguments.coordinator.clone())?;
+                let files = environment.files(arguments.credentials.clone().into(), &endpoint);
                 let config = resolve_worker(&arguments, endpoint, cores, isa()?);
-                Self::Worker { config, files: arguments.credentials.into() }
+                Self::Worker { config, files }
             }
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
@@ -200,18 +233,17 @@ impl Resolved {
                 let coordinator = remote(arguments.client.clone())?;
                 resolve_submit(arguments, coordinator)
             }
-            Command::Jobs(JobsArguments { command: None, client, json }) => {
-                Self::Jobs { coordinator: remote(client)?, format: format(json) }
-            }
-            Command::Jobs(JobsArguments {
-                command: Some(JobsCommand::Prune(prune)),
-                client,
-                json,
-            }) => Self::Prune {
-                older_than: prune.older_than,
-                keep_last: prune.keep_last,
-                coordinator: remote(prune.client.or(client))?,
-                format: format(json || prune.json),
+            Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
+            Command::Workers(arguments) => resolve_workers(arguments, remote)?,
+            Command::Health(arguments) => Self::Health {
+                coordinator: remote(arguments.client)?,
+                limit: Duration::from_secs_f64(arguments.timeout),
+                format: format(arguments.json),
+            },
+            Command::Backup(arguments) => Self::Backup {
+                directory: arguments.directory,
+                coordinator: remote(arguments.client)?,
+                format: format(arguments.json),
             },
             Command::Watch(arguments) => {
                 Self::Watch { job: arguments.job, coordinator: remote(arguments.client)? }
@@ -241,52 +273,26 @@ pub(crate) fn format(json: bool) -> Format {
     if json { Format::Json } else { Format::Text }
 }
 
-/// The address in the environment; an empty one counts as none.
-fn environment(value: Option<OsString>) -> Result<Option<String>, Failure> {
-    let text = value.map(OsString::into_string).transpose();
-    let text = text.map_err(|value| {
-        Failure::bad_input(anyhow!("in {VARIABLE}: {value:?} is not valid text"))
-    })?;
-    Ok(text.filter(|url| !url.is_empty()))
-}
-
-/// The coordinator that a command cannot do without.
-fn resolve_coordinator(
-    flag: Option<Endpoint>,
-    environment: Option<&str>,
-) -> Result<Endpoint, Failure> {
-    match (flag, environment) {
-        (Some(endpoint), _) => Ok(endpoint),
-        (None, Some(url)) => parse_environment(url),
-        (None, None) => Err(Failure::bad_input(anyhow!(
-            "no coordinator is given; use --coordinator URL or set {VARIABLE}"
-        ))),
-    }
-}
-
-fn parse_environment(url: &str) -> Result<Endpoint, Failure> {
-    url.parse::<Endpoint>().map_err(|error| {
-        Failure::bad_input(anyhow::Error::new(error).context(format!("in {VARIABLE}")))
-    })
-}
-
 fn resolve_run(
     kind: JobKind,
     arguments: RunArguments,
     cores: u32,
-    environment: Option<&str>,
+    environment: &Environment,
 ) -> Result<Run, Failure> {
-    let RunArguments { job, workers, threads, coordinator, credentials, out, json } = arguments;
+    let RunArguments { job, workers, threads, coordinator, credentials, name, out, json } =
+        arguments;
     let files = CredentialFiles::from(credentials);
     let here = workers.is_some() || threads.is_some();
     let from_environment = coordinator.is_none();
-    let there = match (coordinator, environment) {
-        (Some(endpoint), _) => Some(endpoint),
-        (None, Some(url)) if !here => Some(parse_environment(url)?),
-        _ => None,
+    let there = match coordinator {
+        None if !here => environment.coordinator()?,
+        given => given,
     };
     let place = match (there, files.first_given()) {
-        (Some(endpoint), _) => Place::There(Remote { endpoint, files, from_environment }),
+        (Some(endpoint), _) => {
+            let files = environment.files(files, &endpoint);
+            Place::There(Remote { endpoint, files, from_environment })
+        }
         (None, Some(option)) => {
             return Err(Failure::bad_input(anyhow!(
                 "{option} is for a coordinator, and none is given; add --coordinator URL"
@@ -297,7 +303,40 @@ fn resolve_run(
             Place::Here { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
         }
     };
-    Ok(Run { kind, job, place, out, format: format(json) })
+    Ok(Run { kind, job, place, name: name.unwrap_or_default(), out, format: format(json) })
+}
+
+/// `jobs` and what is below it.
+fn resolve_jobs(
+    arguments: JobsArguments,
+    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
+) -> Result<Resolved, Failure> {
+    let JobsArguments { command, client, json } = arguments;
+    Ok(match command {
+        None => Resolved::Jobs { coordinator: remote(client)?, format: format(json) },
+        Some(JobsCommand::Prune(prune)) => Resolved::Prune {
+            older_than: prune.older_than,
+            keep_last: prune.keep_last,
+            coordinator: remote(prune.client.or(client))?,
+            format: format(json || prune.json),
+        },
+    })
+}
+
+/// `workers` and what is below it.
+fn resolve_workers(
+    arguments: WorkersArguments,
+    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
+) -> Result<Resolved, Failure> {
+    let WorkersArguments { command, client, json } = arguments;
+    Ok(match command {
+        None => Resolved::Workers { coordinator: remote(client)?, format: format(json) },
+        Some(WorkersCommand::Drain(drain)) => Resolved::DrainWorker {
+            worker: drain.worker,
+            coordinator: remote(drain.client.or(client))?,
+            format: format(json || drain.json),
+        },
+    })
 }
 
 fn resolve_worker(
@@ -324,12 +363,12 @@ impl From<CredentialArguments> for CredentialFiles {
 }
 
 fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Resolved {
-    let SubmitArguments { job, client: _, propagate, request_id, priority, json } = arguments;
+    let SubmitArguments { job, client: _, propagate, request_id, name, priority, json } = arguments;
     Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
         request: request_id.map_or_else(Request::new, Request::with_id),
-        priority,
+        options: SubmitOptions { priority, name: name.unwrap_or_default() },
         coordinator,
         format: format(json),
     }
@@ -337,19 +376,30 @@ fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Resolved {
 
 #[cfg(test)]
 mod tests {
+    use std::ffi::OsString;
+
     use clap::Parser as _;
 
     use super::*;
 
-    fn run(line: &str, cores: u32, environment: Option<&str>) -> Run {
+    fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
         let words = line.split_whitespace();
         let command = Arguments::try_parse_from(words).unwrap().command;
         let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
             panic!("{line} is no run");
         };
-        let environment = super::environment(environment.map(OsString::from)).unwrap();
-        let environment = environment.as_deref();
-        resolve_run(JobKind::Identification, arguments, cores, environment).unwrap()
+        let environment = environment(coordinator);
+        resolve_run(JobKind::Identification, arguments, cores, &environment).unwrap()
+    }
+
+    /// The coordinator that is named, and files for it.
+    fn environment(coordinator: Option<&str>) -> Environment {
+        let files = ["OSTEON_TLS_CA", "OSTEON_TOKEN_FILE"];
+        Environment::read(|name| match name {
+            "OSTEON_COORDINATOR" => coordinator.map(OsString::from),
+            name => files.contains(&name).then(|| OsString::from("file")),
+        })
+        .unwrap()
     }
 
     fn here(line: &str, cores: u32) -> (u32, u32) {
@@ -391,28 +441,10 @@ mod tests {
             panic!("no run");
         };
         let failure =
-            resolve_run(JobKind::Identification, arguments, 2, Some("nowhere")).unwrap_err();
+            resolve_run(JobKind::Identification, arguments, 2, &environment(Some("nowhere")))
+                .unwrap_err();
         assert_eq!(failure.exit_code(), 2);
         assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
         assert!(failure.to_string().contains("`nowhere`"), "{failure}");
-    }
-
-    #[test]
-    fn a_client_needs_a_coordinator_and_an_empty_variable_is_none() {
-        let resolved = |flag: Option<&str>, variable: Option<&str>| {
-            let environment = super::environment(variable.map(OsString::from))?;
-            let flag = flag.map(|url| url.parse().unwrap());
-            resolve_coordinator(flag, environment.as_deref()).map(|endpoint| endpoint.to_string())
-        };
-        assert_eq!(resolved(Some("unix:a"), Some("unix:b")).unwrap(), "unix:a");
-        assert_eq!(resolved(Some("unix:a"), Some("")).unwrap(), "unix:a");
-        assert_eq!(resolved(None, Some("unix:b")).unwrap(), "unix:b");
-        for (variable, expected) in
-            [(None, "--coordinator URL"), (Some(""), "--coordinator URL"), (Some("b"), "`b`")]
-        {
-            let failure = resolved(None, variable).unwrap_err();
-            assert_eq!(failure.exit_code(), 2);
-            assert!(failure.to_string().contains(expected), "{failure}");
-        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot;
 
 use crate::ending::{Failure, Interruption};
@@ -15,7 +15,7 @@ const ONE_WISH: Duration = Duration::from_millis(300);
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Completes at the first SIGINT or SIGTERM after the call; these signals no longer end the process
-/// by themselves from then on. SIGHUP is left alone, so that `nohup` keeps its meaning.
+/// by themselves from then on. SIGHUP is left alone, so that `nohup` keeps its meaning, unless [`hangups`] asks for it.
 ///
 /// Who then presses Ctrl-C again does not want to wait for an orderly end: the process exits, with
 /// code 130.
@@ -63,6 +63,26 @@ pub(crate) async fn unless_interrupted<T>(
         result = command => result,
         Ok(interruption) = received => Err(Failure::Interrupted(interruption, left)),
     }
+}
+
+/// SIGHUP from now on, which no longer ends the process.
+///
+/// # Errors
+/// When the system does not let signals be handled.
+pub(crate) fn hangups() -> Result<Signal, Failure> {
+    signal(SignalKind::hangup()).map_err(|error| {
+        Failure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
+    })
+}
+
+/// The next signal; waits for ever without a source of them.
+pub(crate) async fn next(signals: &mut Option<Signal>) {
+    if let Some(signals) = signals
+        && signals.recv().await.is_some()
+    {
+        return;
+    }
+    std::future::pending().await
 }
 
 /// Ends the process at the next SIGINT.

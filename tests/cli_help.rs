@@ -9,38 +9,34 @@ use std::process::Command;
 use osteon_common::version::{NUMERICS_REVISION, RESULT_SCHEMA};
 use support::run;
 
+/// The subcommands that a help text lists.
+fn subcommands(help: &str) -> Vec<&str> {
+    let listed = help.split("\nCommands:\n").nth(1).unwrap_or_default();
+    let entries = listed.lines().take_while(|line| !line.is_empty());
+    // What is wrapped is indented further.
+    let entries = entries.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names = entries.filter_map(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").collect()
+}
+
+/// The help of a command and of all below it.
+fn help(words: &[&str], text: &mut String, count: &mut usize) {
+    let own = run(&[words, &["--help"]].concat()).succeeded().to_owned();
+    if !words.is_empty() {
+        text.push_str(&format!("\n==== osteon {}\n", words.join(" ")));
+    }
+    text.push_str(&own);
+    *count += 1;
+    for name in subcommands(&own) {
+        help(&[words, &[name]].concat(), text, count);
+    }
+}
+
 #[test]
 fn help_of_every_command() {
-    let mut text = run(&["--help"]).succeeded().to_owned();
-    for command in [
-        "identify",
-        "propagate",
-        "simulate",
-        "draw",
-        "coordinator",
-        "worker",
-        "submit",
-        "jobs",
-        "watch",
-        "cancel",
-        "fetch",
-        "certs",
-        "token",
-        "study",
-        "study failures",
-        "study accuracy",
-        "study methods",
-        "study refinement",
-        "study setups",
-        "study continuity",
-        "study variance",
-        "study digest",
-        "study convergence",
-    ] {
-        text.push_str(&format!("\n==== osteon {command}\n"));
-        let words: Vec<_> = command.split(' ').chain(["--help"]).collect();
-        text.push_str(run(&words).succeeded());
-    }
+    let (mut text, mut count) = (String::new(), 0);
+    help(&[], &mut text, &mut count);
+    assert!(count > 30, "only {count} commands were found");
     for line in text.lines().filter(|line| !line.starts_with("Usage: ")) {
         assert!(line.chars().count() <= 80, "{line}");
     }

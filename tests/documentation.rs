@@ -130,6 +130,29 @@ fn the_network_pages_commands_make_what_a_coordinator_takes() {
 }
 
 #[test]
+fn the_cluster_pages_commands_for_operators_run_as_they_stand() {
+    let scratch = Scratch::new();
+    scratch.write("job.toml", &support::job(20, 1));
+    let coordinator = support::Coordinator::start(&scratch.path("store"));
+    let all = commands("docs/cluster.md");
+    assert!(all.len() >= 8, "{all:?}");
+    for command in &all {
+        // As a shell would take it apart: what stands in quotes is one word.
+        let quoted = command.split('"').enumerate();
+        let words = quoted.flat_map(|(i, part)| match i % 2 {
+            0 => part.split_whitespace().map(str::to_owned).collect::<Vec<_>>(),
+            _ => vec![part.to_owned()],
+        });
+        let mut osteon = osteon();
+        osteon.args(words).current_dir(scratch.path("."));
+        let output = osteon.env("OSTEON_COORDINATOR", &coordinator.url).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "osteon {command}: {errors}");
+    }
+    assert!(scratch.path("monday/osteon.sqlite").exists());
+}
+
+#[test]
 fn the_grpc_pages_code_is_the_tested_clients() {
     let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path));
     let (page, client) = (read("docs/grpc.md").unwrap(), read("tests/python/osteon_client.py"));

@@ -189,7 +189,8 @@ impl LongRun {
 /// Stored evaluations of the only job at `url`; `None` while there is none.
 fn only_evaluations(url: &str) -> Option<u64> {
     let listed = run(&["jobs", "--json", "--coordinator", url]);
-    let jobs: Vec<Value> = serde_json::from_str(&listed.stdout).ok()?;
+    let listed: Value = serde_json::from_str(&listed.stdout).ok()?;
+    let jobs = listed.as_array()?;
     assert!(jobs.len() <= 1, "{jobs:?}");
     jobs.first().map(|job| job["evaluations"].as_u64().unwrap())
 }

@@ -54,8 +54,8 @@ fn by_newton() -> String {
 /// Evaluations so far of the only job at `url`.
 fn evaluations(url: &str) -> Option<u64> {
     let listed = run(&["jobs", "--json", "--coordinator", url]);
-    let jobs: Vec<Value> = serde_json::from_str(&listed.stdout).ok()?;
-    jobs.first()?["evaluations"].as_u64()
+    let listed: Value = serde_json::from_str(&listed.stdout).ok()?;
+    listed.as_array()?.first()?["evaluations"].as_u64()
 }
 
 /// Every row of a table by the names of its columns. No field but the last one holds a comma.

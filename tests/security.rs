@@ -16,6 +16,9 @@ use std::time::Duration;
 
 use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_proto::endpoint::{Connection, Endpoint, connect_with};
+use osteon_proto::v1::FILE_DESCRIPTOR_SET;
+use prost::Message as _;
+use prost_types::FileDescriptorSet;
 use secure::{Made, ROLES, Secure, certificate, mode, serve, set_up};
 use support::{Owned, Scratch, eventually, job, osteon, run, text};
 use time::OffsetDateTime;
@@ -84,27 +87,51 @@ fn secrets(scratch: &Scratch) -> Vec<String> {
     secrets
 }
 
-/// Every method, the roles that may call it, and whether a certificate is enough.
-const METHODS: [(&str, &[&str], bool); 10] = [
-    ("/grpc.health.v1.Health/Check", &["none", "stranger", "read", "submit", "admin"], true),
-    (
-        "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
-        &["read", "submit", "admin"],
-        true,
-    ),
-    (
-        "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
-        &["read", "submit", "admin"],
-        true,
-    ),
+/// Who may call a method of the services, by role, and whether a certificate is enough. A method that
+/// is not listed here is called by admins only: the one that is made next.
+const CALLERS: [(&str, &[&str], bool); 12] = [
+    ("/grpc.health.v1.Health/", &["none", "stranger", "read", "submit", "admin"], true),
+    ("/grpc.reflection.v1.ServerReflection/", &["read", "submit", "admin"], true),
+    ("/grpc.reflection.v1alpha.ServerReflection/", &["read", "submit", "admin"], true),
     ("/osteon.v1.Jobs/Get", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/List", &["read", "submit", "admin"], false),
+    ("/osteon.v1.Jobs/ListExpelled", &["read", "submit", "admin"], false),
+    ("/osteon.v1.Jobs/ListWorkers", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Watch", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Fetch", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Submit", &["submit", "admin"], false),
     ("/osteon.v1.Jobs/Cancel", &["submit", "admin"], false),
     ("/osteon.v1.Workers/Attach", &[], true),
 ];
+
+/// Every method that a coordinator describes by reflection or that describes it, who may call it, and
+/// whether a certificate is enough.
+fn methods() -> Vec<(String, &'static [&'static str], bool)> {
+    let described = [
+        FILE_DESCRIPTOR_SET,
+        tonic_health::pb::FILE_DESCRIPTOR_SET,
+        tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
+        tonic_reflection::pb::v1alpha::FILE_DESCRIPTOR_SET,
+    ];
+    let mut methods = Vec::new();
+    for set in described {
+        for file in FileDescriptorSet::decode(set).unwrap().file {
+            for service in &file.service {
+                for method in &service.method {
+                    let service = format!("/{}.{}/", file.package(), service.name());
+                    let path = format!("{service}{}", method.name());
+                    let known = CALLERS.iter().find(|(of, ..)| *of == path || *of == service);
+                    let (roles, enough): (&[&str], bool) =
+                        known.map_or((&["admin"], false), |(_, roles, enough)| (roles, *enough));
+                    methods.push((path, roles, enough));
+                }
+            }
+        }
+    }
+    // Prune, DrainWorker and Backup are for admins; each of the others is listed.
+    assert!(methods.len() >= CALLERS.len() + 3, "{methods:?}");
+    methods
+}
 
 /// A connection with a token and a certificate, by name, if given.
 async fn connection(secure: &Secure, token: Option<&str>, certificate: Option<&str>) -> Connection {
@@ -121,18 +148,19 @@ async fn connection(secure: &Secure, token: Option<&str>, certificate: Option<&s
 }
 
 /// Calls a method with an empty message; the status of its answer.
-async fn call(connection: &Connection, path: &'static str, header: Option<&str>) -> Status {
+async fn call(connection: &Connection, path: &str, header: Option<&str>) -> Status {
     let mut grpc = Grpc::new(connection.clone());
     grpc.ready().await.unwrap();
     let mut request = Request::new(());
     if let Some(header) = header {
         request.metadata_mut().insert("authorization", header.parse().unwrap());
     }
-    let path = tonic::codegen::http::uri::PathAndQuery::from_static(path);
+    let path = path.parse().unwrap();
     let codec = ProstCodec::<(), ()>::default();
     let answer = tokio::time::timeout(TIMEOUT, async {
         let mut stream = grpc.server_streaming(request, path, codec).await?.into_inner();
-        while stream.message().await?.is_some() {}
+        // Some streams have no end.
+        stream.message().await?;
         Ok::<_, Status>(())
     });
     answer.await.unwrap().err().unwrap_or_else(|| Status::ok(""))
@@ -151,8 +179,8 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
     for token in ["none", "stranger", "read", "submit", "admin"] {
         let given = (token != "none").then_some(token);
         let connection = connection(&secure, given, None).await;
-        for (path, allowed, _) in METHODS {
-            let status = call(&connection, path, None).await;
+        for (path, allowed, _) in methods() {
+            let status = call(&connection, &path, None).await;
             let context = format!("{path} with {token}: {status}");
             assert_eq!(is_let_in(&status), allowed.contains(&token), "{context}");
             if is_let_in(&status) {
@@ -163,10 +191,11 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
                 _ if worker => (Code::Unauthenticated, "give --tls-cert and --tls-key"),
                 "none" => (Code::Unauthenticated, "give --token-file"),
                 "stranger" => (Code::Unauthenticated, "does not know the token"),
-                _ => (
+                _ if allowed.contains(&"submit") => (
                     Code::PermissionDenied,
                     "`read-holder` has role read, and this needs role submit",
                 ),
+                _ => (Code::PermissionDenied, "and this needs role admin"),
             };
             assert_eq!(status.code(), code, "{context}");
             assert!(status.message().contains(message), "{context}");
@@ -179,7 +208,7 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
         assert!(status.message().contains("must be `Bearer`"), "{header}: {status}");
     }
     // Nothing was started by any of it.
-    assert_eq!(secure.client("read", &["jobs", "--json"]).json(), serde_json::json!([]));
+    assert_eq!(secure.client("read", &["jobs", "--json"]).json()["jobs"], serde_json::json!([]));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -187,8 +216,8 @@ async fn a_certificate_opens_the_service_of_workers_and_no_other() {
     let secure = Secure::start();
     for (certificate, works) in [("worker", true), ("client", false)] {
         let connection = connection(&secure, None, Some(certificate)).await;
-        for (path, _, enough) in METHODS {
-            let status = call(&connection, path, None).await;
+        for (path, _, enough) in methods() {
+            let status = call(&connection, &path, None).await;
             let expected = enough && (works || !path.ends_with("/Attach"));
             assert_eq!(is_let_in(&status), expected, "{path} with {certificate}: {status}");
         }
@@ -301,9 +330,17 @@ fn an_expired_certificate_is_told_to_whoever_meets_it() {
 fn tls_and_plain_http_meet_with_an_explanation() {
     let secure = Secure::start();
     let plain = secure.url.replace("https://", "http://");
-    let finished = run(&["jobs", "--coordinator", &plain]);
-    assert_eq!(finished.code, Some(1), "{finished:?}");
-    assert!(finished.stderr.contains(&plain), "{finished:?}");
+    let token = secure.scratch.path("read.token");
+    let hint = format!("if the coordinator speaks TLS, write {}", secure.url);
+    for options in [&[] as &[&str], &["--token-file", text(&token)]] {
+        let finished = run(&[&["jobs", "--coordinator", &plain], options].concat());
+        assert_eq!(finished.code, Some(1), "{finished:?}");
+        assert!(finished.stderr.contains(&plain), "{finished:?}");
+        assert!(finished.stderr.contains(&hint), "{finished:?}");
+    }
+    let worker = run(&["worker", "--coordinator", &plain, "--give-up-after", "0.5"]);
+    assert_eq!(worker.code, Some(1), "{worker:?}");
+    assert!(worker.stderr.contains(&hint), "{worker:?}");
 
     let open = support::Coordinator::start(&secure.scratch.path("open"));
     let tls = open.url.replace("http://", "https://");

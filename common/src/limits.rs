@@ -96,6 +96,8 @@ pub const FETCHES_AT_ONCE_MAX: usize = 8;
 pub const FETCHES_OF_ONE_MAX: usize = 2;
 /// Longest time that a fetch takes, s.
 pub const FETCH_S_MAX: u64 = 300;
+/// Longest time that a backup takes, s.
+pub const BACKUP_S_MAX: u64 = 3600;
 /// A fetch ends when its reader takes nothing for this long, s.
 pub const READER_PATIENCE_S: u64 = 30;
 /// Highest priority of a job among those of its client.

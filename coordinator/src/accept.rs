@@ -11,7 +11,7 @@ use futures::{Stream, stream};
 use osteon_common::limits::HANDSHAKES_MAX;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::JoinSet;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 use tokio_rustls::server::TlsStream;
@@ -67,7 +67,7 @@ enum Io {
 /// is dropped without a word.
 pub(crate) fn connections(
     bound: Bound,
-    tls: Option<Tls>,
+    tls: Option<watch::Receiver<Tls>>,
 ) -> impl Stream<Item = io::Result<Connection>> {
     let acceptor = Acceptor {
         bound,
@@ -84,7 +84,8 @@ pub(crate) fn connections(
 
 struct Acceptor {
     bound: Bound,
-    tls: Option<Tls>,
+    /// Read for each connection: it may be replaced while the coordinator runs.
+    tls: Option<watch::Receiver<Tls>>,
     places: Arc<Semaphore>,
     handshakes: JoinSet<Option<Connection>>,
     /// When it was last said that the operating system gives no connection.
@@ -113,7 +114,8 @@ impl Acceptor {
                     };
                     match (&self.tls, io) {
                         (Some(tls), Io::Tcp(stream)) => {
-                            self.handshakes.spawn(handshake(tls.clone(), stream, place));
+                            let tls = tls.borrow().clone();
+                            self.handshakes.spawn(handshake(tls, stream, place));
                         }
                         (_, io) => return Connection::new(io, Certificate::Absent, place),
                     }

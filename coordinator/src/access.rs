@@ -127,7 +127,7 @@ pub fn need(path: &str) -> Need {
     match (service, method) {
         ("grpc.health.v1.Health", _) => Need::Nothing,
         ("osteon.v1.Workers", _) => Need::Worker,
-        ("osteon.v1.Jobs", "Get" | "List" | "ListExpelled" | "Watch" | "Fetch") => {
+        ("osteon.v1.Jobs", "Get" | "List" | "ListExpelled" | "ListWorkers" | "Watch" | "Fetch") => {
             Need::Role(Role::Read)
         }
         ("osteon.v1.Jobs", "Submit" | "Cancel") => Need::Role(Role::Submit),

@@ -8,6 +8,7 @@ use std::time::Duration;
 use osteon_common::limits::{
     SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_S_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX,
 };
+use tokio::sync::watch;
 use tonic::body::Body;
 use tonic::codegen::{Service, http};
 use tonic::{Code, Status};
@@ -29,7 +30,8 @@ const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
 /// Puts a [`Door`] before a service.
 #[derive(Debug, Clone)]
 pub(crate) struct AccessLayer {
-    policy: Arc<Policy>,
+    /// Read for each call: it may be replaced while the coordinator runs.
+    policy: watch::Receiver<Arc<Policy>>,
     submissions: Places,
 }
 
@@ -41,9 +43,9 @@ pub(crate) struct Door<S> {
 }
 
 impl AccessLayer {
-    pub(crate) fn new(policy: Policy) -> Self {
+    pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>) -> Self {
         let submissions = Places::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
-        Self { policy: Arc::new(policy), submissions }
+        Self { policy, submissions }
     }
 
     /// The holder of the call's token, if tokens are asked for.
@@ -54,7 +56,8 @@ impl AccessLayer {
         let header = request.headers().get(http::header::AUTHORIZATION);
         let presented = access::presented(header.map(http::HeaderValue::as_bytes));
         let need = access::need(path);
-        match access::decide(&self.policy, certificate, presented, need) {
+        let policy = Arc::clone(&self.policy.borrow());
+        match access::decide(&policy, certificate, presented, need) {
             Ok(holder) => {
                 // Who changed something shall be found in the log; who looks is no news.
                 if let (Some(holder), Need::Role(Role::Submit | Role::Admin)) = (holder, need) {

@@ -161,6 +161,9 @@ impl Core {
                 Effect::Heartbeat { worker } => {
                     self.send(worker, service_workers::heartbeat(), followups);
                 }
+                Effect::Drain { worker } => {
+                    self.send(worker, service_workers::drain(), followups);
+                }
                 Effect::Close { worker, reason } => self.close(worker, &reason),
                 Effect::Store(record) => {
                     let (job, key) = record.key();
@@ -191,6 +194,7 @@ impl Core {
                         let _ = reply.send(answer);
                     }
                 }
+                Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
                 Effect::Despair { error, waited } => {
                     self.failing.tell(Failed::StoreRefuses { error, waited });
@@ -215,7 +219,7 @@ impl Core {
     }
 
     fn close(&mut self, worker: WorkerId, reason: &CloseReason) {
-        tracing::info!(%worker, %reason, "a worker's stream is closed");
+        tracing::debug!(%worker, %reason, "stream of a worker closed");
         if let Some(outbound) = self.outbound.remove(&worker) {
             // A full queue belongs to a worker that does not read; it sees the stream end.
             let _ = outbound.send(Err(service_workers::status(reason)));

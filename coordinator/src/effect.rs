@@ -5,11 +5,12 @@ use std::time::Duration;
 
 use osteon_proto::batch::Work;
 use osteon_proto::malformed::Malformed;
-use osteon_proto::v1::JobSnapshot;
+use osteon_proto::v1::{JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use thiserror::Error;
 
 use crate::event::RecordKey;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::notice::Notice;
 use crate::search::Summary;
 use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
 
@@ -41,6 +42,11 @@ pub enum Effect {
     },
     /// Give a worker a sign of life.
     Heartbeat {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// Tell a worker to leave when it has answered what it holds.
+    Drain {
         /// The worker.
         worker: WorkerId,
     },
@@ -81,6 +87,8 @@ pub enum Effect {
         /// How it stands.
         snapshot: JobSnapshot,
     },
+    /// Tell the operator, in the log.
+    Note(Notice),
     /// Say that the store takes nothing any more.
     Despair {
         /// What it said last.
@@ -147,6 +155,10 @@ pub enum Answer {
     Pruned(Vec<JobId>),
     /// The expelled workers, with the time since then.
     Expelled(Vec<(ExpulsionRecord, Duration)>),
+    /// The attached workers, and those that went last.
+    Workers(ListWorkersResponse),
+    /// How a worker stands.
+    Worker(WorkerSnapshot),
     /// The request is refused.
     Refused(Refusal),
 }
@@ -159,6 +171,12 @@ pub enum Refusal {
     NoJob {
         /// The job asked for.
         job: JobId,
+    },
+    /// There is no such worker.
+    #[error("no worker with number {worker} is attached; `osteon workers` lists those that are")]
+    NoWorker {
+        /// The worker asked for.
+        worker: WorkerId,
     },
     /// The request id belongs to a job with another specification.
     #[error(

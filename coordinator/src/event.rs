@@ -125,6 +125,8 @@ pub enum Request {
         client: String,
         /// Rank among the client's jobs.
         priority: u32,
+        /// What people call it; may be empty.
+        name: String,
     },
     /// A snapshot.
     Get(JobId),
@@ -143,6 +145,10 @@ pub enum Request {
     Prune(Retention),
     /// The workers that were found to compute wrongly.
     Expelled,
+    /// The attached workers, and those that went last.
+    Workers,
+    /// A worker sent away when it has answered what it holds.
+    DrainWorker(WorkerId),
 }
 
 /// Which ended jobs are kept: one that meets both conditions is forgotten.

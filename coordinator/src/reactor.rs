@@ -55,7 +55,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
         Event::Misbehaved { worker, reason } => {
             workers::close(state, worker, reason, now, &mut effects);
         }
-        Event::StreamEnded { worker } => workers::stream_ended(state, worker, now),
+        Event::StreamEnded { worker } => workers::stream_ended(state, worker, now, &mut effects),
         Event::Stored { job, key } => jobs::stored(state, job, key, now, &mut effects),
         Event::StoreFailed { job, key, error } => {
             jobs::store_failed(state, job, key, error, now, &mut effects);

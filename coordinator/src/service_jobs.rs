@@ -10,23 +10,26 @@ use osteon_common::limits::{
 };
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
-    CancelRequest, CancelResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest,
-    GetResponse, JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest, ListResponse,
-    PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest, WatchResponse,
+    BackupRequest, BackupResponse, CancelRequest, CancelResponse, DrainWorkerRequest,
+    DrainWorkerResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest, GetResponse,
+    JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest, ListResponse,
+    ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest,
+    SubmitResponse, WatchRequest, WatchResponse,
 };
 use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
 use crate::access_layer::Holder;
+use crate::backing_up;
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
 
 use crate::event::{self, Retention};
 use crate::fetching;
-use crate::ids::JobId;
+use crate::ids::{JobId, WorkerId};
 use crate::observers;
 use crate::places::{Caller, Places};
 use crate::store_thread::Command;
@@ -46,13 +49,16 @@ pub(crate) struct JobsService {
     store: mpsc::Sender<Command>,
     /// What jobs left may be large: a few at a time are held in memory.
     fetches: Places,
+    /// A copy of the store takes room on its disk: one at a time.
+    backups: Arc<Semaphore>,
 }
 
 type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        Self { messages, store, fetches: Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX) }
+        let fetches = Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
+        Self { messages, store, fetches, backups: Arc::new(Semaphore::new(1)) }
     }
 
     /// Queues a message for the core; refused when it does not keep up.
@@ -103,20 +109,25 @@ impl JobsService {
 impl Jobs for JobsService {
     type WatchStream = BoxStream<WatchResponse>;
     type FetchStream = BoxStream<FetchResponse>;
+    type BackupStream = BoxStream<BackupResponse>;
 
     async fn submit(
         &self,
         request: Request<SubmitRequest>,
     ) -> Result<Response<SubmitResponse>, Status> {
         let holder = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
-        let SubmitRequest { specification: message, request_id, client, priority } =
+        let SubmitRequest { specification: message, request_id, client, priority, name } =
             request.into_inner();
         // Who showed a token is who it was made for, whatever else it says.
         let client = holder.unwrap_or(client);
-        for (field, value) in [("request_id", &request_id), ("client", &client)] {
+        for (field, value) in [("request_id", &request_id), ("client", &client), ("name", &name)] {
             if value.len() > NAME_BYTES_MAX {
                 return Err(too_long(field, value));
             }
+        }
+        if name.chars().any(char::is_control) {
+            let message = format!("is {name:?}; control characters are not allowed");
+            return Err(status::bad_field("name", &message));
         }
         if priority > PRIORITY_MAX {
             let message = format!("is {priority}; 0 to {PRIORITY_MAX} are allowed");
@@ -126,7 +137,7 @@ impl Jobs for JobsService {
         let specification = specification::from_message(&message)
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
-        let submit = event::Request::Submit { specification, request_id, client, priority };
+        let submit = event::Request::Submit { specification, request_id, client, priority, name };
         match self.ask(submit).await? {
             Answer::Submitted(job) => Ok(Response::new(SubmitResponse { job: job.to_string() })),
             _ => Err(unexpected()),
@@ -176,7 +187,9 @@ impl Jobs for JobsService {
         &self,
         request: Request<CancelRequest>,
     ) -> Result<Response<CancelResponse>, Status> {
+        let user = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
         let job = job(&request.into_inner().job)?;
+        tracing::info!(%job, user, "job is to be cancelled");
         let cancelled = self.snapshot(event::Request::Cancel(job));
         let snapshot = match timeout(END_PATIENCE, cancelled).await {
             Ok(snapshot) => snapshot?,
@@ -210,6 +223,44 @@ impl Jobs for JobsService {
             Answer::Pruned(jobs) => {
                 let jobs = jobs.iter().map(JobId::to_string).collect();
                 Ok(Response::new(PruneResponse { jobs }))
+            }
+            _ => Err(unexpected()),
+        }
+    }
+
+    async fn backup(
+        &self,
+        _: Request<BackupRequest>,
+    ) -> Result<Response<Self::BackupStream>, Status> {
+        let place = Arc::clone(&self.backups).try_acquire_owned().map_err(|_| {
+            status::resource_exhausted(
+                "another backup is under way; try again when it ended",
+                RETRY,
+            )
+        })?;
+        let (reply, copied) = oneshot::channel();
+        self.store.send(Command::Copy { reply }).await.map_err(|_| stopped())?;
+        Ok(Response::new(Box::pin(backing_up::streamed(copied, place))))
+    }
+
+    async fn list_workers(
+        &self,
+        _: Request<ListWorkersRequest>,
+    ) -> Result<Response<ListWorkersResponse>, Status> {
+        match self.ask(event::Request::Workers).await? {
+            Answer::Workers(workers) => Ok(Response::new(workers)),
+            _ => Err(unexpected()),
+        }
+    }
+
+    async fn drain_worker(
+        &self,
+        request: Request<DrainWorkerRequest>,
+    ) -> Result<Response<DrainWorkerResponse>, Status> {
+        let worker = WorkerId(request.into_inner().worker);
+        match self.ask(event::Request::DrainWorker(worker)).await? {
+            Answer::Worker(worker) => {
+                Ok(Response::new(DrainWorkerResponse { worker: Some(worker) }))
             }
             _ => Err(unexpected()),
         }
@@ -249,6 +300,7 @@ fn refused(refusal: &Refusal) -> Status {
     let message = refusal.to_string();
     match refusal {
         Refusal::NoJob { job } => status::no_job(job.to_string(), message),
+        Refusal::NoWorker { worker } => status::no_worker(worker.to_string(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
             status::resource_exhausted(message, RETRY)

@@ -12,7 +12,7 @@ use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::workers_server::Workers;
 use osteon_proto::v1::{
-    AttachRequest, AttachResponse, BatchRevoke, Heartbeat, WorkerHello, WorkerWelcome,
+    AttachRequest, AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerHello, WorkerWelcome,
 };
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
@@ -190,6 +190,11 @@ pub(crate) fn batch(id: BatchId, work: &Work) -> AttachResponse {
 /// A batch that a worker is to forget.
 pub(crate) fn revoke(batch: BatchId) -> AttachResponse {
     respond(Response::Revoke(BatchRevoke { batch: batch.0 }))
+}
+
+/// The wish that a worker leaves when it has answered what it holds.
+pub(crate) fn drain() -> AttachResponse {
+    respond(Response::Drain(WorkerDrain {}))
 }
 
 /// A sign of life.

@@ -2,6 +2,7 @@
 //! port. This, the services and [`crate::core_task`] are all that is asynchronous; they only move
 //! bytes.
 
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -10,7 +11,7 @@ use osteon_proto::v1;
 use osteon_proto::v1::jobs_server::JobsServer;
 use osteon_proto::v1::workers_server::WorkersServer;
 use thiserror::Error;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tonic::transport::Server;
 use tonic::transport::server::Router;
 use tower::layer::util::{Identity, Stack};
@@ -29,6 +30,8 @@ use crate::service_workers::WorkersService;
 use crate::state::State;
 use crate::store::{Store, StoreError};
 use crate::store_thread::{self, Command};
+use crate::tls::Tls;
+use crate::tokens::Tokens;
 
 /// Events that may wait for the one task.
 const EVENTS_MAX: usize = 1024;
@@ -75,6 +78,8 @@ pub struct Coordinator {
     url: String,
     failing: Failing,
     messages: mpsc::Sender<Message>,
+    policy: watch::Sender<Arc<Policy>>,
+    tls: Option<watch::Sender<Tls>>,
     stop_serving: oneshot::Sender<()>,
     server: tokio::task::JoinHandle<()>,
     core: tokio::task::JoinHandle<()>,
@@ -88,7 +93,7 @@ pub struct Coordinator {
 /// When the store cannot be read.
 pub async fn start(
     listener: Listener,
-    mut store: Box<dyn Store>,
+    mut store: Box<dyn Store + Send>,
     config: Config,
 ) -> Result<Coordinator, StartError> {
     let load = move || Restored::load(store.as_mut()).map(|restored| (store, restored));
@@ -97,6 +102,12 @@ pub async fn start(
     let audit_key = AuditKey::random().ok_or(StartError::NoRandomness)?;
     let config = Config { audit_key, ..config };
     let clock = Clock::new();
+    tracing::info!(
+        unfinished_jobs = restored.unfinished(),
+        ended_jobs = restored.ended(),
+        expelled_workers = restored.expelled(),
+        "jobs recovered from the store"
+    );
     let (state, effects) = State::restore(config, restored, clock.now());
 
     let failing = Failing::new();
@@ -104,24 +115,54 @@ pub async fn start(
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
     let (commands, store) = store_thread::start(store, events, failing.guard(Failed::Store))
         .map_err(|source| StartError::Thread { source })?;
-    let router = services(&messages, &commands, listener.policy.clone(), config).await?;
+    let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
+    let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
+    let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let server = serve(router, listener, stopped);
+    let server = serve(router, listener, shown, stopped);
     let server = tokio::spawn(guarded(failing.guard(Failed::Server), server));
     let guard = failing.guard(Failed::Core);
     let core = Core::new(state, clock, commands, failing.clone());
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");
-    let shutdown_timeout = config.shutdown_timeout;
-    Ok(Coordinator { url, failing, messages, stop_serving, server, core, store, shutdown_timeout })
+    Ok(Coordinator {
+        url,
+        failing,
+        messages,
+        policy,
+        tls,
+        stop_serving,
+        server,
+        core,
+        store,
+        shutdown_timeout: config.shutdown_timeout,
+    })
 }
 
 impl Coordinator {
     /// URL that clients and workers use: `http://127.0.0.1:PORT` or `unix:PATH`.
     pub fn url(&self) -> &str {
         &self.url
+    }
+
+    /// Takes these tokens, and no others, for every call that begins from now on. A coordinator
+    /// that asks for none goes on to ask for none.
+    pub fn replace_tokens(&self, tokens: Tokens) {
+        self.policy.send_modify(|policy| match **policy {
+            Policy::Everybody => {}
+            Policy::Tokens(_) => *policy = Arc::new(Policy::Tokens(tokens)),
+            Policy::Tls(_) => *policy = Arc::new(Policy::Tls(tokens)),
+        });
+    }
+
+    /// Uses these certificates for every connection that begins from now on; a coordinator
+    /// without TLS goes on without.
+    pub fn replace_tls(&self, with: Tls) {
+        if let Some(tls) = &self.tls {
+            tls.send_replace(with);
+        }
     }
 
     /// Waits, for ever if all is well, until a part of the coordinator has ended unasked, or the
@@ -171,7 +212,7 @@ async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
 async fn services(
     messages: &mpsc::Sender<Message>,
     commands: &mpsc::Sender<Command>,
-    policy: Policy,
+    policy: watch::Receiver<Arc<Policy>>,
     config: Config,
 ) -> Result<GuardedRouter, StartError> {
     let jobs = JobsService::new(messages.clone(), commands.clone());
@@ -210,12 +251,17 @@ async fn services(
         ))
 }
 
-async fn serve(router: GuardedRouter, listener: Listener, stopped: oneshot::Receiver<()>) {
+async fn serve(
+    router: GuardedRouter,
+    listener: Listener,
+    tls: Option<watch::Receiver<Tls>>,
+    stopped: oneshot::Receiver<()>,
+) {
     let signal = async {
         // Told, or the coordinator was dropped: both mean stop.
         let _ = stopped.await;
     };
-    let Listener { bound, tls, file: _file, .. } = listener;
+    let Listener { bound, file: _file, .. } = listener;
     let connections = accept::connections(bound, tls);
     if let Err(error) = router.serve_with_incoming_shutdown(connections, signal).await {
         tracing::error!(%error, "the server ended");

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use osteon_proto::choice::{JOB_FAILURE, JOB_KIND, JOB_STATUS};
+use osteon_proto::timestamp;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
@@ -30,6 +31,10 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
         workers: workers(state),
         elapsed_s: now.saturating_sub(job.record.accepted).as_secs_f64(),
         sequence: job.sequence,
+        client: job.record.client.clone(),
+        name: job.record.name.clone(),
+        priority: job.record.priority,
+        submit_time: Some(timestamp::to_message(job.record.accepted)),
         ..JobSnapshot::default()
     };
     match &job.stage {
@@ -70,6 +75,11 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
         workers: workers(state),
         elapsed_s: end.ended.saturating_sub(job.accepted).as_secs_f64(),
         sequence: job.sequence,
+        client: job.client.clone(),
+        name: job.name.clone(),
+        priority: job.priority,
+        submit_time: Some(timestamp::to_message(job.accepted)),
+        end_time: Some(timestamp::to_message(end.ended)),
         ..JobSnapshot::default()
     };
     snapshot.set_state(JobState::Ended);

@@ -18,6 +18,7 @@ use crate::evaluation::{Evaluation, Indices};
 use crate::event::Hello;
 use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::notice::Departure;
 use crate::pace::Pace;
 use crate::probation::Probation;
 use crate::rate::Rate;
@@ -32,6 +33,8 @@ pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
 const LOST_IN_A_ROW_MAX: usize = 3;
 /// So many of them are remembered.
 const LOST_SHOWN_MAX: usize = 99;
+/// Workers that went which are remembered, to be listed.
+pub(crate) const DEPARTED_MAX: usize = 64;
 /// Settled batches that are remembered for each worker, to compare late answers with.
 pub(crate) const SETTLED_MAX: usize = 16;
 
@@ -64,6 +67,8 @@ pub struct State {
     /// When old jobs were looked for last; `None` if they were not.
     pub(crate) pruned: Option<Duration>,
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
+    /// Workers that went last, the newest at the end, at most [`DEPARTED_MAX`].
+    pub(crate) departed: VecDeque<Departed>,
     /// Workers that compute wrongly, in the order in which they were found.
     pub(crate) expelled: Vec<Expelled>,
     /// How many workers of a host were lost in a row with what they held, none answering anything
@@ -173,6 +178,12 @@ pub(crate) struct EndedJob {
     pub(crate) request: Option<RequestName>,
     pub(crate) identity: Identity,
     pub(crate) kind: JobKind,
+    /// Who submitted it.
+    pub(crate) client: String,
+    /// What people call it; may be empty.
+    pub(crate) name: String,
+    /// Its rank among the jobs of its client.
+    pub(crate) priority: u32,
     pub(crate) max_evaluations: u64,
     /// Realizations of each evaluation.
     pub(crate) realizations: u64,
@@ -213,6 +224,18 @@ pub(crate) struct LostInARow {
     pub(crate) last: Duration,
 }
 
+/// A worker that is not attached any more.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Departed {
+    pub(crate) worker: WorkerId,
+    pub(crate) name: WorkerName,
+    /// When it went.
+    pub(crate) at: Duration,
+    /// How many batches it held.
+    pub(crate) batches: usize,
+    pub(crate) why: Departure,
+}
+
 /// A stay of a worker.
 #[derive(Debug)]
 pub(crate) struct Worker {
@@ -235,6 +258,8 @@ pub(crate) struct Worker {
     pub(crate) in_flight: Vec<BatchId>,
     /// Batches it answered or was told to forget, newest last.
     pub(crate) settled: VecDeque<(BatchId, Assignment)>,
+    /// What it answers, over all jobs.
+    pub(crate) rate: Rate,
     /// Realizations per second, by job.
     pub(crate) rates: BTreeMap<JobId, f64>,
     /// It wants no more batches.
@@ -313,6 +338,7 @@ impl State {
             started: now,
             pruned: None,
             workers: BTreeMap::new(),
+            departed: VecDeque::new(),
             expelled: Vec::new(),
             lost_in_a_row: BTreeMap::new(),
             probation: Probation::default(),
@@ -529,6 +555,9 @@ impl EndedJob {
             request: RequestName::of(record),
             identity: identity(specification),
             kind: specification.kind,
+            client: record.client.clone(),
+            name: record.name.clone(),
+            priority: record.priority,
             max_evaluations: specification.evaluations_max(),
             realizations: specification.monte_carlo.realizations,
             accepted: record.accepted,

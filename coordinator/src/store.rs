@@ -5,6 +5,8 @@
 //! answer was lost can be repeated.
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -40,6 +42,8 @@ pub struct JobRecord {
     pub client: String,
     /// Its rank among the jobs of its client: a higher one goes first.
     pub priority: u32,
+    /// What people call it; may be empty.
+    pub name: String,
 }
 
 /// A complete evaluation.
@@ -234,6 +238,17 @@ pub enum StoreError {
         /// What SQLite said.
         error: rusqlite::Error,
     },
+    /// There is no file to copy.
+    #[error("this coordinator keeps its jobs in memory; there is nothing to copy")]
+    NoFile,
+    /// A copy of it cannot be made.
+    #[error("{} cannot be made or removed: {error}; look at its directory", path.display())]
+    Copy {
+        /// The file of the copy.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
     /// Its pages do not fit together.
     #[error(
         "{} is damaged: {found}; restore the file from a copy, or choose another directory",
@@ -358,8 +373,11 @@ pub enum DamagedRecord {
     Expulsion,
 }
 
+/// What is done between two pieces of a copy; `Break` ends it.
+pub type Between<'a> = dyn FnMut(&mut dyn Store) -> ControlFlow<()> + 'a;
+
 /// A durable place for jobs.
-pub trait Store: Send {
+pub trait Store {
     /// All jobs, in the order of their identifiers.
     ///
     /// # Errors
@@ -368,6 +386,18 @@ pub trait Store: Send {
         let mut jobs = Vec::new();
         self.visit_jobs(&mut |job| jobs.push(job))?;
         Ok(jobs)
+    }
+
+    /// A copy of the whole store, as it is when this returns: a SQLite file that is open for
+    /// reading and that nobody else can find. `None` if `between` ended it. The copy is made in
+    /// pieces; after each of them `between` may use the store, and what it changes is in the copy.
+    ///
+    /// # Errors
+    /// When the store is no file, cannot be read, or the copy cannot be written beside it.
+    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+        // Where nothing is copied there is nothing between.
+        let _ = between;
+        Err(StoreError::NoFile)
     }
 
     /// Shows `visit` all jobs, in the order of their identifiers. One is in memory at a time.

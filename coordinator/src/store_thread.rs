@@ -2,10 +2,13 @@
 //! reported as an event; what ended jobs left is read for those who fetch it.
 
 use std::collections::VecDeque;
+use std::fs::File;
+use std::ops::ControlFlow;
 use std::thread::{self, JoinHandle};
 
 use osteon_common::limits::JOBS_MAX;
-use tokio::sync::mpsc;
+use tokio::sync::mpsc::error::TryRecvError;
+use tokio::sync::{mpsc, oneshot};
 
 use crate::effect::Record;
 use crate::event::{Event, Unread};
@@ -17,6 +20,9 @@ use crate::store::{ExpulsionRecord, Store, StoreError};
 /// Commands that may wait: a record for every job, and some readers.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
 
+/// Most commands that are done between two pieces of a copy, so that it comes to its end.
+const COMMANDS_BETWEEN: usize = 64;
+
 /// Something to do with the store.
 pub(crate) enum Command {
     /// Make a record durable.
@@ -27,11 +33,13 @@ pub(crate) enum Command {
     Prune { token: Option<Token>, jobs: Vec<JobId> },
     /// Read a record of what an ended job left.
     Fetch(Reading),
+    /// Copy the whole store.
+    Copy { reply: CopyReply },
 }
 
 /// Starts the thread. It ends when every sender of commands is gone.
 pub(crate) fn start(
-    mut store: Box<dyn Store>,
+    mut store: Box<dyn Store + Send>,
     events: mpsc::Sender<Event>,
     guard: Guard,
 ) -> std::io::Result<(mpsc::Sender<Command>, JoinHandle<()>)> {
@@ -44,17 +52,17 @@ pub(crate) fn start(
     Ok((sender, thread))
 }
 
-/// Does what is asked for until every sender of commands is gone. Between two other commands one record
-/// that is fetched is read: no record of a job under way waits for longer than it takes to read one.
+/// Does what is asked for until every sender of commands is gone. Of what is fetched or copied one
+/// piece is read at a time, and a command that has come meanwhile goes first: no record of a job
+/// under way waits for longer than it takes to read one.
 pub(crate) fn serve(
     store: &mut dyn Store,
     commands: &mut mpsc::Receiver<Command>,
     events: &mpsc::Sender<Event>,
 ) {
-    // As many as there are fetches at once.
-    let mut readings = VecDeque::new();
+    let mut desk = Desk { events, readings: VecDeque::new(), copies: VecDeque::new() };
     loop {
-        let command = if readings.is_empty() {
+        let command = if desk.readings.is_empty() && desk.copies.is_empty() {
             match commands.blocking_recv() {
                 Some(command) => Some(command),
                 None => return,
@@ -62,26 +70,74 @@ pub(crate) fn serve(
         } else {
             commands.try_recv().ok()
         };
+        if let Some(command) = command {
+            desk.run(store, command);
+        }
+        desk.read_on(store);
+        if let Some(reply) = desk.copies.pop_front() {
+            desk.copy(store, commands, reply);
+        }
+    }
+}
+
+/// Where the answer to a copy goes; `None` inside if nobody waited for it any more.
+pub(crate) type CopyReply = oneshot::Sender<Result<Option<File>, StoreError>>;
+
+/// What is to be done piece by piece, between commands.
+struct Desk<'a> {
+    events: &'a mpsc::Sender<Event>,
+    /// As many as there are fetches at once.
+    readings: VecDeque<Reading>,
+    /// One, and perhaps one whose reader has gone.
+    copies: VecDeque<CopyReply>,
+}
+
+impl Desk<'_> {
+    fn run(&mut self, store: &mut dyn Store, command: Command) {
         match command {
             // Nobody listens any more when the coordinator has stopped.
-            Some(Command::Put(record)) => drop(events.blocking_send(put(store, &record))),
-            Some(Command::Read { job, number }) => {
+            Command::Put(record) => drop(self.events.blocking_send(put(store, &record))),
+            Command::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
-                drop(events.blocking_send(Event::Read { job, number, found }));
+                drop(self.events.blocking_send(Event::Read { job, number, found }));
             }
-            Some(Command::Prune { token, jobs }) => {
+            Command::Prune { token, jobs } => {
                 let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
-                drop(events.blocking_send(Event::Pruned { token, jobs, outcome }));
+                drop(self.events.blocking_send(Event::Pruned { token, jobs, outcome }));
             }
-            Some(Command::Fetch(reading)) => {
-                readings.push_back(reading);
-                continue;
-            }
-            None => {}
+            Command::Fetch(reading) => self.readings.push_back(reading),
+            Command::Copy { reply } => self.copies.push_back(reply),
         }
-        if let Some(reading) = readings.pop_front() {
+    }
+
+    /// Reads one record of what is fetched.
+    fn read_on(&mut self, store: &mut dyn Store) {
+        if let Some(reading) = self.readings.pop_front() {
             reading.serve(store);
         }
+    }
+
+    /// Copies the store, and does between two pieces what is asked for meanwhile.
+    fn copy(
+        &mut self,
+        store: &mut dyn Store,
+        commands: &mut mpsc::Receiver<Command>,
+        reply: CopyReply,
+    ) {
+        let copied = store.copy(&mut |store: &mut dyn Store| {
+            for _ in 0..COMMANDS_BETWEEN {
+                match commands.try_recv() {
+                    Ok(command) => self.run(store, command),
+                    Err(TryRecvError::Empty) => break,
+                    // The coordinator stops.
+                    Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
+                }
+            }
+            self.read_on(store);
+            if reply.is_closed() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        // The reader may have gone.
+        drop(reply.send(copied));
     }
 }
 

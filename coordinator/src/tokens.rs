@@ -142,6 +142,11 @@ impl Tokens {
         Ok(self)
     }
 
+    /// How many tokens are taken.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
     /// Whose token a text is. Every hash is compared, each in constant time.
     pub fn holder(&self, text: &str) -> Option<&Holder> {
         let hash = Token::parse(text).ok()?.hash();

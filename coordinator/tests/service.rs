@@ -36,7 +36,7 @@ use tonic_types::StatusExt as _;
 
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-async fn coordinator(address: &str, store: Box<dyn Store>) -> Coordinator {
+async fn coordinator(address: &str, store: Box<dyn Store + Send>) -> Coordinator {
     let listener = Listener::bind(&address.parse().unwrap(), false).await.unwrap();
     let config = Config { tick: Duration::from_millis(10), ..Config::default() };
     start(listener, store, config).await.unwrap()

@@ -13,6 +13,7 @@ use thiserror::Error;
 use tokio::net::{TcpStream, UnixStream};
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::pki_types::ServerName;
+use tonic::Status;
 use tonic::body::Body;
 use tonic::client::GrpcService;
 use tonic::codegen::{self, StdError};
@@ -142,18 +143,18 @@ fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, En
 }
 
 impl Endpoint {
-    /// What broke a connection, with a word about TLS where that may be the cause.
-    pub fn explained(&self, reason: &str) -> String {
+    /// What the status of a call says that this peer has not answered before. Where the call broke
+    /// before an answer came, and nothing says that nobody listens, TLS may be the cause.
+    pub fn explained(&self, status: &Status) -> String {
+        let Some(cause) = std::error::Error::source(status) else {
+            return status.message().to_owned();
+        };
+        let reason = innermost(cause);
         match self {
-            // The answer to plain HTTP/2 was no HTTP/2, or none.
-            Self::Http(authority)
-                if ["protocol error", "operation was canceled"]
-                    .iter()
-                    .any(|known| reason.contains(known)) =>
-            {
-                format!("{reason}; if it speaks TLS, write https://{authority}")
+            Self::Http(authority) if !is_refused(cause) => {
+                format!("{reason}; if the coordinator speaks TLS, write https://{authority}")
             }
-            _ => reason.to_owned(),
+            _ => reason,
         }
     }
 
@@ -315,6 +316,23 @@ fn transport(uri: String, timeout: Duration) -> Result<Transport, tonic::transpo
         .keep_alive_while_idle(true))
 }
 
+/// Whether the operating system says that nobody listens there.
+fn is_refused(error: &(dyn std::error::Error + 'static)) -> bool {
+    let mut cause = Some(error);
+    while let Some(error) = cause {
+        let io = error.downcast_ref::<io::Error>();
+        if io.is_some_and(|io| io.kind() == io::ErrorKind::ConnectionRefused) {
+            return true;
+        }
+        // An I/O error hides the error that it was made of from the chain of causes.
+        cause = match io.and_then(io::Error::get_ref) {
+            Some(hidden) => Some(hidden),
+            None => error.source(),
+        };
+    }
+    false
+}
+
 /// The last cause of an error: for a transport error it is the operating system's.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut cause = error;
@@ -394,14 +412,23 @@ mod tests {
 
     #[test]
     fn what_may_be_tls_is_said_so() {
-        for (url, reason, expected) in [
-            ("http://a:1", "protocol error", "; if it speaks TLS, write https://a:1"),
-            ("http://a:1", "operation was canceled", "; if it speaks TLS, write https://a:1"),
-            ("http://a:1", "refused", ""),
-            ("https://a:1", "protocol error", ""),
+        let broken = |kind: io::ErrorKind| {
+            let cause = io::Error::other(io::Error::from(kind));
+            Status::from_error(Box::new(io::Error::other(cause)))
+        };
+        let reset = broken(io::ErrorKind::ConnectionReset);
+        let refused = broken(io::ErrorKind::ConnectionRefused);
+        let answer = Status::unavailable("the coordinator stops");
+        let hint = "; if the coordinator speaks TLS, write https://a:1";
+        for (url, status, expected) in [
+            ("http://a:1", &reset, format!("connection reset{hint}")),
+            ("http://a:1", &refused, "connection refused".to_owned()),
+            ("http://a:1", &answer, "the coordinator stops".to_owned()),
+            ("https://a:1", &reset, "connection reset".to_owned()),
+            ("unix:a", &reset, "connection reset".to_owned()),
         ] {
             let endpoint: Endpoint = url.parse().unwrap();
-            assert_eq!(endpoint.explained(reason), format!("{reason}{expected}"), "{url}");
+            assert_eq!(endpoint.explained(status), expected, "{url}: {status}");
         }
     }
 

@@ -18,6 +18,7 @@ pub mod results;
 pub mod setup;
 pub mod specification;
 pub mod status;
+pub mod timestamp;
 pub mod tls_failure;
 pub mod token;
 

@@ -67,6 +67,13 @@ pub fn no_job(job: impl Into<String>, message: impl Into<String>) -> Status {
     Status::with_error_details(Code::NotFound, message, details)
 }
 
+/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the `worker`.
+pub fn no_worker(worker: impl Into<String>, message: impl Into<String>) -> Status {
+    let message = message.into();
+    let details = ErrorDetails::with_resource_info("worker", worker, "", &message);
+    Status::with_error_details(Code::NotFound, message, details)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

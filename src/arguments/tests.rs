@@ -63,6 +63,13 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon worker --coordinator unix:a --time-limit 1e9", "at most");
     check("osteon coordinator --listen 127.0.0.1:0", "--store");
     check("osteon submit a.toml --coordinator unix:a --request-id=", "1 to 256 bytes");
+    let long = "n".repeat(257);
+    check(&format!("osteon submit a.toml --name {long}"), "at most 256 bytes");
+    check("osteon identify a.toml --name a\u{7}b", "no control characters");
+    check("osteon health --timeout 0", "from 0.1 to 60");
+    check("osteon health --timeout 61", "from 0.1 to 60");
+    check("osteon workers drain one", "invalid digit");
+    check("osteon backup", "<DIR>");
     check("osteon fetch 1 --coordinator unix:a", "--out");
     check("osteon report DIR", "unrecognized subcommand");
     check("osteon frobnicate", "unrecognized subcommand");

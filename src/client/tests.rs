@@ -99,7 +99,8 @@ async fn a_submission_whose_answer_is_lost_makes_one_job() {
         }
         cut.notify_one();
     };
-    let (submitted, ()) = tokio::join!(client.submit(&specification, &request, 0), accepted);
+    let (submitted, ()) =
+        tokio::join!(client.submit(&specification, &request, SubmitOptions::default()), accepted);
     let jobs = witness.list().await.unwrap();
     assert_eq!(jobs.len(), 1);
     assert_eq!(submitted.unwrap(), jobs[0].job);
@@ -119,7 +120,7 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
     });
     let mut client = Client::connect(&remote(&socket)).await.unwrap();
     let (begun, request) = (Instant::now(), Request::new());
-    let error = client.submit(&example(), &request, 0).await.unwrap_err();
+    let error = client.submit(&example(), &request, SubmitOptions::default()).await.unwrap_err();
     assert!(matches!(error, ClientError::Uncertain { .. }), "{error:?}");
     let told = format!("--request-id {} ", request.id);
     assert!(error.to_string().contains(&told), "{error}");

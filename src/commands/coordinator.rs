@@ -1,10 +1,11 @@
 //! `coordinator`: serves jobs to clients and workers until it is told to end.
 
 use std::fs;
+use std::pin::pin;
 
 use anyhow::Context as _;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{BindError, Config, ListenAddress, open_files};
+use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, open_files};
 
 use crate::arguments::CoordinatorArguments;
 use crate::door::Door;
@@ -24,8 +25,13 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
     // Read before anything is bound or made.
     let door = Door::open(&arguments, &address)?;
-    let interruption = signals::interruption()?;
-    let directory = arguments.store;
+    let mut interruption = pin!(signals::interruption()?);
+    let mut reload = match &door {
+        // SIGHUP keeps its meaning where there is nothing to read again.
+        Door::Open => None,
+        _ => Some(signals::hangups()?),
+    };
+    let directory = arguments.store.clone();
     if matches!(address, ListenAddress::Unix(_)) {
         // The socket may be meant to lie in the directory of the store.
         SqliteStore::make_directory(&directory)
@@ -52,15 +58,44 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
         .map_err(Failure::Failed)?;
     let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {
-        Ok(()) => tokio::select! {
-            _ = interruption => Ok(Ending::Done),
-            failed = coordinator.failed() => Err(Failure::failed(failed)),
+        Ok(()) => loop {
+            tokio::select! {
+                _ = interruption.as_mut() => break Ok(Ending::Done),
+                failed = coordinator.failed() => break Err(Failure::failed(failed)),
+                () = signals::next(&mut reload) => read_again(&coordinator, &arguments, &address),
+            }
         },
         Err(error) => Err(stdout_failure(error)),
     };
+    tracing::info!("stopping");
     drop(fs::remove_file(&address_file));
     coordinator.shutdown().await;
+    tracing::info!("stopped");
     served
+}
+
+/// Reads tokens and certificates again; if any of them cannot be used, all stay as they are.
+fn read_again(
+    coordinator: &Coordinator,
+    arguments: &CoordinatorArguments,
+    address: &ListenAddress,
+) {
+    let tokens = match Door::open(arguments, address) {
+        Ok(Door::Open) => return,
+        Ok(Door::Tokens(tokens)) => tokens,
+        Ok(Door::Tls(tls, tokens)) => {
+            coordinator.replace_tls(tls);
+            tokens
+        }
+        Err(failure) => {
+            let reason = failure.to_string();
+            tracing::error!(reason, "tokens and certificates stay as they were");
+            return;
+        }
+    };
+    let count = tokens.count();
+    coordinator.replace_tokens(tokens);
+    tracing::info!(tokens = count, "tokens and certificates are read again");
 }
 
 fn bind_failure(error: BindError) -> Failure {

@@ -11,7 +11,7 @@ use osteon_proto::v1::JobSnapshot;
 use serde_json::Value;
 use tonic::Code;
 
-use crate::client::{self, Client, ClientError, Fetched, Remote};
+use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
 use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::request::Request;
@@ -30,8 +30,8 @@ pub(super) struct Submission<'a> {
     pub(super) kind: JobKind,
     /// The request that stands for it.
     pub(super) request: &'a Request,
-    /// Rank among the user's own jobs.
-    pub(super) priority: u32,
+    /// What is told besides.
+    pub(super) options: SubmitOptions,
 }
 
 /// `submit`: prints the job's id.
@@ -40,18 +40,18 @@ pub(super) async fn submit(
     coordinator: &Remote,
     format: Format,
 ) -> Result<Ending, Failure> {
-    let Submission { job, kind, request, priority } = submission;
+    let Submission { job, kind, request, options } = submission;
     let (specification, warnings) =
         job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
     unsearched_groups::warn(job, &specification);
     warnings::say_of_job(&specification, &warnings).await;
     let mut client = Client::connect(coordinator).await?;
-    let id = client.submit(&specification, request, priority).await?;
+    let id = client.submit(&specification, request, options).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
-/// `jobs`: prints all jobs, and, for people, the workers that are expelled.
+/// `jobs`: prints all jobs, and the workers that are expelled.
 pub(super) async fn list(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
     let mut client = Client::connect(coordinator).await?;
     let jobs = client.list().await?;

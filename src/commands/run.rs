@@ -11,7 +11,7 @@ use osteon_common::results::Status;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 
-use crate::client::{Client, Fetched, Remote};
+use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, Interruption, stdout_failure};
 use crate::output::{self, ShownResult};
@@ -53,14 +53,23 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     }
     let fetched = match computers {
         Computers::Here { workers, threads } => {
-            here(workers, threads, &specification, directory.as_ref(), interruption).await?
+            let job = Named { specification: &specification, name: &run.name };
+            here(workers, threads, job, directory.as_ref(), interruption).await?
         }
         Computers::There(client) => {
-            there(*client, &specification, directory.as_ref(), interruption).await?
+            let job = Named { specification: &specification, name: &run.name };
+            there(*client, job, directory.as_ref(), interruption).await?
         }
     };
     let json = keep(run.kind, &fetched, directory.as_ref())?;
     show(&run, &specification, &json)
+}
+
+/// A job, and what people call it.
+#[derive(Clone, Copy)]
+struct Named<'a> {
+    specification: &'a JobSpecification,
+    name: &'a str,
 }
 
 /// Who computes, and is there.
@@ -129,7 +138,7 @@ fn show(run: &Run, specification: &JobSpecification, json: &str) -> Result<Endin
 async fn here(
     workers: u32,
     threads: u32,
-    specification: &JobSpecification,
+    job: Named<'_>,
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, Failure> {
@@ -145,7 +154,7 @@ async fn here(
             let done = snapshot.evaluations.wrapping_mul(snapshot.realizations);
             progress.store(done.wrapping_add(snapshot.realizations_done), Ordering::Relaxed);
         };
-        drive(client, specification, directory, note).await
+        drive(client, job, directory, note).await
     };
     let result = tokio::select! {
         driven = driven => driven,
@@ -162,12 +171,12 @@ async fn here(
 /// The job on a running coordinator.
 async fn there(
     client: Client,
-    specification: &JobSpecification,
+    job: Named<'_>,
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, Failure> {
     tokio::select! {
-        driven = drive(client, specification, directory, |_| {}) => driven,
+        driven = drive(client, job, directory, |_| {}) => driven,
         interruption = interruption => Err(Failure::Interrupted(
             interruption,
             "a job that was accepted goes on (see `osteon jobs`, `osteon cancel`)",
@@ -178,7 +187,7 @@ async fn there(
 /// Submits, watches, fetches.
 async fn drive(
     mut client: Client,
-    specification: &JobSpecification,
+    Named { specification, name }: Named<'_>,
     directory: Option<&ResultsDirectory>,
     note: impl Fn(&JobSnapshot),
 ) -> Result<Fetched, Failure> {
@@ -186,7 +195,8 @@ async fn drive(
         Some(directory) => directory.request()?,
         None => Request::new(),
     };
-    let job = client.submit(specification, &request, 0).await?;
+    let options = SubmitOptions { name: name.to_owned(), ..SubmitOptions::default() };
+    let job = client.submit(specification, &request, options).await?;
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }

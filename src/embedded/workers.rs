@@ -16,6 +16,7 @@ use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
 use crate::ending::Failure;
+use crate::environment;
 use crate::progress::say;
 
 /// A worker leaves by itself after this long without this process, s.
@@ -155,6 +156,10 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
         .stderr(Stdio::piped())
         .process_group(0)
         .kill_on_drop(true);
+    // They are for coordinators of others.
+    for variable in environment::FILES {
+        command.env_remove(variable);
+    }
     if std::env::var_os("RUST_LOG").is_none() {
         command.env("RUST_LOG", "warn");
     }

@@ -1,15 +1,21 @@
 //! Output for programs: one JSON value per command, without inf or NaN.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use osteon_common::results_json;
-use osteon_proto::v1::{ExpelledWorker, JobSnapshot};
+use osteon_proto::timestamp;
+use osteon_proto::v1::{
+    BackupEnd, DepartedWorker, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+};
 use osteon_study::Difference;
 use osteon_study::check::Solution;
 use serde_json::{Map, Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};
+use crate::output::text::operators::standing_name;
 use crate::output::text::{kind_name, state_name, status_name};
+use crate::output::times::utc;
 use crate::program;
 
 /// Output for programs.
@@ -42,7 +48,35 @@ impl Output for JsonOutput<'_> {
     }
 
     fn jobs(&mut self, jobs: &[JobSnapshot], _: &[ExpelledWorker]) -> io::Result<()> {
-        self.value(&Value::Array(jobs.iter().map(snapshot_value).collect()))
+        self.value(&jobs.iter().map(snapshot_value).collect())
+    }
+
+    fn workers(
+        &mut self,
+        workers: &ListWorkersResponse,
+        expelled: &[ExpelledWorker],
+    ) -> io::Result<()> {
+        self.value(&json!({
+            "workers": workers.workers.iter().map(worker_value).collect::<Vec<_>>(),
+            "departed": workers.departed.iter().map(departed_value).collect::<Vec<_>>(),
+            "expelled": expelled.iter().map(expelled_value).collect::<Vec<_>>(),
+        }))
+    }
+
+    fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
+        self.value(&worker_value(worker))
+    }
+
+    fn health(&mut self, not_serving: Option<&str>) -> io::Result<()> {
+        self.value(&json!({ "serving": not_serving.is_none(), "reason": not_serving }))
+    }
+
+    fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()> {
+        self.value(&json!({
+            "file": file.to_string_lossy(),
+            "bytes": copy.length,
+            "digest": copy.digest,
+        }))
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
@@ -99,10 +133,56 @@ fn solution_value(solution: &Solution) -> Value {
     value
 }
 
+fn expelled_value(worker: &ExpelledWorker) -> Value {
+    json!({
+        "host": worker.host,
+        "process": worker.process,
+        "job": worker.job,
+        "reason": worker.reason,
+        "elapsed_s": worker.elapsed_s,
+    })
+}
+
+fn worker_value(worker: &WorkerSnapshot) -> Value {
+    let attached = worker.attach_time.as_ref().and_then(timestamp::from_message);
+    json!({
+        "number": worker.worker,
+        "host": worker.host,
+        "process": worker.process,
+        "threads": worker.threads,
+        "version": worker.version,
+        "attached": attached.and_then(utc),
+        "silent_s": worker.silent_s,
+        "realizations_per_second": worker.realizations_per_second,
+        "batches": worker.batches,
+        "oldest_batch_s": worker.oldest_batch_s,
+        "standing": standing_name(worker),
+    })
+}
+
+fn departed_value(worker: &DepartedWorker) -> Value {
+    let departed = worker.depart_time.as_ref().and_then(timestamp::from_message);
+    json!({
+        "number": worker.worker,
+        "host": worker.host,
+        "process": worker.process,
+        "departed": departed.and_then(utc),
+        "reason": worker.reason,
+        "batches": worker.batches,
+    })
+}
+
 fn snapshot_value(snapshot: &JobSnapshot) -> Value {
     let text = |text: &str| (!text.is_empty()).then(|| text.to_owned());
+    let submitted = snapshot.submit_time.as_ref().and_then(timestamp::from_message);
+    let ended = snapshot.end_time.as_ref().and_then(timestamp::from_message);
     json!({
         "job": snapshot.job,
+        "name": text(&snapshot.name),
+        "user": text(&snapshot.client),
+        "priority": snapshot.priority,
+        "submitted": submitted.and_then(utc),
+        "ended": ended.and_then(utc),
         "kind": kind_name(snapshot),
         "state": state_name(snapshot),
         "status": status_name(snapshot),

@@ -6,15 +6,19 @@ mod groups;
 mod identified;
 mod layout;
 mod number;
+pub(super) mod operators;
 mod result;
 mod solver;
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use osteon_common::visible;
-use osteon_proto::v1::{ExpelledWorker, JobKind, JobSnapshot, JobState};
+use osteon_proto::v1::{
+    BackupEnd, ExpelledWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
+};
 
-use self::layout::{INDENT, WIDTH, aligned, glued, wrapped};
+use self::layout::{WIDTH, aligned, glued, wrapped};
 use self::number::{VELOCITY_DIGITS, digits, significant};
 use super::{Output, ShownResult, ShownSimulation, solver_value};
 use crate::client;
@@ -52,20 +56,29 @@ impl Output for TextOutput<'_> {
             self.verbatim("no jobs\n")?;
             return self.verbatim(&expelled_lines(expelled));
         }
-        let header = ["ID", "KIND", "STATE", "TIME", "WORKERS", "PROGRESS"];
-        let mut rows = vec![header.map(str::to_owned)];
-        for job in jobs {
-            rows.push([
-                job.job.clone(),
-                kind_name(job).to_owned(),
-                state(job).to_owned(),
-                span(job.elapsed_s),
-                job.workers.to_string(),
-                progress(job, WIDTH - INDENT),
-            ]);
-        }
-        self.verbatim(&aligned(&rows))?;
+        self.verbatim(&operators::jobs(jobs))?;
         self.verbatim(&expelled_lines(expelled))
+    }
+
+    fn workers(
+        &mut self,
+        workers: &ListWorkersResponse,
+        expelled: &[ExpelledWorker],
+    ) -> io::Result<()> {
+        self.verbatim(&operators::workers(workers))?;
+        self.verbatim(&expelled_lines(expelled))
+    }
+
+    fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
+        self.verbatim(&operators::attached(std::slice::from_ref(worker)))
+    }
+
+    fn health(&mut self, not_serving: Option<&str>) -> io::Result<()> {
+        self.verbatim(&not_serving.map_or("serving\n".to_owned(), |reason| format!("{reason}\n")))
+    }
+
+    fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()> {
+        self.verbatim(&format!("{} ({} bytes)\n", file.display(), copy.length))
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
@@ -78,7 +91,7 @@ impl Output for TextOutput<'_> {
         // Who runs has an evaluation to show for it.
         let state = match snapshot.state() {
             JobState::Running => String::new(),
-            _ => format!("{}: ", state(snapshot)),
+            _ => format!("{}: ", operators::state(snapshot)),
         };
         let text = match progress(snapshot, WIDTH - TIME_WIDTH - state.len()) {
             progress if progress.is_empty() => state.trim_end_matches(": ").to_owned(),
@@ -126,11 +139,6 @@ pub(super) fn state_name(snapshot: &JobSnapshot) -> &'static str {
 /// How the job ended; `None` while it has not.
 pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
     client::job_status(snapshot).map(osteon_common::results::Status::name)
-}
-
-/// How the job ended, or where it stands.
-fn state(snapshot: &JobSnapshot) -> &'static str {
-    status_name(snapshot).unwrap_or_else(|| state_name(snapshot))
 }
 
 /// What there is to tell of a job in so many columns; a reason comes whole, however long it is.

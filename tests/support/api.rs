@@ -73,7 +73,7 @@ impl Api {
             specification: Some(job.clone()),
             request_id: id.to_owned(),
             client: "the test".to_owned(),
-            priority: 0,
+            ..SubmitRequest::default()
         };
         self.call(async |client| Ok(client.submit(request).await?.into_inner().job))
     }

@@ -72,7 +72,16 @@ pub(crate) fn text(path: &Path) -> &str {
 /// The program under test, without the caller's settings.
 pub(crate) fn osteon() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_osteon"));
-    for name in ["OSTEON_COORDINATOR", "OSTEON_INSTRUCTION_SET", "RUST_LOG", "COLUMNS"] {
+    for name in [
+        "OSTEON_COORDINATOR",
+        "OSTEON_TLS_CA",
+        "OSTEON_TLS_CERT",
+        "OSTEON_TLS_KEY",
+        "OSTEON_TOKEN_FILE",
+        "OSTEON_INSTRUCTION_SET",
+        "RUST_LOG",
+        "COLUMNS",
+    ] {
         command.env_remove(name);
     }
     command.stdin(Stdio::null());
@@ -236,7 +245,7 @@ impl Coordinator {
     /// The job as `jobs --json` has it.
     pub(crate) fn job(&self, id: &str) -> Value {
         let jobs = self.client(&["jobs", "--json"]).json();
-        let found = jobs.as_array().unwrap().iter().find(|job| job["job"] == id);
+        let found = jobs["jobs"].as_array().unwrap().iter().find(|job| job["job"] == id);
         found.unwrap_or_else(|| panic!("no job {id} in {jobs}")).clone()
     }
 }

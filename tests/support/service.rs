@@ -103,7 +103,7 @@ impl Service {
     /// Batches that were taken from lost workers and given to others.
     pub(crate) fn retries(&self) -> usize {
         let log = self.log();
-        let lost = log.lines().filter(|line| line.contains("what it held goes to others"));
+        let lost = log.lines().filter(|line| line.contains("worker lost"));
         let batches = lost.filter_map(|line| line.split("batches=").nth(1)?.split(' ').next());
         batches.map(|batches| batches.parse::<usize>().unwrap()).sum()
     }

@@ -93,7 +93,9 @@ pub async fn run(
         }
     };
     let leave = pin!(leave);
-    worker.serve(config.give_up_after, leave).await
+    let served = worker.serve(config.give_up_after, leave).await;
+    info!(endpoint = %config.endpoint, "ended");
+    served
 }
 
 struct Worker {
@@ -141,7 +143,8 @@ impl Worker {
                 return Err(WorkerError::GaveUp { endpoint, seconds, last });
             }
             let wait = backoff.next().min(left.unwrap_or(Duration::MAX));
-            warn!(endpoint = %self.endpoint, wait_ms = wait.as_millis() as u64, "no coordinator: {last}");
+            let wait_ms = wait.as_millis() as u64;
+            warn!(endpoint = %self.endpoint, wait_ms, reason = last, "reconnecting");
             if timeout(wait, leave.as_mut()).await.is_ok() {
                 return Ok(());
             }
@@ -173,6 +176,7 @@ impl Worker {
         let mut draining = false;
         loop {
             let was_attached = self.state.is_attached();
+            let was_draining = self.state.is_draining();
             if was_attached {
                 self.last_attached = Instant::now();
             }
@@ -188,12 +192,16 @@ impl Worker {
                 },
                 () = leave.as_mut(), if !draining => {
                     draining = true;
-                    info!("draining");
                     Event::Drain
                 }
                 _ = ticks.tick() => Event::Tick,
             };
-            if let Some(end) = self.apply(event, Some(&outbox))? {
+            let ended = self.apply(event, Some(&outbox))?;
+            if !was_draining && self.state.is_draining() {
+                let by = if draining { "this machine" } else { "the coordinator" };
+                info!(by, "draining: answering the batches in hand, then leaving");
+            }
+            if let Some(end) = ended {
                 if matches!(end, End::Left) {
                     close(outbox, &mut responses).await;
                 }
@@ -202,7 +210,7 @@ impl Worker {
             if !was_attached && self.state.is_attached() {
                 backoff.reset();
                 self.ever_attached = true;
-                info!(endpoint = %self.endpoint, "attached");
+                info!(endpoint = %self.endpoint, worker = self.state.number(), "attached");
             }
             if !self.state.is_attached() && Instant::now() > greeted_by {
                 return Ok(End::Lost("the coordinator does not answer".to_owned()));
@@ -256,7 +264,10 @@ impl Worker {
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
         }
-        let reason = self.endpoint.explained(status.message());
+        let reason = match self.ever_attached {
+            true => status.message().to_owned(),
+            false => self.endpoint.explained(status),
+        };
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument

@@ -75,7 +75,7 @@ pub(crate) enum Event {
     Computed(Task, Computed),
     /// The stream of the attachment ended.
     Lost,
-    /// The worker shall leave.
+    /// The worker shall leave, as its user wants.
     Drain,
     /// Time has passed.
     Tick,
@@ -128,6 +128,8 @@ pub(crate) enum Failure {
 pub(crate) struct State {
     identity: Identity,
     attachments: u64,
+    /// The number that the coordinator gave it last.
+    number: u64,
     link: Link,
     held: BTreeSet<u64>,
     /// When the wish to leave came.
@@ -153,6 +155,7 @@ impl State {
         Self {
             identity,
             attachments: 0,
+            number: 0,
             link: Link::Down,
             held: BTreeSet::new(),
             draining_since: None,
@@ -176,6 +179,16 @@ impl State {
     /// Whether the coordinator has taken this worker.
     pub(crate) fn is_attached(&self) -> bool {
         matches!(self.link, Link::Attached { .. })
+    }
+
+    /// The number that the coordinator has given it, by which its log names it.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether it leaves when it has answered what it holds.
+    pub(crate) fn is_draining(&self) -> bool {
+        self.draining_since.is_some()
     }
 
     /// What to do about `event`, which happens at `now`.
@@ -215,12 +228,14 @@ impl State {
                 effects.extend(self.leave_if_idle());
                 effects
             }
+            (Link::Attached { .. }, Response::Drain(_)) => self.on_drain(now),
             (Link::Attached { .. }, Response::Heartbeat(_)) | (Link::Down, _) => Vec::new(),
             _ => vec![Effect::Detach(Detached::Protocol)],
         }
     }
 
     fn on_welcome(&mut self, now: Duration, welcome: &v1::WorkerWelcome) -> Vec<Effect> {
+        self.number = welcome.worker;
         let span = |seconds: f64| {
             // A NaN becomes the lower bound.
             Duration::from_secs_f64(seconds.max(SPAN_S.0).min(SPAN_S.1))

@@ -59,6 +59,7 @@ fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         }
     };
     let record = JobRecord {
+        name: String::new(),
         job: JOB,
         request_id: String::new(),
         specification,

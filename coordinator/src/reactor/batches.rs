@@ -33,6 +33,7 @@ pub(super) fn answered(
     };
     attached.heard = now;
     attached.answered = now;
+    attached.rate.add(solved.len() as u64, now);
     let name = attached.name.clone();
     let held = state.batches.get(&batch).filter(|held| held.worker == worker);
     let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);

@@ -12,6 +12,7 @@ use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
+use crate::notice::Notice;
 use crate::search::{Ending, Search, Step};
 use crate::snapshot;
 use crate::state::{EndedJob, Job, RequestName, Stage, State, Trouble};
@@ -37,6 +38,7 @@ pub(super) fn stored(
             job.stage = Stage::Waiting;
             job.trouble = None;
             state.waiting.push_back(id);
+            effects.push(Effect::Note(accepted(&job.record)));
             for token in std::mem::take(&mut job.tokens) {
                 effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
             }
@@ -254,6 +256,7 @@ fn begin(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
         job.progressed = now;
         state.shares.begin(&job.record.client);
         state.active.insert(id);
+        effects.push(Effect::Note(Notice::JobStarted { job: id, stored: job.stored }));
         ahead::keep_bound(state, now, effects);
         advance(state, id, now, effects);
     }
@@ -341,6 +344,14 @@ fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
     else {
         return;
     };
+    effects.push(Effect::Note(Notice::JobEnded {
+        job: id,
+        client: record.client.clone(),
+        kind: record.specification.kind,
+        ending: end.ending.clone(),
+        evaluations: end.evaluations,
+        elapsed: end.ended.saturating_sub(record.accepted),
+    }));
     state.ended.insert(id, EndedJob::new(&record, end, sequence));
     state.changed.remove(&id);
     let Some(snapshot) = snapshot::of(state, id, now) else {
@@ -352,6 +363,16 @@ fn ended(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
     }
     // At once, and not when the others are published: somebody waits for it.
     effects.push(Effect::Publish { job: id, snapshot });
+}
+
+fn accepted(record: &JobRecord) -> Notice {
+    Notice::JobAccepted {
+        job: record.job,
+        client: record.client.clone(),
+        name: record.name.clone(),
+        kind: record.specification.kind,
+        priority: record.priority,
+    }
 }
 
 /// The end of a job whose client does not want it any more.

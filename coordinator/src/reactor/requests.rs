@@ -8,13 +8,14 @@ use osteon_common::job::{Data, Group, JobSpecification};
 use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
-use super::{Effects, jobs, prune};
+use super::{Effects, jobs, prune, workers};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::Request;
-use crate::ids::{JobId, Token};
+use crate::ids::{JobId, Token, WorkerId};
 use crate::snapshot;
 use crate::state::{Job, RequestName, Stage, State, identity};
 use crate::store::JobRecord;
+use crate::worker_list;
 
 /// Most expelled workers that are shown.
 const EXPELLED_SHOWN_MAX: usize = 1000;
@@ -27,8 +28,8 @@ pub(super) fn requested(
     effects: &mut Effects,
 ) {
     let answer = match request {
-        Request::Submit { specification, request_id, client, priority } => {
-            let submission = Submission { specification, request_id, client, priority };
+        Request::Submit { specification, request_id, client, priority, name } => {
+            let submission = Submission { specification, request_id, client, priority, name };
             match submit(state, token, submission, now, effects) {
                 Ok(answer) => answer,
                 Err(refusal) => Some(Answer::Refused(refusal)),
@@ -39,6 +40,8 @@ pub(super) fn requested(
         Request::Cancel(job) => cancel(state, token, job, now, effects),
         Request::Fetch(job) => Some(fetch(state, job)),
         Request::Expelled => Some(expelled(state, now)),
+        Request::Workers => Some(Answer::Workers(worker_list::all(state, now))),
+        Request::DrainWorker(worker) => Some(drain(state, worker, now, effects)),
         Request::Prune(retention) => {
             prune::requested(state, token, retention, now, effects);
             None
@@ -55,6 +58,7 @@ struct Submission {
     request_id: String,
     client: String,
     priority: u32,
+    name: String,
 }
 
 /// Accepts a job; the answer comes when it is durable.
@@ -65,7 +69,7 @@ fn submit(
     now: Duration,
     effects: &mut Effects,
 ) -> Result<Option<Answer>, Refusal> {
-    let Submission { specification, request_id, client, priority } = submission;
+    let Submission { specification, request_id, client, priority, name } = submission;
     if state.draining {
         return Err(Refusal::Draining);
     }
@@ -81,9 +85,16 @@ fn submit(
     state.next_job += 1;
     state.requests.extend(request.map(|request| (request, id)));
     let fingerprint = version::fingerprint();
-    let accepted = now;
-    let record =
-        JobRecord { job: id, request_id, specification, accepted, fingerprint, client, priority };
+    let record = JobRecord {
+        job: id,
+        request_id,
+        specification,
+        accepted: now,
+        fingerprint,
+        client,
+        priority,
+        name,
+    };
     effects.push(Effect::Store(Record::Job(record.clone())));
     let mut job = Job::new(record, Stage::Accepting, 0, now);
     job.tokens.push(token);
@@ -186,6 +197,15 @@ fn fetch(state: &State, id: JobId) -> Answer {
     match state.jobs.get(&id).map(|job| &job.stage) {
         None | Some(Stage::Accepting) => Answer::Refused(Refusal::NoJob { job: id }),
         Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
+    }
+}
+
+/// Sends a worker away; how it stands then.
+fn drain(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) -> Answer {
+    match workers::send_away(state, worker, now, effects) {
+        Ok(()) => worker_list::of(state, worker, now)
+            .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
+        Err(refusal) => Answer::Refused(refusal),
     }
 }
 

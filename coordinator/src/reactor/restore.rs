@@ -72,6 +72,23 @@ fn keep_numerics(
     Ok(())
 }
 
+impl Restored {
+    /// How many jobs have not ended.
+    pub fn unfinished(&self) -> usize {
+        self.unfinished.len()
+    }
+
+    /// How many jobs have ended.
+    pub fn ended(&self) -> usize {
+        self.ended.len()
+    }
+
+    /// How many workers are expelled.
+    pub fn expelled(&self) -> usize {
+        self.expelled.len()
+    }
+}
+
 impl State {
     /// A coordinator that goes on with what was `restored`, as of `now`.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {

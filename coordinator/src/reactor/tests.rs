@@ -22,6 +22,7 @@ mod dispatch;
 mod fairness;
 mod jobs;
 mod lost;
+mod notices;
 mod overdue;
 mod prune;
 mod reread;
@@ -67,7 +68,9 @@ impl Rig {
         if let Err(insane) = sanity_check(&self.state) {
             panic!("{insane}\n{:#?}", self.state);
         }
-        effects.iter().map(described).collect()
+        // What is only told to the log has tests of its own.
+        let acts = effects.iter().filter(|effect| !matches!(effect, Effect::Note(_)));
+        acts.map(described).collect()
     }
 
     /// Asserts that an event brings about these effects and nothing else.
@@ -133,6 +136,7 @@ fn submit(token: u64, request_id: &str, specification: JobSpecification) -> Even
         request_id: request_id.to_owned(),
         client: String::new(),
         priority: 0,
+        name: String::new(),
     };
     Event::Requested { token: Token(token), request }
 }
@@ -193,6 +197,8 @@ fn described(effect: &Effect) -> String {
             format!("send {worker}: batch {batch} = {}+{}", work.first, work.count)
         }
         Effect::Revoke { worker, batch } => format!("revoke {worker}: batch {batch}"),
+        Effect::Drain { worker } => format!("drain {worker}"),
+        Effect::Note(notice) => format!("note {notice:?}"),
         Effect::Heartbeat { worker } => format!("beat {worker}"),
         Effect::Close { worker, reason } => format!("close {worker}: {reason}"),
         Effect::Store(Record::Job(record)) => format!("store job {}", record.job),
@@ -230,6 +236,10 @@ fn answered(answer: &Answer) -> String {
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
         Answer::Expelled(expelled) => format!("expelled {}", expelled.len()),
+        Answer::Workers(list) => {
+            format!("{} workers, {} departed", list.workers.len(), list.departed.len())
+        }
+        Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.standing()),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }

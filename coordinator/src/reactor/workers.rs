@@ -7,11 +7,13 @@ use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
 use super::{Effects, ahead, batches, overdue, suspects};
-use crate::effect::{CloseReason, Effect};
+use crate::effect::{CloseReason, Effect, Refusal};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
 use crate::losses::{Cause, Loss};
-use crate::state::{Missed, State, Worker};
+use crate::notice::{Departure, Notice};
+use crate::rate::Rate;
+use crate::state::{DEPARTED_MAX, Departed, Missed, State, Worker};
 use crate::worker_name::WorkerName;
 
 pub(super) fn hello(
@@ -26,7 +28,11 @@ pub(super) fn hello(
         return;
     }
     if let Err(reason) = admit(state, &hello) {
-        effects.push(Effect::Close { worker, reason });
+        // A name that is too long is not repeated as a whole.
+        let host: String = hello.host.chars().take(NAME_BYTES_MAX).collect();
+        let name = WorkerName::new(&host, hello.process, hello.instance);
+        let refused = Notice::WorkerRefused { worker, name, reason: reason.clone() };
+        effects.extend([Effect::Close { worker, reason }, Effect::Note(refused)]);
         return;
     }
     let lease = LeaseId(state.next_lease);
@@ -34,6 +40,13 @@ pub(super) fn hello(
     let name = name(&hello);
     suspects::forgive(state, &name);
     state.probation.attach(&name, now);
+    effects.push(Effect::Welcome { worker, lease });
+    effects.push(Effect::Note(Notice::WorkerAttached {
+        worker,
+        name: name.clone(),
+        threads: hello.threads,
+        version: hello.version.clone(),
+    }));
     state.workers.insert(
         worker,
         Worker {
@@ -48,11 +61,11 @@ pub(super) fn hello(
             beat: now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
+            rate: Rate::default(),
             rates: BTreeMap::new(),
             draining: false,
         },
     );
-    effects.push(Effect::Welcome { worker, lease });
 }
 
 pub(super) fn heard(state: &mut State, worker: WorkerId, now: Duration) {
@@ -68,6 +81,25 @@ pub(super) fn drains(state: &mut State, worker: WorkerId, now: Duration, effects
     }
     ahead::give_back(state, worker, now, effects);
     dismiss_if_drained(state, worker, now, effects);
+}
+
+/// Sends a worker away: it gets nothing new, and leaves when it has answered what it holds.
+///
+/// # Errors
+/// When no such worker is attached.
+pub(super) fn send_away(
+    state: &mut State,
+    worker: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) -> Result<(), Refusal> {
+    let attached = state.workers.get_mut(&worker).ok_or(Refusal::NoWorker { worker })?;
+    if !attached.draining {
+        attached.draining = true;
+        effects.push(Effect::Drain { worker });
+        ahead::give_back(state, worker, now, effects);
+    }
+    Ok(())
 }
 
 /// Closes the stream of a worker that wanted to leave and holds nothing any more.
@@ -91,32 +123,42 @@ pub(super) fn close(
     now: Duration,
     effects: &mut Effects,
 ) {
-    let cause = cause(&reason);
     if matches!(reason, CloseReason::Unanswering { .. })
         && let Some(name) = state.workers.get(&worker).map(|worker| worker.name.clone())
     {
         overdue::begin_probation(state, &name, now, now);
     }
-    effects.push(Effect::Close { worker, reason });
-    lost(state, worker, cause, now);
+    effects.push(Effect::Close { worker, reason: reason.clone() });
+    lost(state, worker, Departure::Closed(reason), now, effects);
 }
 
 /// The stream of a worker ended; what it held goes to others.
-pub(super) fn stream_ended(state: &mut State, worker: WorkerId, now: Duration) {
-    lost(state, worker, Cause::StreamBroke, now);
+pub(super) fn stream_ended(
+    state: &mut State,
+    worker: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) {
+    lost(state, worker, Departure::StreamEnded, now, effects);
 }
 
 /// Forgets a worker; what it held goes to others. Later events of it mean nothing.
-fn lost(state: &mut State, worker: WorkerId, cause: Cause, now: Duration) {
+fn lost(state: &mut State, worker: WorkerId, why: Departure, now: Duration, effects: &mut Effects) {
     let Some(gone) = state.workers.remove(&worker) else {
         return;
     };
     if state.workers.is_empty() {
         state.no_worker_since = now;
     }
-    tracing::info!(%worker, name = %gone.name, batches = gone.in_flight.len(),
-        "worker disconnected; reassigning its batches");
-    let cause = if gone.draining { Cause::Announced } else { cause };
+    let batches = gone.in_flight.len();
+    let cause = if gone.draining { Cause::Announced } else { cause(&why) };
+    let name = gone.name.clone();
+    let departed = Departed { worker, name: name.clone(), at: now, batches, why: why.clone() };
+    state.departed.push_back(departed);
+    if state.departed.len() > DEPARTED_MAX {
+        state.departed.pop_front();
+    }
+    effects.push(Effect::Note(Notice::WorkerDetached { worker, name, batches, why }));
     if cause != Cause::Announced && !gone.in_flight.is_empty() {
         state.count_loss(&gone.name, now);
     }
@@ -127,8 +169,11 @@ fn lost(state: &mut State, worker: WorkerId, cause: Cause, now: Duration) {
     }
 }
 
-/// What the reason for which a stream is closed says about its worker.
-fn cause(reason: &CloseReason) -> Cause {
+/// What the way in which a worker went says about it.
+fn cause(why: &Departure) -> Cause {
+    let Departure::Closed(reason) = why else {
+        return Cause::StreamBroke;
+    };
     match reason {
         CloseReason::Drained | CloseReason::Draining | CloseReason::Expelled { .. } => {
             Cause::Announced

@@ -4,6 +4,7 @@
 //! no shared memory is needed and a second coordinator is refused. `synchronous = FULL`: a record that is reported is on the disk. Each
 //! row has a BLAKE3 checksum of its other columns.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,16 +17,18 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    DamagedRecord, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError,
-    StoredJob,
+    Between, DamagedRecord, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store,
+    StoreError, StoredJob,
 };
 use crate::ids::JobId;
 use crate::search::{Ending, Summary};
 use crate::worker_name::WorkerName;
 
 mod acknowledged;
+mod backup;
 mod columns;
 mod opening;
+mod owned;
 mod schema;
 mod summary;
 
@@ -48,7 +51,7 @@ pub struct SqliteStore {
     /// Held until the end; says whose the store is.
     lock: File,
     /// Which jobs were acknowledged.
-    mark: Mark,
+    mark: RefCell<Mark>,
 }
 
 impl Drop for SqliteStore {
@@ -82,10 +85,11 @@ impl SqliteStore {
         };
         let (connection, lock, path, (found, known, last)) =
             opening::open(directory, acknowledged)?;
+        backup::remove_leftover(&path)?;
         if last > known {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
-        let mark = Mark::open(directory, &found, last)?;
+        let mark = RefCell::new(Mark::open(directory, &found, last)?);
         Ok(Self { connection, path, lock, mark })
     }
 
@@ -114,7 +118,7 @@ impl SqliteStore {
     ) -> Result<(), StoreError> {
         let sql = format!(
             "SELECT id, request_id, accepted_ns, specification, fingerprint, checksum, client,
-             priority FROM job WHERE {condition} ORDER BY id"
+             priority, name FROM job WHERE {condition} ORDER BY id"
         );
         let refused = |source| self.refused(source);
         let mut statement = self.connection.prepare(&sql).map_err(refused)?;
@@ -198,7 +202,7 @@ impl SqliteStore {
     }
 }
 
-impl Store for SqliteStore {
+impl Store for &SqliteStore {
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.read_jobs("true", [], &mut |record| {
             let end = match self.end(record.job) {
@@ -262,8 +266,8 @@ impl Store for SqliteStore {
         let encoded = specification::to_message(&record.specification).encode_to_vec();
         let columns = job_columns(record, &encoded);
         let sql = "INSERT OR IGNORE INTO job (id, request_id, accepted_ns, specification,
-                   fingerprint, checksum, client, priority)
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+                   fingerprint, checksum, client, priority, name)
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
         let values = params![
             record.job.0,
             columns.request_id,
@@ -273,10 +277,11 @@ impl Store for SqliteStore {
             job_checksum(&columns),
             columns.client,
             columns.priority,
+            columns.name,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         // From here on the job may be acknowledged; its client hears of it after this.
-        self.mark.acknowledge(record.job).inspect_err(|_| {
+        self.mark.borrow_mut().acknowledge(record.job).inspect_err(|_| {
             // It is refused. If it cannot be removed it is a job that nobody asks for.
             let _ = self.connection.execute("DELETE FROM job WHERE id = ?1", params![record.job.0]);
         })
@@ -437,6 +442,10 @@ impl Store for SqliteStore {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))
     }
+
+    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+        backup::copy(self, between)
+    }
 }
 
 /// The highest identifier that the database knows, be it of a job that was forgotten; 0: none.
@@ -473,8 +482,8 @@ fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
 /// The job of a row, and its identifier; `None` if it is damaged.
 fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
     let job = JobId(row.get(0)?);
-    let (request_id, fingerprint, client): (String, String, String) =
-        (row.get(1)?, row.get(4)?, row.get(6)?);
+    let (request_id, fingerprint, client, name): (String, String, String, String) =
+        (row.get(1)?, row.get(4)?, row.get(6)?, row.get(8)?);
     let (encoded, checksum) = (row.get_ref(3)?.as_blob()?, row.get_ref(5)?.as_blob()?);
     let columns = JobColumns {
         job,
@@ -484,6 +493,7 @@ fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
         fingerprint: &fingerprint,
         client: &client,
         priority: row.get(7)?,
+        name: &name,
     };
     let intact = checksum == job_checksum(&columns);
     let (accepted, priority) = (Duration::from_nanos(columns.accepted_ns), columns.priority);
@@ -497,6 +507,7 @@ fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
         fingerprint,
         client,
         priority,
+        name,
     });
     Ok((job, record))
 }
@@ -510,6 +521,7 @@ fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobColumns<'a> {
         fingerprint: &record.fingerprint,
         client: &record.client,
         priority: record.priority,
+        name: &record.name,
     }
 }
 

@@ -67,6 +67,7 @@ pub(crate) fn submission(specification: &JobSpecification, request_id: &str) -> 
         request_id: request_id.to_owned(),
         client: String::new(),
         priority: 0,
+        name: String::new(),
     }
 }
 

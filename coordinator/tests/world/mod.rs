@@ -500,7 +500,7 @@ impl World {
                 Effect::Read { job, number } => self.within(10, Happening::Read(job, number)),
                 Effect::Prune { token, jobs } => self.within(20, Happening::Forget(token, jobs)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
-                Effect::Publish { .. } => {}
+                Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
                 Effect::Despair { .. } => panic!("nobody lacks patience"),
                 Effect::Stop => self.stopped(),
             }

@@ -210,6 +210,23 @@ fn a_drained_worker_finishes_what_it_holds() {
 }
 
 #[test]
+fn a_worker_that_the_coordinator_sends_away_answers_what_it_holds_and_leaves() {
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    let leave = || Response::Drain(v1::WorkerDrain {});
+    worker.message(leave());
+    worker.expect(&[DRAIN]);
+    worker.message(leave());
+    worker.nothing_else();
+    worker.complete(1, 4);
+    worker.expect(&[answer(4), Effect::Leave]);
+    let mut idle = Recorder::attached();
+    idle.message(leave());
+    idle.expect(&[DRAIN, Effect::Leave]);
+}
+
+#[test]
 fn an_idle_worker_leaves_at_once() {
     let mut worker = Recorder::attached();
     worker.event(Event::Drain);

@@ -12,7 +12,8 @@ impl Rig {
             panic!("no submission");
         };
         let client = client.to_owned();
-        let request = Request::Submit { specification, request_id, client, priority };
+        let request =
+            Request::Submit { specification, request_id, client, priority, name: String::new() };
         let job = JobId(self.state.next_job);
         self.event(Event::Requested { token, request });
         self.event(stored(job.0, RecordKey::Job));
@@ -59,7 +60,13 @@ fn what_waits_is_bounded_in_bytes() {
         let (specification, client) = (Arc::new(specification), client.to_owned());
         request(
             0,
-            Request::Submit { specification, request_id: String::new(), client, priority: 0 },
+            Request::Submit {
+                specification,
+                request_id: String::new(),
+                client,
+                priority: 0,
+                name: String::new(),
+            },
         )
     };
     let mut rig = Rig::new();

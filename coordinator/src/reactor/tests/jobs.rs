@@ -65,7 +65,8 @@ fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
             unreachable!()
         };
         let client = client.to_owned();
-        let request = Request::Submit { specification, request_id, client, priority };
+        let request =
+            Request::Submit { specification, request_id, client, priority, name: String::new() };
         Event::Requested { token, request }
     };
     let mut rig = Rig::new();

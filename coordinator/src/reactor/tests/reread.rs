@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::*;
 use crate::event::Unread;
+use crate::notice::Notice;
 use crate::reactor::Restored;
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, Store as _};
@@ -60,7 +61,8 @@ fn a_restarted_job_reads_one_evaluation_after_another() {
     let restored = Restored::load(&mut store).unwrap();
     let (state, effects) = State::restore(Config::default(), restored, Duration::ZERO);
     let mut rig = Rig { state, now: Duration::ZERO };
-    assert_eq!(effects, [Effect::Read { job: JobId(1), number: 0 }]);
+    let started = Effect::Note(Notice::JobStarted { job: JobId(1), stored: 3 });
+    assert_eq!(effects, [started, Effect::Read { job: JobId(1), number: 0 }]);
     rig.check(hello(1, 1), &["welcome 1, lease 1"]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 3);

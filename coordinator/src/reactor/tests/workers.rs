@@ -148,3 +148,62 @@ fn answers_to_unknown_batches_mean_nothing() {
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.realizations_done, 0);
 }
+
+#[test]
+fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
+    let mut rig = Rig::with(1000, &[1, 2]);
+    rig.now += Duration::from_secs(3);
+    rig.hear(2);
+    let list = crate::worker_list::all(&rig.state, rig.now + Duration::from_secs(1));
+    let shown: Vec<_> = list
+        .workers
+        .iter()
+        .map(|it| {
+            (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.standing())
+        })
+        .collect();
+    let ok = osteon_proto::v1::WorkerStanding::Ok;
+    assert_eq!(shown, [(1, 1, 4.0, 2, Some(4.0), ok), (2, 2, 1.0, 2, Some(4.0), ok)]);
+    assert_eq!(list.workers[0].realizations_per_second, 0.0);
+    assert_eq!(list.departed, []);
+    rig.event(answer(1, 1, 0, 4));
+    rig.event(end_of_stream(1));
+    let list = crate::worker_list::all(&rig.state, rig.now);
+    assert_eq!(list.workers.len(), 1);
+    let [gone] = &list.departed[..] else { panic!("{list:?}") };
+    assert_eq!((gone.worker, gone.host.as_str(), gone.process), (1, "node", 42));
+    assert_eq!((gone.batches, gone.reason.as_str()), (2, "its connection ended"));
+    assert_eq!(gone.depart_time.map(|time| time.seconds), Some(3));
+    // However many come and go.
+    for worker in 3..200 {
+        rig.event(hello(worker, 1));
+        rig.event(end_of_stream(worker));
+    }
+    let list = crate::worker_list::all(&rig.state, rig.now);
+    assert_eq!(list.departed.len(), 64);
+    assert_eq!(list.departed[0].worker, 199);
+}
+
+#[test]
+fn a_worker_that_is_sent_away_gets_nothing_more_and_leaves_when_it_has_answered() {
+    let mut rig = Rig::with(1000, &[1]);
+    let drain = |worker| request(7, Request::DrainWorker(WorkerId(worker)));
+    rig.check(drain(1), &["drain 1", "answer 7: worker 1 Draining"]);
+    // Once is enough.
+    rig.check(drain(1), &["answer 7: worker 1 Draining"]);
+    let unknown =
+        "answer 7: no worker with number 5 is attached; `osteon workers` lists those that are";
+    rig.check(drain(5), &[unknown]);
+    rig.check(answer(1, 1, 0, 4), &[]);
+    rig.check(answer(1, 2, 4, 4), &["close 1: this worker has drained"]);
+}
+
+#[test]
+fn a_worker_that_holds_nothing_is_told_before_its_stream_is_closed() {
+    let mut rig = Rig::new();
+    rig.event(hello(1, 1));
+    let drain = request(7, Request::DrainWorker(WorkerId(1)));
+    rig.check(drain, &["drain 1", "answer 7: worker 1 Draining"]);
+    let drains = Event::WorkerDrains { worker: WorkerId(1) };
+    rig.check(drains, &["close 1: this worker has drained"]);
+}

@@ -13,7 +13,7 @@ fn reason(job: &JobSpecification, outcomes: [Outcome; 10]) -> String {
     while let Step::Evaluate(_) = search.ask() {
         search.tell(outcomes.into(), None);
     }
-    let Ending { status, reason } = ending(&search);
+    let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     reason.unwrap()
 }

@@ -53,6 +53,7 @@ pub(super) struct JobColumns<'a> {
     pub(super) fingerprint: &'a str,
     pub(super) client: &'a str,
     pub(super) priority: u32,
+    pub(super) name: &'a str,
 }
 
 pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
@@ -64,6 +65,7 @@ pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
         columns.fingerprint.as_bytes(),
         columns.client.as_bytes(),
         &columns.priority.to_le_bytes(),
+        columns.name.as_bytes(),
     ])
 }
 

@@ -10,6 +10,7 @@ pub(super) const SCHEMA: &str = "
         fingerprint TEXT NOT NULL,       -- of the numerics of its evaluations
         client TEXT NOT NULL,
         priority INTEGER NOT NULL,
+        name TEXT NOT NULL,              -- what people call it
         checksum BLOB NOT NULL
     );
     CREATE TABLE evaluation (

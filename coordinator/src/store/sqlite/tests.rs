@@ -33,6 +33,7 @@ pub(super) fn job(id: u64) -> JobRecord {
         fingerprint: "osteon 1.2.3 numerics 4".to_owned(),
         client: if id == 2 { "somebody@there".to_owned() } else { String::new() },
         priority: if id == 3 { 9 } else { 0 },
+        name: if id == 2 { "Müller, left tibia".to_owned() } else { String::new() },
     }
 }
 

@@ -1,0 +1,82 @@
+//! The store for its owner. What it does is done through a shared reference, so that others may use
+//! it between two pieces of a copy.
+
+use std::fs::File;
+
+use super::SqliteStore;
+use crate::ids::JobId;
+use crate::search::Summary;
+use crate::store::{
+    Between, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
+};
+use crate::worker_name::WorkerName;
+
+impl Store for SqliteStore {
+    fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
+        (&*self).visit_jobs(visit)
+    }
+
+    fn job(&mut self, job: JobId) -> Result<Option<JobRecord>, StoreError> {
+        (&*self).job(job)
+    }
+
+    fn evaluation(
+        &mut self,
+        job: JobId,
+        number: u64,
+    ) -> Result<Option<EvaluationRecord>, StoreError> {
+        (&*self).evaluation(job, number)
+    }
+
+    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        (&*self).begin_again(job, fingerprint)
+    }
+
+    fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
+        (&*self).put_job(record)
+    }
+
+    fn put_evaluation(
+        &mut self,
+        record: &EvaluationRecord,
+        is_last: bool,
+    ) -> Result<(), StoreError> {
+        (&*self).put_evaluation(record, is_last)
+    }
+
+    fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
+        (&*self).finish_job(end, summary)
+    }
+
+    fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {
+        (&*self).summary(job)
+    }
+
+    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        (&*self).forget_jobs(jobs)
+    }
+
+    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
+        (&*self).last_forgotten()
+    }
+
+    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
+        (&*self).put_expulsion(record)
+    }
+
+    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
+        (&*self).expulsions()
+    }
+
+    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        (&*self).ended_with(worker)
+    }
+
+    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
+        (&*self).forget_expulsions()
+    }
+
+    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+        (&*self).copy(between)
+    }
+}

@@ -1,0 +1,70 @@
+//! Options of the commands for those who run a coordinator.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{ClientArguments, probe_seconds};
+
+/// Of `workers`.
+#[derive(Debug, Args)]
+pub(crate) struct WorkersArguments {
+    /// What else than to list them.
+    #[command(subcommand)]
+    pub(crate) command: Option<WorkersCommand>,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What can be done with workers.
+#[derive(Debug, Subcommand)]
+pub(crate) enum WorkersCommand {
+    /// Send a worker away: it gets nothing new, answers what it holds, and ends
+    Drain(DrainArguments),
+}
+
+/// Of `workers drain`.
+#[derive(Debug, Args)]
+pub(crate) struct DrainArguments {
+    /// Number of the worker, as `osteon workers` lists it
+    #[arg(value_name = "NUMBER")]
+    pub(crate) worker: u64,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Of `health`.
+#[derive(Debug, Args)]
+pub(crate) struct HealthArguments {
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Longest wait for the answer, s, 0.1 to 60
+    #[arg(long, value_name = "S", default_value = "5", value_parser = probe_seconds)]
+    pub(crate) timeout: f64,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Of `backup`.
+#[derive(Debug, Args)]
+pub(crate) struct BackupArguments {
+    /// Directory for the copy, which is named osteon.sqlite; none may be there already
+    #[arg(value_name = "DIR")]
+    pub(crate) directory: PathBuf,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}

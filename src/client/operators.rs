@@ -1,0 +1,72 @@
+//! What those ask who run a coordinator: its workers, its health, a copy of its store.
+
+use std::time::Duration;
+
+use osteon_proto::credentials::{CredentialFiles, Credentials};
+use osteon_proto::endpoint;
+use osteon_proto::malformed::Malformed;
+use osteon_proto::v1::backup_response::Part;
+use osteon_proto::v1::{self, BackupEnd, ListWorkersResponse, WorkerSnapshot};
+use tokio::time::{Instant, timeout};
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
+
+use super::{Client, ClientError, Remote, answer_limit, answered, answered_within, refused};
+
+impl Client {
+    /// The attached workers, and those that went last.
+    pub(crate) async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
+        let call = self.jobs.list_workers(v1::ListWorkersRequest {});
+        answered(&self.endpoint, call).await
+    }
+
+    /// Sends a worker away; how it is then.
+    pub(crate) async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
+        let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });
+        let worker = answered(&self.endpoint, call).await?.worker;
+        self.present(worker, "worker")
+    }
+
+    /// Shows `take` a copy of the store, part by part; what it must be in all. The outer error is
+    /// that of `take`.
+    pub(crate) async fn backup<E>(
+        &mut self,
+        mut take: impl FnMut(&[u8]) -> Result<(), E>,
+    ) -> Result<Result<BackupEnd, ClientError>, E> {
+        let call = self.jobs.backup(v1::BackupRequest {});
+        let mut stream = match answered(&self.endpoint, call).await {
+            Ok(stream) => stream,
+            Err(error) => return Ok(Err(error)),
+        };
+        loop {
+            let Ok(message) = timeout(answer_limit(), stream.message()).await else {
+                return Ok(Err(ClientError::Unanswered { endpoint: self.endpoint.clone() }));
+            };
+            let part = match message {
+                Ok(message) => message.and_then(|message| message.part),
+                Err(status) => return Ok(Err(refused(&self.endpoint, &status))),
+            };
+            match part {
+                Some(Part::Data(data)) => take(&data)?,
+                Some(Part::End(end)) => return Ok(Ok(end)),
+                None => return Ok(Err(self.malformed(Malformed::Missing { field: "part" }))),
+            }
+        }
+    }
+}
+
+/// Asks a coordinator once whether it serves, for no longer than `limit`. It needs no token, and
+/// none is sent.
+pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
+    let Remote { endpoint, files, .. } = remote;
+    let files = CredentialFiles { token: None, ..files.clone() };
+    let credentials = Credentials::load(&files, endpoint)?;
+    let begun = Instant::now();
+    let connection = endpoint::connect_with(endpoint, &credentials, limit).await?;
+    let mut client = HealthClient::new(connection);
+    let call = client.check(HealthCheckRequest::default());
+    let left = limit.saturating_sub(begun.elapsed());
+    let answer = answered_within(endpoint, left, call).await?;
+    Ok(answer.status() == ServingStatus::Serving)
+}

@@ -1,0 +1,126 @@
+//! `workers`, `health`, `backup`: for those who run a coordinator.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use osteon_coordinator::store::sqlite::SqliteStore;
+use osteon_proto::v1::BackupEnd;
+use tempfile::NamedTempFile;
+
+use crate::client::{Client, Remote, operators};
+use crate::ending::{Ending, Failure, stdout_failure};
+use crate::output;
+use crate::resolved::Format;
+
+/// Name of a store's file in its directory, and those that SQLite keeps beside it.
+const STORE: &str = "osteon.sqlite";
+const BESIDE_STORE: [&str; 2] = ["osteon.sqlite-wal", "osteon.sqlite-journal"];
+
+/// `workers`: prints who is attached, who went last, and who is expelled.
+pub(super) async fn workers(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
+    let mut client = Client::connect(coordinator).await?;
+    let workers = client.workers().await?;
+    let expelled = client.expelled().await?;
+    output::stdout(format).workers(&workers, &expelled).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+/// `workers drain`: prints how the worker is then.
+pub(super) async fn drain(
+    worker: u64,
+    coordinator: &Remote,
+    format: Format,
+) -> Result<Ending, Failure> {
+    let worker = Client::connect(coordinator).await?.drain(worker).await?;
+    output::stdout(format).worker(&worker).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+/// `health`: whether a coordinator serves, told by the exit code, too.
+pub(super) async fn health(
+    coordinator: &Remote,
+    limit: Duration,
+    format: Format,
+) -> Result<Ending, Failure> {
+    let reason = match operators::health(coordinator, limit).await {
+        Ok(true) => None,
+        Ok(false) => {
+            Some(anyhow!("the coordinator at {} says that it does not serve", coordinator.endpoint))
+        }
+        Err(error) if error.is_bad_input() => return Err(error.into()),
+        Err(error) => Some(anyhow::Error::new(error)),
+    };
+    match (reason, format) {
+        (Some(reason), Format::Text) => Err(Failure::Failed(reason)),
+        (reason, _) => {
+            let reason = reason.map(|reason| reason.to_string());
+            output::stdout(format).health(reason.as_deref()).map_err(stdout_failure)?;
+            Ok(if reason.is_none() { Ending::Done } else { Ending::RunFailed })
+        }
+    }
+}
+
+/// `backup`: a copy of the store of a running coordinator, whole or not at all.
+pub(super) async fn backup(
+    directory: &Path,
+    coordinator: &Remote,
+    format: Format,
+) -> Result<Ending, Failure> {
+    let target = vacant(directory)?;
+    let mut client = Client::connect(coordinator).await?;
+    SqliteStore::make_directory(directory)
+        .with_context(|| format!("cannot create the directory {}", directory.display()))
+        .map_err(Failure::Failed)?;
+    // Removed when it is dropped; others cannot read it.
+    let file = tempfile::Builder::new().prefix(".osteon-backup-").tempfile_in(directory);
+    let unmade = || format!("cannot make a file in {}", directory.display());
+    let mut file = file.with_context(unmade).map_err(Failure::Failed)?;
+    let end = receive(&mut client, &mut file).await?;
+    file.as_file().sync_all().with_context(unmade).map_err(Failure::Failed)?;
+    file.persist_noclobber(&target)
+        .map_err(|error| error.error)
+        .with_context(|| format!("cannot make {}", target.display()))
+        .map_err(Failure::Failed)?;
+    output::stdout(format).backup(&target, &end).map_err(stdout_failure)?;
+    Ok(Ending::Done)
+}
+
+/// The file of the copy, where there is none and nothing that SQLite would take for a part of it.
+fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
+    for name in [STORE].iter().chain(&BESIDE_STORE) {
+        let path = directory.join(name);
+        if path.symlink_metadata().is_ok() {
+            return Err(Failure::bad_input(anyhow!(
+                "{} is there already and is left as it is; choose another directory",
+                path.display()
+            )));
+        }
+    }
+    Ok(directory.join(STORE))
+}
+
+/// Writes the copy to `file`; what it is in all, when it is that.
+async fn receive(client: &mut Client, file: &mut NamedTempFile) -> Result<BackupEnd, Failure> {
+    let (mut length, mut digest) = (0, blake3::Hasher::new());
+    let place = file.path().to_owned();
+    let received = client.backup(|data| {
+        length += data.len() as u64;
+        digest.update(data);
+        file.write_all(data)
+            .with_context(|| format!("cannot write {}", place.display()))
+            .map_err(Failure::Failed)
+    });
+    let end = received.await??;
+    let found = digest.finalize().to_hex().to_string();
+    if (length, &found) != (end.length, &end.digest) {
+        return Err(Failure::failed(anyhow!(
+            "the copy is damaged: {length} bytes with digest {found} came, the coordinator sent {} \
+             bytes with digest {}; nothing was kept, try again",
+            end.length,
+            end.digest
+        )));
+    }
+    Ok(end)
+}
