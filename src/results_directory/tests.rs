@@ -1,4 +1,3 @@
-use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{Objective, Sampling, Search};
 use osteon_common::results::{JobFailure, JobResult};
@@ -121,6 +120,7 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     let directory = ResultsDirectory::open(&path).unwrap();
     let request = directory.request().unwrap();
     let mut failed = fetched(Status::Failed);
+    failed.result.failure = Some(JobFailure::IntegrityError);
     failed.result.reason = Some("integrity error: realization 3 is …".to_owned());
     directory.write_results(JobKind::Identification, &failed).unwrap();
     assert_eq!(ResultsDirectory::finished(&path, &specification()).unwrap(), None);
