@@ -10,6 +10,7 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
+use osteon_common::document::Format;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
 use osteon_common::results::{GroupResult, JobResult, Status};
@@ -139,10 +140,11 @@ impl ResultsDirectory {
         let path = self.path.join(REQUEST);
         let stored = read_if_there(&path).map_err(Failure::Failed)?.unwrap_or_default();
         let mut lines = stored.lines().map(str::trim);
-        if let Some((id, client)) = lines.next().zip(lines.next()).filter(|(id, _)| !id.is_empty())
-        {
-            let client = client.to_owned();
-            return Ok(Request { client, ..Request::with_id(id.to_owned()) });
+        if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
+            let request = Request::with_id(id.to_owned());
+            // Whoever writes the file by hand may leave the client out.
+            let client = lines.next().map_or(request.client, str::to_owned);
+            return Ok(Request { client, ..request });
         }
         let request = Request::new();
         let text = format!("{}\n{}\n", request.id, request.client);
@@ -263,7 +265,14 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 
 /// Refuses a directory whose job is not `specification`, and says where they differ.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    match difference(stored, &job_file::to_toml(specification)) {
+    // What is said in other words, or left out where it is the default, is the same job.
+    let directory = path.parent().unwrap_or(Path::new(""));
+    // Only that of an identification has data.
+    let complete = [JobKind::Identification, JobKind::Propagation]
+        .into_iter()
+        .find_map(|kind| job_file::parse(stored, Format::Toml, directory, kind).ok())
+        .map_or_else(|| stored.to_owned(), |there| job_file::to_toml(&there));
+    match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
         Some(difference) => Err(Failure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \

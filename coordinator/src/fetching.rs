@@ -33,7 +33,8 @@ const REALIZATION_BLOCK: usize = 65_536;
 pub(crate) struct Opened {
     left: Arc<Left>,
     outcomes: Option<Arc<[Outcome]>>,
-    store: mpsc::Sender<Command>,
+    /// Weak, so that who reads slowly does not keep a coordinator from stopping.
+    store: mpsc::WeakSender<Command>,
 }
 
 /// Reads all that an ended job left but its groups.
@@ -46,7 +47,7 @@ pub(crate) async fn open(store: &mpsc::Sender<Command>, end: EndRecord) -> Resul
     let summary = read(store, |reply| Reading::Summary(job, reply)).await?;
     let left = Left { end, specification: record.specification, summary };
     let outcomes = outcomes(store, job, left.best()).await?;
-    Ok(Opened { left: Arc::new(left), outcomes, store: store.clone() })
+    Ok(Opened { left: Arc::new(left), outcomes, store: store.downgrade() })
 }
 
 async fn outcomes(
@@ -62,13 +63,16 @@ async fn read<T>(
     store: &mpsc::Sender<Command>,
     what: impl FnOnce(Reply<T>) -> Reading,
 ) -> Result<T, Status> {
-    let stopped = || Status::unavailable("the coordinator has stopped; try again when it is back");
     let (reply, record) = oneshot::channel();
     store.send(Command::Fetch(what(reply))).await.map_err(|_| stopped())?;
     record.await.map_err(|_| stopped())?.map_err(|error| match error {
         ReadError::Pruned { .. } => Status::not_found(error.to_string()),
         _ => Status::data_loss(error.to_string()),
     })
+}
+
+fn stopped() -> Status {
+    Status::unavailable("the coordinator has stopped; try again when it is back")
 }
 
 /// Sends one specification, one result, history blocks, realization blocks; where the data are groups
@@ -89,7 +93,10 @@ pub(crate) async fn send_all(opened: Opened, reader: Reader) -> Result<(), Stop>
     }
     send_realizations(None, &of_best, &reader).await?;
     for set in 0..left.groups() {
-        let read = outcomes(&store, left.end.job, left.best_of(set)).await?;
+        let read = {
+            let store = store.upgrade().ok_or_else(stopped)?;
+            outcomes(&store, left.end.job, left.best_of(set)).await?
+        };
         let number = u32::try_from(set).unwrap_or(u32::MAX);
         let found = computed(&left, move |left| {
             let found = left.group(set, read)?;

@@ -1,4 +1,3 @@
-use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{Objective, Sampling, Search};
 use osteon_common::results::{JobFailure, JobResult};
