@@ -20,9 +20,9 @@ use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::{Code, Response, Status};
 
+use crate::environment::COORDINATOR;
 use crate::progress::say;
 use crate::request::Request;
-use crate::environment::COORDINATOR;
 
 use self::parts::Parts;
 

@@ -150,6 +150,7 @@ fn record(job: u64) -> JobRecord {
         fingerprint: version::fingerprint(),
         client: String::new(),
         priority: 0,
+        name: String::new(),
     }
 }
 

@@ -331,7 +331,7 @@ fn with_a_rollback_journal_everything_is_the_same() {
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
     let mark = Mark::open(directory.path(), &Found::Nothing, 0).unwrap();
-    let mut store = SqliteStore { connection, path, lock, mark };
+    let mut store = SqliteStore { connection, path, lock, mark: mark.into() };
     store.put_evaluation(&evaluation(1, 0), true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
