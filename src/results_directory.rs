@@ -221,7 +221,7 @@ pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
 }
 
 /// The text of a file in a directory that the user has named; `None` if there is no such file.
-fn given(path: &Path) -> Result<Option<String>, Failure> {
+pub(crate) fn given(path: &Path) -> Result<Option<String>, Failure> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
         Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
         Err(error) => Failure::Failed(error),
@@ -307,7 +307,7 @@ pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
-pub(crate) fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
+fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
     let cannot = || format!("cannot read {}", visible::path(path));
     let read = match user_file::read(path, FILE_BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

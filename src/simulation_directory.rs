@@ -13,7 +13,7 @@ use osteon_common::{case_file, visible};
 use crate::ending::Failure;
 use crate::program;
 use crate::result_files::{Origin, RESULT, ResultFiles};
-use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, read_if_there};
+use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 
 /// The file of the traces.
 pub(crate) const TRACES: &str = "traces.csv";
@@ -47,7 +47,7 @@ impl Simulated<'_> {
     pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), Failure> {
         let there = |name: &str| directory.join(name).symlink_metadata().is_ok();
         let shown = visible::path(directory);
-        let stored = read_if_there(&directory.join(CASE)).map_err(Failure::Failed)?;
+        let stored = given(&directory.join(CASE))?;
         let why = match stored {
             Some(stored) => match difference(&stored, &self.text()) {
                 None => return Ok(()),

@@ -19,9 +19,10 @@ const VELOCITY: (f64, f64) = (0.98, 1.055);
 const VARIATION: (f64, f64) = (0.985, 1.145);
 /// Data are out of reach whose mean is beyond all that can be reached by more than this factor …
 const MEAN_BEYOND: f64 = 2.0;
-/// … or whose coefficient of variation is.
+/// … or whose coefficient of variation is above all that can be reached by more than this factor. One
+/// that is too small is no sign of another unit.
 const VARIATION_BEYOND: f64 = 5.0;
-/// Fewer velocities may happen to be this much alike.
+/// Fewer velocities may differ this much by chance.
 const VELOCITIES_MIN: usize = 10;
 /// Where the receivers are nearer to the source than this many times the sum of the heights, reflections
 /// come first, whose apparent velocity has no bound.
@@ -144,11 +145,9 @@ impl Reach {
     /// The moment of data, of so many velocities, that is far out of reach: which, its value, and what
     /// can be reached.
     fn missed(&self, data: Moments, count: Option<usize>) -> Option<(Moment, f64, String)> {
-        let beyond = |value: f64, (from, to): (f64, f64), factor: f64| {
-            value < from / factor || value > to * factor
-        };
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
-        if beyond(mean, self.velocity, MEAN_BEYOND) {
+        let (slowest, fastest) = self.velocity;
+        if mean < slowest / MEAN_BEYOND || mean > fastest * MEAN_BEYOND {
             let reached = format!(
                 "the bounds of [parameters] allow mean velocities of about {}: check the units of \
                  data and parameters, or widen the bounds",
@@ -157,7 +156,7 @@ impl Reach {
             return Some((Moment::Mean, mean, reached));
         }
         let enough = count.is_none_or(|count| count >= VELOCITIES_MIN);
-        if enough && beyond(variation, self.variation, VARIATION_BEYOND) {
+        if enough && variation > self.variation.1 * VARIATION_BEYOND {
             let reached = format!(
                 "the bounds of parameters.dispersion allow coefficients of variation of about {}: check \
                  the data, or widen the bounds",
@@ -291,9 +290,9 @@ mod tests {
             (1300.0, 0.0271, Some(2), Some((Moment::Mean, velocities))),
             (3906.0, 0.4, None, None),
             (3906.0, 0.5, None, Some((Moment::Variation, variations))),
-            (3906.0, 0.001, None, Some((Moment::Variation, variations))),
-            (3906.0, 0.001, Some(9), None),
-            (3906.0, 0.001, Some(10), Some((Moment::Variation, variations))),
+            (3906.0, 0.5, Some(9), None),
+            (3906.0, 0.5, Some(10), Some((Moment::Variation, variations))),
+            (3906.0, 0.001, None, None),
         ] {
             let expected = expected.map(|(moment, text)| (moment, text.to_owned()));
             assert_eq!(missed(mean, variation, count), expected, "{mean} {variation} {count:?}");

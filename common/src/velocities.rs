@@ -35,7 +35,7 @@ pub(crate) struct Measured<T> {
 pub(crate) struct Origin {
     path: PathBuf,
     /// Line of each velocity of each set, from 1.
-    lines: Vec<Vec<usize>>,
+    lines: Vec<Vec<u32>>,
 }
 
 impl Origin {
@@ -45,7 +45,7 @@ impl Origin {
     }
 
     /// The line of a velocity of a set.
-    pub(crate) fn line(&self, set: usize, index: usize) -> Option<usize> {
+    pub(crate) fn line(&self, set: usize, index: usize) -> Option<u32> {
         self.lines.get(set)?.get(index).copied()
     }
 
@@ -265,7 +265,7 @@ impl<R: BufRead> Lines<R> {
 struct Gathered {
     groups: Vec<Group>,
     /// Line of each velocity of each group, from 1.
-    lines: Vec<Vec<usize>>,
+    lines: Vec<Vec<u32>>,
     /// Of each group, by its name.
     places: BTreeMap<String, usize>,
     count: usize,
@@ -288,7 +288,8 @@ impl Gathered {
             }
         };
         self.groups[place].velocities.push(velocity);
-        self.lines[place].push(line);
+        // A file has fewer lines than bytes, of which far fewer are allowed.
+        self.lines[place].push(u32::try_from(line).unwrap_or(u32::MAX));
         Ok(())
     }
 }

@@ -175,7 +175,7 @@ fn implausible_data() {
             (given, "mean = 3.8\ncoefficient_of_variation = 2.7"),
             (given, "mean = 50\ncoefficient_of_variation = 0.027"),
             (given, "mean = 3900.0\ncoefficient_of_variation = 0.6"),
-            (given, "mean = 3900.0\ncoefficient_of_variation = 0.001"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.5"),
             (given, "mean = 1100.0\ncoefficient_of_variation = 0.027"),
             (given, "velocities = [1100.0, 1200.0]"),
             (given, "groups = { a = [1100.0, 1200.0], b = [1000.0, 1200.0] }"),

@@ -74,10 +74,11 @@ fn groups_stand_in_the_order_in_which_they_begin() {
 
 #[test]
 fn a_group_of_one_velocity_is_a_group() {
-    let read = read_as(b"bone,velocity\na,1\na,2\nb,3\nc,4\nc,4\n", "group = \"bone\"");
+    let read =
+        read_as(b"bone,velocity\na,3900\na,3950\nb,4000\nc,4010\nc,4010\n", "group = \"bone\"");
     let Ok(Some(Data::Groups(groups))) = read else { panic!("{read:?}") };
     let unsearched: Vec<_> = groups.iter().map(Group::no_variation).collect();
-    let equal = NoVariation::AllEqual { count: 2, velocity: 4.0 };
+    let equal = NoVariation::AllEqual { count: 2, velocity: 4010.0 };
     assert_eq!(unsearched, [None, Some(NoVariation::OneVelocity), Some(equal)]);
 }
 

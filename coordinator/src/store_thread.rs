@@ -70,8 +70,12 @@ pub(crate) fn serve(
         } else {
             commands.try_recv().ok()
         };
+        let others_first = matches!(command, Some(Command::Fetch(_)));
         if let Some(command) = command {
             desk.run(store, command);
+        }
+        if others_first {
+            continue;
         }
         desk.read_on(store);
         if let Some(reply) = desk.copies.pop_front() {

@@ -132,8 +132,8 @@ fn row(number: u64) -> v1::EvaluationRow {
     }
 }
 
-/// An identification of two free parameters from two starts, with all that there can be.
-fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
+/// A job of two free parameters with two starts.
+fn job_of_two_starts() -> JobSpecification {
     let text =
         "[data]\nvelocities = [3900.0, 3950.0, 4000.0]\n[search]\nstarts = 2\n[parameters]\n";
     let ranges = Parameter::ALL.map(|parameter| {
@@ -147,8 +147,15 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         }
     });
     let text = text.to_owned() + &ranges.join("\n");
-    let job = job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap();
-    let moments = |mean, coefficient_of_variation| Moments { mean, coefficient_of_variation };
+    job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
+}
+
+fn moments(mean: f64, coefficient_of_variation: f64) -> Moments {
+    Moments { mean, coefficient_of_variation }
+}
+
+/// An evaluation of each start, then one for each derivative.
+fn history_of_two_starts() -> Vec<Evaluation> {
     let evaluation = |number: u64, start: u32, varied: Option<Parameter>| {
         let mut point = POINT;
         if let Some(parameter) = varied {
@@ -164,12 +171,17 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
             estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
         }
     };
-    let history = vec![
+    vec![
         evaluation(0, 0, None),
         evaluation(1, 1, None),
         evaluation(2, 0, Some(Parameter::Density)),
         evaluation(3, 0, Some(Parameter::Dispersion)),
-    ];
+    ]
+}
+
+/// An identification of two free parameters from two starts, with all that there can be.
+fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
+    let (job, history) = (job_of_two_starts(), history_of_two_starts());
     let best = BestPoint {
         point: POINT,
         meaning: Some(PointMeaning::SimplexEnd),

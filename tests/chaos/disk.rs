@@ -185,7 +185,7 @@ fn files_that_cannot_be_used_are_refused_and_left_as_they_are() {
         connection.execute_batch(sql).unwrap();
     };
     change("UPDATE format SET version = 99");
-    refused_by(&directory, &["format 99", "use a newer version of osteon", text(&database)]);
+    refused_by(&directory, &["format 99", "run the version that wrote it", text(&database)]);
 
     let damaged = "is damaged";
     let advice = "restore the file from a copy";

@@ -245,7 +245,7 @@ impl Coordinator {
     /// The job as `jobs --json` has it.
     pub(crate) fn job(&self, id: &str) -> Value {
         let jobs = self.client(&["jobs", "--json"]).json();
-        let found = jobs["jobs"].as_array().unwrap().iter().find(|job| job["job"] == id);
+        let found = jobs.as_array().unwrap().iter().find(|job| job["job"] == id);
         found.unwrap_or_else(|| panic!("no job {id} in {jobs}")).clone()
     }
 }

@@ -280,9 +280,9 @@ fn other_units_are_asked_about() {
     assert_eq!(
         refusal(|m| modulus(m, 20.0, 12.0, 25.0)),
         [
-            "parameters.longitudinal_young_modulus.start: is 20.0; values are in Pa: did you mean 20 GPa \
+            "parameters.longitudinal_young_modulus.free.start: is 20.0; values are in Pa: did you mean 20 GPa \
              (20e9)?",
-            "parameters.longitudinal_young_modulus.bounds: are 12.0 and 25.0; values are in Pa: did you \
+            "parameters.longitudinal_young_modulus.free: are 12.0 and 25.0; values are in Pa: did you \
              mean 12 and 25 GPa (12e9 and 25e9)?",
         ]
     );
