@@ -72,7 +72,7 @@ pub(crate) enum ClientError {
     #[error("{}", counted(.0))]
     Violations(Violations),
     /// It refuses the request.
-    #[error("{reason}{} (coordinator {endpoint})", hint(*code))]
+    #[error("{reason}{hint} (coordinator {endpoint})")]
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,
@@ -80,6 +80,8 @@ pub(crate) enum ClientError {
         code: Code,
         /// What it says.
         reason: String,
+        /// What can be done about it, or nothing.
+        hint: &'static str,
     },
     /// Whether it has accepted a job is not known.
     #[error(
@@ -117,9 +119,10 @@ impl ClientError {
 
 /// What a user of the command line can do about a refusal, where the coordinator, whose clients are
 /// programs, does not say it.
-fn hint(code: Code) -> &'static str {
-    match code {
-        Code::NotFound => "; `osteon jobs` lists all jobs",
+fn hint(status: &Status) -> &'static str {
+    match status::missing(status).as_deref() {
+        Some("job") => "; `osteon jobs` lists all jobs",
+        Some("worker") => "; `osteon workers` lists all that are attached",
         _ => "",
     }
 }
@@ -455,7 +458,7 @@ fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
         }
         // tonic reports a broken HTTP/2 connection so.
         Code::Internal if !answered => ClientError::Lost { endpoint, reason },
-        code => ClientError::Refused { endpoint, code, reason },
+        code => ClientError::Refused { endpoint, code, reason, hint: hint(status) },
     }
 }
 

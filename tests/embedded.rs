@@ -75,6 +75,8 @@ fn check_draws(job: &str) {
     assert_eq!(rows.len(), 39);
     for index in [0, 1, 17, 38] {
         let case = run(&["draw", text(&job), "--index", &index.to_string()]);
+        let at = ["draw", text(&job), "--index", &index.to_string(), "--at", text(&out)];
+        assert_eq!(run(&at).succeeded(), case.succeeded());
         let case = scratch.write(&format!("{index}.toml"), case.succeeded());
         let velocity = run(&["simulate", text(&case), "--json"]).json()["velocity"].clone();
         let row: Vec<&str> = rows[index].split(',').collect();

@@ -14,12 +14,12 @@ pub fn line(text: &str) -> Cow<'_, str> {
     escaped(text, is_hidden)
 }
 
-/// As [`line`], with the line feeds of `text` as they are: for messages that have several lines.
+/// As [`line()`], with the line feeds of `text` as they are: for messages that have several lines.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c != '\n' && is_hidden(c))
 }
 
-/// A path as [`line`]; bytes that are no UTF-8 are shown as U+FFFD.
+/// A path as [`line()`]; bytes that are no UTF-8 are shown as U+FFFD.
 pub fn path(path: &Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }

@@ -173,7 +173,7 @@ pub enum Refusal {
         job: JobId,
     },
     /// There is no such worker.
-    #[error("no worker with number {worker} is attached; `osteon workers` lists those that are")]
+    #[error("no worker with number {worker} is attached")]
     NoWorker {
         /// The worker asked for.
         worker: WorkerId,

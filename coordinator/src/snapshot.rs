@@ -188,7 +188,12 @@ fn unfit(state: &State) -> String {
     let named = |(host, lost): (&String, &LostInARow)| {
         format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
     };
-    let silent = state.probation.silent();
+    // Of those that are here and hold something: nobody waits for the others.
+    let holds = |name: &&WorkerName| {
+        let there = state.workers.values().find(|worker| worker.name == **name);
+        there.is_some_and(|worker| !worker.in_flight.is_empty())
+    };
+    let silent = state.probation.silent().filter(holds);
     let silent = silent.map(|name: &WorkerName| format!("{name} does not answer what it holds"));
     let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")

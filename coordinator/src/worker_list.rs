@@ -28,6 +28,8 @@ fn snapshot(state: &State, id: WorkerId, worker: &Worker, now: Duration) -> Work
         WorkerStanding::Draining
     } else if state.is_failing(worker.name.host()) {
         WorkerStanding::Distrusted
+    } else if state.probation.has(&worker.name) {
+        WorkerStanding::Probation
     } else {
         WorkerStanding::Ok
     };

@@ -67,6 +67,11 @@ pub fn no_job(job: impl Into<String>, message: impl Into<String>) -> Status {
     Status::with_error_details(Code::NotFound, message, details)
 }
 
+/// The type of what there is not, `job` or `worker`, if that is what `status` says.
+pub fn missing(status: &Status) -> Option<String> {
+    Some(status.get_details_resource_info()?.resource_type)
+}
+
 /// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the `worker`.
 pub fn no_worker(worker: impl Into<String>, message: impl Into<String>) -> Status {
     let message = message.into();

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
+use osteon_common::visible;
 use osteon_proto::credential_file;
 use osteon_proto::endpoint;
 use time::OffsetDateTime;
@@ -45,7 +46,8 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
     }
     new_files::private_directory(directory)?;
     new_files::create(&files)?;
-    let names: String = files.iter().map(|file| format!("{}\n", file.path.display())).collect();
+    let names: String =
+        files.iter().map(|file| format!("{}\n", visible::path(&file.path))).collect();
     output::stdout(Format::Text).verbatim(&names).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }

@@ -48,14 +48,22 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
 }
 
 /// Refuses a directory whose results are not those of the job: the realizations of its best point
-/// would be others. Without data a job is compared in all the rest, on which realizations depend.
+/// would be others. Where one of the two has no data, as the job of a propagation, they are compared in all
+/// the rest, on which realizations depend.
 fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> anyhow::Result<()> {
+    let there = |kind| results_directory::job_of(directory, kind);
     let searched = job_file::read(job, JobKind::Identification).ok();
-    let here = searched.as_ref().unwrap_or(specification);
-    let there = results_directory::job_of(directory, here.kind)
-        .with_context(|| format!("cannot tell whose results {} holds", directory.display()))?;
+    let (here, there) = match searched.zip(there(JobKind::Identification).ok()) {
+        Some(both) => both,
+        None => {
+            let there = there(JobKind::Propagation).with_context(|| {
+                format!("cannot tell whose results {} holds", directory.display())
+            })?;
+            (specification.clone(), there)
+        }
+    };
     let different =
-        results_directory::difference(&job_file::to_toml(&there), &job_file::to_toml(here));
+        results_directory::difference(&job_file::to_toml(&there), &job_file::to_toml(&here));
     match different {
         None => Ok(()),
         Some(difference) => Err(anyhow!(

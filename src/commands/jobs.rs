@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
-use osteon_common::job_file;
 use osteon_common::results::Status;
+use osteon_common::{job_file, visible};
 use osteon_proto::v1::JobSnapshot;
 use serde_json::Value;
 use tonic::Code;
@@ -121,7 +121,7 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
     if wanted {
         directory.write_results(specification.kind, &fetched)?;
     }
-    let line = format!("{}\n", out.display());
+    let line = format!("{}\n", visible::path(out));
     output::stdout(Format::Text).verbatim(&line).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }

@@ -1,10 +1,12 @@
 //! `workers`, `health`, `backup`: for those who run a coordinator.
 
+use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
+use osteon_common::visible;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_proto::v1::BackupEnd;
 use tempfile::NamedTempFile;
@@ -16,7 +18,8 @@ use crate::resolved::Format;
 
 /// Name of a store's file in its directory, and those that SQLite keeps beside it.
 const STORE: &str = "osteon.sqlite";
-const BESIDE_STORE: [&str; 2] = ["osteon.sqlite-wal", "osteon.sqlite-journal"];
+const BESIDE_STORE: [&str; 3] =
+    ["osteon.sqlite-wal", "osteon.sqlite-journal", "osteon.acknowledged"];
 
 /// `workers`: prints who is attached, who went last, and who is expelled.
 pub(super) async fn workers(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
@@ -70,19 +73,24 @@ pub(super) async fn backup(
 ) -> Result<Ending, Failure> {
     let target = vacant(directory)?;
     let mut client = Client::connect(coordinator).await?;
-    SqliteStore::make_directory(directory)
-        .with_context(|| format!("cannot create the directory {}", directory.display()))
-        .map_err(Failure::Failed)?;
+    let shown = visible::path(directory);
+    SqliteStore::make_directory(directory).map_err(|error| {
+        Failure::unusable_path(error, format!("cannot create the directory {shown}"))
+    })?;
     // Removed when it is dropped; others cannot read it.
     let file = tempfile::Builder::new().prefix(".osteon-backup-").tempfile_in(directory);
-    let unmade = || format!("cannot make a file in {}", directory.display());
-    let mut file = file.with_context(unmade).map_err(Failure::Failed)?;
+    let mut file = file
+        .map_err(|error| Failure::unusable_path(error, format!("cannot make a file in {shown}")))?;
     let end = receive(&mut client, &mut file).await?;
-    file.as_file().sync_all().with_context(unmade).map_err(Failure::Failed)?;
+    let unsynced = || format!("cannot write the copy in {shown} to the disk");
+    file.as_file().sync_all().with_context(unsynced).map_err(Failure::Failed)?;
     file.persist_noclobber(&target)
         .map_err(|error| error.error)
-        .with_context(|| format!("cannot make {}", target.display()))
+        .with_context(|| format!("cannot make {}", visible::path(&target)))
         .map_err(Failure::Failed)?;
+    // The name, too, must outlive a power cut.
+    let directory = File::open(directory).and_then(|directory| directory.sync_all());
+    directory.with_context(unsynced).map_err(Failure::Failed)?;
     output::stdout(format).backup(&target, &end).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
@@ -94,7 +102,7 @@ fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
         if path.symlink_metadata().is_ok() {
             return Err(Failure::bad_input(anyhow!(
                 "{} is there already and is left as it is; choose another directory",
-                path.display()
+                visible::path(&path)
             )));
         }
     }
@@ -109,7 +117,7 @@ async fn receive(client: &mut Client, file: &mut NamedTempFile) -> Result<Backup
         length += data.len() as u64;
         digest.update(data);
         file.write_all(data)
-            .with_context(|| format!("cannot write {}", place.display()))
+            .with_context(|| format!("cannot write {}", visible::path(&place)))
             .map_err(Failure::Failed)
     });
     let end = received.await??;

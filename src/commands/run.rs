@@ -26,7 +26,6 @@ use crate::{unsearched_groups, verdict, warnings};
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let (specification, warnings) =
         job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
-    unsearched_groups::warn(&run.job, &specification);
     if let Some(json) = finished(&run, &specification)? {
         return show(&run, &specification, &json);
     }
@@ -36,6 +35,7 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     if let Place::There(remote) = &run.place {
         remote.tell();
     }
+    unsearched_groups::warn(&run.job, &specification);
     warnings::say_of_job(&specification, &warnings).await;
     let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.

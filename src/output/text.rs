@@ -78,7 +78,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()> {
-        self.verbatim(&format!("{} ({} bytes)\n", file.display(), copy.length))
+        self.verbatim(&format!("{} ({} bytes)\n", visible::path(file), copy.length))
     }
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {

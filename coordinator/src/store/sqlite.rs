@@ -200,6 +200,25 @@ impl SqliteStore {
         }
         self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
     }
+
+    /// Removes jobs and all that belongs to them; their identifiers are never given again.
+    fn remove_jobs(&self, jobs: &[JobId]) -> rusqlite::Result<()> {
+        let transaction = self.connection.unchecked_transaction()?;
+        for table in ["summary", "ending", "evaluation"] {
+            let sql = format!("DELETE FROM {table} WHERE job = ?1");
+            let mut delete = transaction.prepare(&sql)?;
+            for job in jobs {
+                delete.execute(params![job.0])?;
+            }
+        }
+        for job in jobs {
+            transaction.execute("DELETE FROM job WHERE id = ?1", params![job.0])?;
+        }
+        let known: i32 = transaction.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
+        let highest = jobs.iter().map(|job| i32::try_from(job.0).unwrap_or(i32::MAX)).max();
+        transaction.pragma_update(None, LAST_FORGOTTEN, known.max(highest.unwrap_or(0)))?;
+        transaction.commit()
+    }
 }
 
 impl Store for &SqliteStore {
@@ -282,8 +301,11 @@ impl Store for &SqliteStore {
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         // From here on the job may be acknowledged; its client hears of it after this.
         self.mark.borrow_mut().acknowledge(record.job).inspect_err(|_| {
-            // It is refused. If it cannot be removed it is a job that nobody asks for.
-            let _ = self.connection.execute("DELETE FROM job WHERE id = ?1", params![record.job.0]);
+            // It is refused. The mark may name it all the same, so the database must know of it: as a
+            // job that was forgotten. If that fails too it is a job that nobody asks for.
+            if let Err(error) = self.remove_jobs(&[record.job]) {
+                tracing::error!(job = %record.job, %error, "a refused job stays in the store");
+            }
         })
     }
 
@@ -352,25 +374,7 @@ impl Store for &SqliteStore {
     }
 
     fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
-        let forget = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            for table in ["summary", "ending", "evaluation"] {
-                let sql = format!("DELETE FROM {table} WHERE job = ?1");
-                let mut delete = transaction.prepare(&sql)?;
-                for job in jobs {
-                    delete.execute(params![job.0])?;
-                }
-            }
-            for job in jobs {
-                transaction.execute("DELETE FROM job WHERE id = ?1", params![job.0])?;
-            }
-            let known: i32 =
-                transaction.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
-            let highest = jobs.iter().map(|job| i32::try_from(job.0).unwrap_or(i32::MAX)).max();
-            transaction.pragma_update(None, LAST_FORGOTTEN, known.max(highest.unwrap_or(0)))?;
-            transaction.commit()
-        };
-        forget().map_err(|source| self.refused(source))?;
+        self.remove_jobs(jobs).map_err(|source| self.refused(source))?;
         if let Err(error) = self.give_back() {
             tracing::warn!(%error, "the room of removed jobs is not given back yet");
         }

@@ -89,6 +89,7 @@ fn departed(gone: &DepartedWorker) -> String {
     let when = gone.depart_time.as_ref().and_then(timestamp::from_message).and_then(utc);
     let held = match gone.batches {
         0 => String::new(),
+        1 => "; others compute the batch it held".to_owned(),
         batches => format!("; others compute the {batches} batches it held"),
     };
     let DepartedWorker { worker, host, process, reason, .. } = gone;
@@ -96,12 +97,13 @@ fn departed(gone: &DepartedWorker) -> String {
     wrapped(&format!("left {}: {}", when.unwrap_or_default(), visible::line(&line)))
 }
 
-/// `ok`, `draining` or `distrusted`.
+/// `ok`, `draining`, `distrusted` or `probation`.
 pub(in crate::output) fn standing_name(worker: &WorkerSnapshot) -> &'static str {
     match worker.standing() {
         WorkerStanding::Ok => "ok",
         WorkerStanding::Draining => "draining",
         WorkerStanding::Distrusted => "distrusted",
+        WorkerStanding::Probation => "probation",
         WorkerStanding::Unspecified => "unknown",
     }
 }

@@ -98,6 +98,14 @@ impl Mark {
         }
     }
 
+    /// The mark of `directory`, on a disk that takes nothing.
+    #[cfg(test)]
+    pub(super) fn unwritable(directory: &Path, last: u64) -> Self {
+        let path = directory.join(MARK);
+        let file = File::open(&path).unwrap();
+        Self { file, path, last, slot: 0 }
+    }
+
     /// Makes durable that `job` is acknowledged, if that is not known already.
     ///
     /// # Errors

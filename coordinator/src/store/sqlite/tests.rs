@@ -337,6 +337,23 @@ fn with_a_rollback_journal_everything_is_the_same() {
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
 }
 
+/// A mark that is written and not synced may name the job all the same.
+#[test]
+fn a_job_whose_mark_fails_is_refused_and_does_not_keep_the_store_from_opening() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    let mark = store.mark.replace(Mark::unwritable(directory.path(), 1));
+    let error = store.put_job(&job(2)).unwrap_err();
+    assert!(matches!(error, StoreError::Mark { .. }), "{error}");
+    assert_eq!(store.jobs().unwrap().len(), 1);
+    store.mark.replace(mark);
+    store.mark.borrow_mut().acknowledge(JobId(2)).unwrap();
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.last_forgotten().unwrap(), Some(JobId(2)));
+}
+
 #[test]
 fn a_second_coordinator_is_refused() {
     let directory = tempfile::tempdir().unwrap();
