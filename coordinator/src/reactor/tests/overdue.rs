@@ -336,9 +336,16 @@ fn who_does_not_answer_gets_one_realization_at_a_time_and_less_and_less_often() 
         rig.live(SECOND / 10);
     }
     assert_eq!(tried, [3, 9, 21, 45, 93]);
-    rig.accept(propagation(4));
-    let waits = crate::snapshot::of(&rig.state, JobId(rig.state.next_job - 1), rig.now).unwrap();
-    assert_eq!(waits.waiting_for, "nothing; host 1 (process 1) does not answer what it holds");
+    let waiting = |rig: &mut Rig| {
+        rig.accept(propagation(4));
+        let job = JobId(rig.state.next_job - 1);
+        crate::snapshot::of(&rig.state, job, rig.now).unwrap().waiting_for
+    };
+    // While it rests nobody waits for it.
+    assert_eq!(waiting(&mut rig), "");
+    rig.live(60 * SECOND);
+    let says = "host 1 (process 1) does not answer what it holds";
+    assert!(waiting(&mut rig).contains(says), "{}", waiting(&mut rig));
 }
 
 #[test]
