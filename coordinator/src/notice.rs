@@ -122,7 +122,8 @@ impl Notice {
             ),
             Self::WorkerDetached { worker, name, batches, why } => {
                 let (host, process, reason) = (name.host(), name.process(), why.to_string());
-                if why.is_orderly() {
+                // One that held nothing is no loss, however it went.
+                if why.is_orderly() || *batches == 0 {
                     tracing::info!(%worker, host, process, reason, "worker disconnected");
                 } else {
                     tracing::warn!(%worker, host, process, batches, reason,
