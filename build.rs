@@ -5,8 +5,8 @@ use std::env;
 use std::path::Path;
 use std::process::Command;
 
-/// What the program is built from. A change of any of it runs this script again, so that a modified
-/// tree is seen; it builds this package again in any case.
+/// Files and directories of the program's source. A change in any of them runs this script again, so
+/// that it notices a modified tree.
 const SOURCES: [&str; 20] = [
     ".cargo",
     "Cargo.lock",
@@ -80,7 +80,8 @@ fn watch() {
     }
 }
 
-/// What git prints, without the end of its line; `None` if it cannot.
+/// The output of git for these arguments, without its last line end; `None` if git fails or is not
+/// installed.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok().filter(|_| output.status.success())?;

@@ -8,7 +8,6 @@ use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
 use crate::state::{EndedJob, Job, LostInARow, Stage, State};
-use crate::worker_name::WorkerName;
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -188,13 +187,10 @@ fn unfit(state: &State) -> String {
     let named = |(host, lost): (&String, &LostInARow)| {
         format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
     };
-    // Of those that are here and hold something: nobody waits for the others.
-    let holds = |name: &&WorkerName| {
-        let there = state.workers.values().find(|worker| worker.name == **name);
-        there.is_some_and(|worker| !worker.in_flight.is_empty())
-    };
-    let silent = state.probation.silent().filter(holds);
-    let silent = silent.map(|name: &WorkerName| format!("{name} does not answer what it holds"));
+    // A worker that holds nothing, or is gone, is not waited for.
+    let holding = state.workers.values().filter(|worker| !worker.in_flight.is_empty());
+    let silent = holding.filter(|worker| state.probation.is_silent(&worker.name));
+    let silent = silent.map(|worker| format!("{} does not answer what it holds", worker.name));
     let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")
 }

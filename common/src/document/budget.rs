@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::limits::{DOCUMENT_KEYS_MAX, DOCUMENT_VALUES_MAX, TOML_TOKENS_MAX};
 
-/// What there is too much of.
+/// The bound that a document exceeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Excess {
     /// Brackets that are open.
@@ -38,7 +38,7 @@ impl fmt::Display for Excess {
     }
 }
 
-/// What of it is left.
+/// The values, keys, tables and lists that a document may still have.
 #[derive(Debug)]
 pub(super) struct Budget {
     values: usize,
@@ -60,7 +60,7 @@ impl Budget {
         Ok(())
     }
 
-    /// So many more keys, tables or lists.
+    /// Takes `count` keys, tables or lists off the budget.
     ///
     /// # Errors
     /// When they are too many.

@@ -27,7 +27,7 @@ pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
     })
 }
 
-/// What makes a node.
+/// Builds the tree of a JSON text within a budget.
 struct Tree<'b> {
     budget: &'b mut Budget,
 }
