@@ -8,6 +8,7 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use osteon_common::case::Case;
+use osteon_common::document::Format;
 use osteon_common::{case_file, visible};
 
 use crate::ending::Failure;
@@ -17,6 +18,8 @@ use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 
 /// The file of the traces.
 pub(crate) const TRACES: &str = "traces.csv";
+/// Start of the first line of `case.toml`, which goes on with the options of the traces.
+const COMMAND: &str = "# osteon simulate case.toml";
 
 /// What a directory of a simulation belongs to.
 pub(crate) struct Simulated<'a> {
@@ -33,10 +36,26 @@ impl Simulated<'_> {
     /// files of it.
     fn text(&self) -> String {
         let Self { case, duration, time_step } = self;
-        let command = format!(
-            "# osteon simulate case.toml --duration {duration:?} --time-step {time_step:?}\n"
-        );
+        let command = format!("{COMMAND} --duration {duration:?} --time-step {time_step:?}\n");
         command + &case_file::to_toml(case)
+    }
+
+    /// The first difference from the simulation that `stored`, the text of a `case.toml`,
+    /// describes. The case is compared by its meaning: defaults may be left out there, and keys
+    /// may be in another order.
+    fn difference_from(&self, stored: &str) -> Option<String> {
+        let Some([duration, time_step]) = traces_of(stored) else {
+            return Some(format!("its first line is not `{COMMAND} --duration S --time-step S`"));
+        };
+        let traces =
+            [("duration", duration, self.duration), ("time step", time_step, self.time_step)];
+        if let Some((name, there, here)) = traces.into_iter().find(|(_, there, here)| there != here)
+        {
+            return Some(format!("{name} {there:?} s there, {here:?} s here"));
+        }
+        let complete = case_file::parse(stored, Format::Toml)
+            .map_or_else(|_| stored.to_owned(), |case| case_file::to_toml(&case));
+        difference(&complete, &case_file::to_toml(self.case))
     }
 
     /// Refuses a directory that belongs to something else.
@@ -49,7 +68,7 @@ impl Simulated<'_> {
         let shown = visible::path(directory);
         let stored = given(&directory.join(CASE))?;
         let why = match stored {
-            Some(stored) => match difference(&stored, &self.text()) {
+            Some(stored) => match self.difference_from(&stored) {
                 None => return Ok(()),
                 Some(difference) => format!("{shown} belongs to a different case ({difference})"),
             },
@@ -89,5 +108,46 @@ impl Simulated<'_> {
             files.finish(result, &origin)
         };
         write().map_err(Failure::Failed)
+    }
+}
+
+/// Duration and time step, s, of the traces beside the `case.toml` with the text `stored`.
+fn traces_of(stored: &str) -> Option<[f64; 2]> {
+    let options = stored.lines().next()?.strip_prefix(COMMAND)?;
+    let (duration, time_step) =
+        options.strip_prefix(" --duration ")?.split_once(" --time-step ")?;
+    Some([duration.parse().ok()?, time_step.parse().ok()?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CASE_TEXT: &str = include_str!("../examples/cases/A.toml");
+
+    #[test]
+    fn the_same_simulation_is_known_in_other_words() {
+        let case = case_file::parse(CASE_TEXT, Format::Toml).unwrap();
+        let mine = Simulated { case: &case, duration: 3e-5, time_step: 1e-8 };
+        let shorter = format!("{COMMAND} --duration 3e-5 --time-step 0.00000001\n{CASE_TEXT}");
+        for stored in [mine.text(), shorter] {
+            assert_eq!(mine.difference_from(&stored), None, "{stored}");
+        }
+    }
+
+    #[test]
+    fn another_simulation_is_told_by_what_differs() {
+        let case = case_file::parse(CASE_TEXT, Format::Toml).unwrap();
+        let mine = Simulated { case: &case, duration: 3e-5, time_step: 1e-8 };
+        let text = mine.text();
+        for (stored, expected) in [
+            (text.replace("3e-5", "4e-5"), "duration 4e-5 s there, 3e-5 s here"),
+            (text.replace("1e-8", "2e-8"), "time step 2e-8 s there, 1e-8 s here"),
+            (case_file::to_toml(&case), "its first line is not"),
+            (format!("{text}\nthickness = 1"), "line "),
+        ] {
+            let difference = mine.difference_from(&stored).unwrap();
+            assert!(difference.starts_with(expected), "{difference}");
+        }
     }
 }

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use osteon_common::job::{Data, JobSpecification};
-use osteon_common::job_file;
+use osteon_common::job::Data;
+use osteon_common::job_file::Noted;
+use osteon_common::visible;
 
 use crate::progress::say;
 
@@ -11,17 +12,14 @@ use crate::progress::say;
 const TOLD_MAX: usize = 10;
 
 /// Says on stderr which groups of the job in the file `job` are not searched, and why.
-pub(crate) fn warn(job: &Path, specification: &JobSpecification) {
-    let groups = specification.data.as_ref().map_or(&[][..], Data::groups);
+pub(crate) fn warn(job: &Path, noted: &Noted) {
+    let groups = noted.specification.data.as_ref().map_or(&[][..], Data::groups);
     let unsearched: Vec<_> =
         groups.iter().filter_map(|group| Some((group, group.no_variation()?))).collect();
     if unsearched.is_empty() {
         return;
     }
-    // The velocities were read from it a moment ago.
-    let file = job_file::velocities_file(job).ok().flatten();
-    let file = file.unwrap_or_else(|| job.to_owned());
-    let file = file.display();
+    let file = visible::path(noted.velocities_file.as_deref().unwrap_or(job));
     for (group, why) in unsearched.iter().take(TOLD_MAX) {
         let (name, count) = (&group.name, group.velocities.len());
         let velocities = if count == 1 { "velocity" } else { "velocities" };

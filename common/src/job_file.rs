@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use crate::check;
-use crate::document::{self, Format, Node, Value};
+use crate::document::{self, Format};
 use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::job::{JobKind, JobSpecification, Range};
 use crate::limits;
@@ -32,43 +32,29 @@ const BOUND: Bound = Bound {
 /// # Errors
 /// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
 pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
-    read_with_warnings(path, kind).map(|(specification, _)| specification)
+    read_noting(path, kind).map(|noted| noted.specification)
 }
 
-/// The same, with what is unusual about the job.
+/// A job, with what the user may be told of the file that it was read from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noted {
+    /// The job.
+    pub specification: JobSpecification,
+    /// What is allowed and unusual about it.
+    pub warnings: Vec<Warning>,
+    /// The file that its measured velocities were read from, if they stand in one of their own.
+    pub velocities_file: Option<PathBuf>,
+}
+
+/// Reads a job file as [`read`] does, and notes what the user may be told of it.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_with_warnings(
-    path: &Path,
-    kind: JobKind,
-) -> Result<(JobSpecification, Vec<Warning>), FileError> {
+pub fn read_noting(path: &Path, kind: JobKind) -> Result<Noted, FileError> {
     let (text, format) = file_error::read(path, BOUND)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    parse_with_warnings(&text, format, directory, kind)
+    parse_noting(&text, format, directory, kind)
         .map_err(|content| FileError::Content { path: path.to_owned(), content })
-}
-
-/// The file of measured velocities that the job file at `path` names, if it names one.
-///
-/// # Errors
-/// When the file cannot be read, or is malformed.
-pub fn velocities_file(path: &Path) -> Result<Option<PathBuf>, FileError> {
-    let (text, format) = file_error::read(path, BOUND)?;
-    let root = document::parse(file_error::without_byte_order_mark(&text), format).map_err(
-        |malformed| FileError::Content { path: path.to_owned(), content: malformed.into() },
-    )?;
-    let entry = |node: &Node, key: &str| match &node.value {
-        Value::Table(entries) => {
-            entries.iter().find(|(name, _)| name == key).map(|(_, node)| node.clone())
-        }
-        _ => None,
-    };
-    let named = entry(&root, "data").and_then(|data| entry(&data, "velocities"));
-    Ok(match named.map(|node| node.value) {
-        Some(Value::Text(name)) => Some(path.parent().unwrap_or(Path::new("")).join(name)),
-        _ => None,
-    })
 }
 
 /// Reads and validates the text of a job file that lies in `directory`; as [`read`].
@@ -81,15 +67,15 @@ pub fn parse(
     directory: &Path,
     kind: JobKind,
 ) -> Result<JobSpecification, ContentError> {
-    parse_with_warnings(text, format, directory, kind).map(|(specification, _)| specification)
+    parse_noting(text, format, directory, kind).map(|noted| noted.specification)
 }
 
-fn parse_with_warnings(
+fn parse_noting(
     text: &str,
     format: Format,
     directory: &Path,
     kind: JobKind,
-) -> Result<(JobSpecification, Vec<Warning>), ContentError> {
+) -> Result<Noted, ContentError> {
     let root = document::parse(file_error::without_byte_order_mark(text), format)?;
     let mut reader = Reader::default();
     let keys = [
@@ -123,7 +109,8 @@ fn parse_with_warnings(
         return Err(reader.refuse(&root).into());
     }
     let warnings = plausible::job_warnings_from(&specification, origin.as_ref());
-    Ok((specification, warnings))
+    let velocities_file = origin.map(|origin| origin.path().to_owned());
+    Ok(Noted { specification, warnings, velocities_file })
 }
 
 /// The seven ranges; where one is missing or wrong, that is recorded and it has no meaning.

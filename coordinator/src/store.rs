@@ -272,7 +272,7 @@ pub enum StoreError {
     /// A version of osteon with another format wrote it.
     #[error(
         "{}: this store has format {found}; this version writes {known}: run the version that wrote \
-         it, or take a new directory",
+         it, or choose another directory",
         path.display()
     )]
     Format {

@@ -41,12 +41,11 @@ pub(super) async fn submit(
     format: Format,
 ) -> Result<Ending, Failure> {
     let Submission { job, kind, request, options } = submission;
-    let (specification, warnings) =
-        job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
-    unsearched_groups::warn(job, &specification);
-    warnings::say_of_job(&specification, &warnings).await;
+    let noted = job_file::read_noting(job, kind).map_err(Failure::bad_input)?;
+    unsearched_groups::warn(job, &noted);
+    warnings::say_of_job(&noted.specification, &noted.warnings).await;
     let mut client = Client::connect(coordinator).await?;
-    let id = client.submit(&specification, request, options).await?;
+    let id = client.submit(&noted.specification, request, options).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }

@@ -24,19 +24,19 @@ use crate::{unsearched_groups, verdict, warnings};
 
 /// Runs the job, or shows what an earlier run left.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
-    let (specification, warnings) =
-        job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
-    if let Some(json) = finished(&run, &specification)? {
-        return show(&run, &specification, &json);
+    let noted = job_file::read_noting(&run.job, run.kind).map_err(Failure::bad_input)?;
+    let specification = &noted.specification;
+    if let Some(json) = finished(&run, specification)? {
+        return show(&run, specification, &json);
     }
-    if let Some(reason) = failed_before(&run, &specification)? {
+    if let Some(reason) = failed_before(&run, specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
     if let Place::There(remote) = &run.place {
         remote.tell();
     }
-    unsearched_groups::warn(&run.job, &specification);
-    warnings::say_of_job(&specification, &warnings).await;
+    unsearched_groups::warn(&run.job, &noted);
+    warnings::say_of_job(specification, &noted.warnings).await;
     let mut interruption = pin!(signals::interruption()?);
     // An address that does not answer leaves no directory behind.
     let computers = tokio::select! {
@@ -48,21 +48,21 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
     // Another run may have ended between the look and the lock.
-    if let Some(json) = finished(&run, &specification)? {
-        return show(&run, &specification, &json);
+    if let Some(json) = finished(&run, specification)? {
+        return show(&run, specification, &json);
     }
     let fetched = match computers {
         Computers::Here { workers, threads } => {
-            let job = Named { specification: &specification, name: &run.name };
+            let job = Named { specification, name: &run.name };
             here(workers, threads, job, directory.as_ref(), interruption).await?
         }
         Computers::There(client) => {
-            let job = Named { specification: &specification, name: &run.name };
+            let job = Named { specification, name: &run.name };
             there(*client, job, directory.as_ref(), interruption).await?
         }
     };
     let json = keep(run.kind, &fetched, directory.as_ref())?;
-    show(&run, &specification, &json)
+    show(&run, specification, &json)
 }
 
 /// A job, and what people call it.
