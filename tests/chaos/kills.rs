@@ -170,10 +170,12 @@ impl<'a> Storm<'a> {
         }
     }
 
+    /// Waits until the coordinator knows these very processes: right after a kill it may still count
+    /// the worker that is gone in place of the one that is not there yet.
     fn until_attached(&mut self) {
         eventually("all workers are attached", || {
-            let jobs = self.api.jobs();
-            jobs.is_some_and(|jobs| jobs.iter().all(|job| job.workers as usize == WORKERS))
+            let attached = self.api.attached_processes().unwrap_or_default();
+            self.workers.iter().all(|worker| attached.contains(&worker.id()))
         });
     }
 

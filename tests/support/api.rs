@@ -11,7 +11,7 @@ use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
     FetchRequest, GetRequest, JobResult, JobSnapshot, JobSpecification, JobState, ListRequest,
-    SubmitRequest,
+    ListWorkersRequest, SubmitRequest,
 };
 use tokio::runtime::Runtime;
 use tonic::transport::Channel;
@@ -65,6 +65,14 @@ impl Api {
     pub(crate) fn jobs(&mut self) -> Option<Vec<JobSnapshot>> {
         let listed = self.call(async |client| client.list(ListRequest::default()).await);
         listed.ok().map(|listed| listed.into_inner().jobs)
+    }
+
+    /// Process ids of the attached workers; `None` when nobody answers.
+    pub(crate) fn attached_processes(&mut self) -> Option<Vec<u32>> {
+        let request = ListWorkersRequest::default();
+        let listed = self.call(async |client| client.list_workers(request).await);
+        let workers = listed.ok()?.into_inner().workers;
+        Some(workers.into_iter().map(|worker| worker.process).collect())
     }
 
     /// Submits a job.
