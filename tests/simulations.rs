@@ -54,8 +54,16 @@ fn a_directory_belongs_to_one_case() {
     for (case, options, expected) in [
         (&case("A.toml"), SHORT, "there, `"),
         (&other, SHORT, "`threshold = 0.05  # of the packet's peak` there, `threshold = 0.0625"),
-        (&case("D.toml"), ["--duration", "4e-6", "--time-step", "1e-7"], "--duration 4e-6"),
-        (&case("D.toml"), ["--duration", "2e-6", "--time-step", "2e-7"], "--time-step 2e-7"),
+        (
+            &case("D.toml"),
+            ["--duration", "4e-6", "--time-step", "1e-7"],
+            "duration 2e-6 s there, 4e-6 s here",
+        ),
+        (
+            &case("D.toml"),
+            ["--duration", "2e-6", "--time-step", "2e-7"],
+            "time step 1e-7 s there, 2e-7 s here",
+        ),
     ] {
         let again = simulate(case, &out, &options);
         refused(&again, &[&to_another[..], &[expected]].concat());
