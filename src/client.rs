@@ -18,7 +18,7 @@ use thiserror::Error;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::Code;
 
-use crate::environment::COORDINATOR;
+use crate::environment::{COORDINATOR, Unused};
 use crate::progress::say;
 use crate::request::Request;
 
@@ -94,6 +94,14 @@ pub(crate) enum ClientError {
         /// The request.
         request_id: String,
     },
+    /// There is no trust, and it may be for want of what the environment holds for another coordinator.
+    #[error("{cause}; {unused}")]
+    Untrusted {
+        /// What became of it.
+        cause: Box<ClientError>,
+        /// Variables that were not used.
+        unused: Unused,
+    },
     /// It sent what cannot be read.
     #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
@@ -109,10 +117,25 @@ impl ClientError {
     pub(crate) fn is_bad_input(&self) -> bool {
         match self {
             Self::Violations(_) | Self::Credentials(_) => true,
+            Self::Untrusted { cause, .. } => cause.is_bad_input(),
             Self::Refused { code, .. } => {
                 matches!(code, Code::NotFound | Code::InvalidArgument | Code::AlreadyExists)
             }
             _ => false,
+        }
+    }
+
+    /// With what was not used, where that may be the reason.
+    fn without(self, unused: &Unused) -> Self {
+        let of_trust = matches!(
+            self,
+            Self::Credentials(CredentialsError::NoAuthority { .. })
+                | Self::Connect(ConnectError::Tls { .. })
+                | Self::Refused { code: Code::Unauthenticated, .. }
+        );
+        match of_trust && !unused.is_empty() {
+            true => Self::Untrusted { cause: Box::new(self), unused: unused.clone() },
+            false => self,
         }
     }
 }
@@ -145,6 +168,8 @@ pub(crate) struct Remote {
     pub(crate) files: CredentialFiles,
     /// Whether the environment names it, and not the command line.
     pub(crate) from_environment: bool,
+    /// Variables of the environment that were not used for it.
+    pub(crate) unused: Unused,
 }
 
 impl Remote {
@@ -176,23 +201,27 @@ impl Client {
     /// Reads the credentials and connects to the coordinator; one that is not there may be about to
     /// come.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
-        let Remote { endpoint, files, .. } = remote;
-        let credentials = Credentials::load(files, endpoint)?;
-        let left = ANSWER_S_MAX - SILENCE_S_MAX;
-        let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
-        unless_silent(Self::find(endpoint, &credentials), notice).await
+        let Remote { endpoint, files, unused, .. } = remote;
+        let found = async {
+            let credentials = Credentials::load(files, endpoint)?;
+            let left = ANSWER_S_MAX - SILENCE_S_MAX;
+            let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
+            unless_silent(Self::find(endpoint, &credentials), notice).await
+        };
+        let jobs = found.await.map_err(|error: ClientError| error.without(unused))?;
+        Ok(Self { peer: Peer::new(remote), jobs })
     }
 
     /// The connection, as soon as there is one.
-    async fn find(endpoint: &Endpoint, credentials: &Credentials) -> Result<Self, ClientError> {
+    async fn find(
+        endpoint: &Endpoint,
+        credentials: &Credentials,
+    ) -> Result<JobsClient<Connection>, ClientError> {
         let begun = Instant::now();
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
             let error = match endpoint::connect_with(endpoint, credentials, left).await {
-                Ok(connection) => {
-                    let jobs = endpoint::jobs_client(connection);
-                    return Ok(Self { peer: Peer::new(endpoint.clone()), jobs });
-                }
+                Ok(connection) => return Ok(endpoint::jobs_client(connection)),
                 Err(error) => error,
             };
             let pause = Duration::from_millis(RETRY_MS);

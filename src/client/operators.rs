@@ -60,14 +60,17 @@ impl Client {
 /// Asks a coordinator once whether it serves, for no longer than `limit`. It needs no token, and
 /// none is sent.
 pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
-    let Remote { endpoint, files, .. } = remote;
+    let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
-    let credentials = Credentials::load(&files, endpoint)?;
     let begun = Instant::now();
-    let connection = endpoint::connect_with(endpoint, &credentials, limit).await?;
+    let connected = async {
+        let credentials = Credentials::load(&files, endpoint)?;
+        Ok(endpoint::connect_with(endpoint, &credentials, limit).await?)
+    };
+    let connection = connected.await.map_err(|error: ClientError| error.without(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
     let left = limit.saturating_sub(begun.elapsed());
-    let answer = Peer::new(endpoint.clone()).answered_within(left, call).await?;
+    let answer = Peer::new(remote).answered_within(left, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

@@ -10,9 +10,10 @@ use osteon_proto::tls_failure::TlsFailure;
 use tokio::time::timeout;
 use tonic::{Code, Response, Status};
 
+use crate::environment::Unused;
 use crate::progress::say;
 
-use super::{ClientError, SILENCE_S_MAX, answer_limit};
+use super::{ClientError, Remote, SILENCE_S_MAX, answer_limit};
 
 /// A coordinator that a client speaks to.
 #[derive(Debug, Clone)]
@@ -21,12 +22,15 @@ pub(super) struct Peer {
     pub(super) endpoint: Endpoint,
     /// Whether it has ever answered: then it speaks what the client speaks.
     ever_answered: bool,
+    /// Variables of the environment that were not used for it.
+    unused: Unused,
 }
 
 impl Peer {
-    /// The coordinator at `endpoint`, of which nothing was heard yet.
-    pub(super) fn new(endpoint: Endpoint) -> Self {
-        Self { endpoint, ever_answered: false }
+    /// The coordinator at `remote`, of which nothing was heard yet.
+    pub(super) fn new(remote: &Remote) -> Self {
+        let Remote { endpoint, unused, .. } = remote.clone();
+        Self { endpoint, ever_answered: false, unused }
     }
 
     /// The answer to `call`, within the time that a client waits.
@@ -57,11 +61,12 @@ impl Peer {
             Err(_) => self.silent(),
         };
         // A refusal is an answer, too.
-        let lost = matches!(
+        self.ever_answered |= matches!(
             error,
-            ClientError::Lost { .. } | ClientError::Unanswered { .. } | ClientError::Connect(_)
+            ClientError::Violations(_)
+                | ClientError::Unavailable { .. }
+                | ClientError::Refused { .. }
         );
-        self.ever_answered |= !lost;
         Err(error)
     }
 
@@ -88,7 +93,8 @@ impl Peer {
         }
         let endpoint = self.endpoint.clone();
         if let Some(failure) = TlsFailure::of(status) {
-            return ConnectError::Tls { endpoint, failure }.into();
+            let error = ClientError::from(ConnectError::Tls { endpoint, failure });
+            return error.without(&self.unused);
         }
         let reason = status.message().to_owned();
         // What the coordinator itself answers has no source: that is an error of the transport.
@@ -100,7 +106,10 @@ impl Peer {
             }
             // tonic reports a broken HTTP/2 connection so.
             Code::Internal if !answered => ClientError::Lost { endpoint, reason },
-            code => ClientError::Refused { endpoint, code, reason, hint: hint(status) },
+            code => {
+                let refused = ClientError::Refused { endpoint, code, reason, hint: hint(status) };
+                refused.without(&self.unused)
+            }
         }
     }
 }

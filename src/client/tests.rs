@@ -15,8 +15,8 @@ use super::*;
 
 #[test]
 fn an_answer_is_told_from_a_loss() {
-    let endpoint: Endpoint = "unix:a".parse().unwrap();
-    let shown = |status: &Status| Peer::new(endpoint.clone()).refused(status).to_string();
+    let peer = Peer::new(&at("unix:a".parse().unwrap()));
+    let shown = |status: &Status| peer.refused(status).to_string();
     let answered = Status::unavailable("the store is full");
     assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
     for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
@@ -32,7 +32,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
     let directory = tempfile::tempdir().unwrap();
     let socket = directory.path().join("socket");
     let endpoint = Endpoint::Unix(socket.clone());
-    let remote = Remote { endpoint, files: CredentialFiles::default(), from_environment: false };
+    let remote = at(endpoint);
     let begun = Instant::now();
     let error = Client::connect(&remote).await.unwrap_err().to_string();
     assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
@@ -48,8 +48,12 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
 }
 
 fn remote(socket: &Path) -> Remote {
-    let endpoint = Endpoint::Unix(socket.to_owned());
-    Remote { endpoint, files: CredentialFiles::default(), from_environment: false }
+    at(Endpoint::Unix(socket.to_owned()))
+}
+
+fn at(endpoint: Endpoint) -> Remote {
+    let (files, unused) = (CredentialFiles::default(), Unused::default());
+    Remote { endpoint, files, from_environment: false, unused }
 }
 
 fn example() -> JobSpecification {
@@ -155,8 +159,7 @@ async fn tls_is_thought_of_only_where_no_answer_ever_came() {
             }
         }
     });
-    let files = CredentialFiles::default();
-    let remote = Remote { endpoint, files, from_environment: false };
+    let remote = at(endpoint);
     let mut before = Client::connect(&remote).await.unwrap();
     before.list().await.unwrap();
     broken.notify_one();

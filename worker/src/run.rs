@@ -281,7 +281,8 @@ impl Worker {
             | Code::PermissionDenied
             | Code::Unauthenticated
             | Code::Unimplemented => {
-                Err(WorkerError::Refused { endpoint: self.endpoint.clone(), reason })
+                let (endpoint, code) = (self.endpoint.clone(), status.code());
+                Err(WorkerError::Refused { endpoint, code, reason })
             }
             code => Ok(End::Lost(format!("{code}: {reason}"))),
         }
