@@ -2,6 +2,7 @@
 
 pub(crate) mod operators;
 
+use std::panic::resume_unwind;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
@@ -15,6 +16,7 @@ use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
 use thiserror::Error;
+use tokio::task::spawn_blocking;
 use tokio::time::{Instant, sleep, timeout};
 use tonic::Code;
 
@@ -203,7 +205,7 @@ impl Client {
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
         let Remote { endpoint, files, unused, .. } = remote;
         let found = async {
-            let credentials = Credentials::load(files, endpoint)?;
+            let credentials = loaded(files, endpoint).await?;
             let left = ANSWER_S_MAX - SILENCE_S_MAX;
             let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
             unless_silent(Self::find(endpoint, &credentials), notice).await
@@ -408,6 +410,16 @@ impl Client {
 /// How a job ended; `None` while it has not.
 pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     JOB_STATUS.value(snapshot.status)
+}
+
+/// Reads the files. A pipe among them may take a while, in which signals are looked at.
+async fn loaded(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Credentials, ClientError> {
+    let (files, endpoint) = (files.clone(), endpoint.clone());
+    match spawn_blocking(move || Credentials::load(&files, &endpoint)).await {
+        Ok(loaded) => Ok(loaded?),
+        // It is never aborted, so it has panicked.
+        Err(error) => resume_unwind(error.into_panic()),
+    }
 }
 
 fn answer_limit() -> Duration {

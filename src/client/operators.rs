@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_proto::credentials::{CredentialFiles, Credentials};
+use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::v1::backup_response::Part;
@@ -13,7 +13,7 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
 use super::peer::Peer;
-use super::{Client, ClientError, Remote, answer_limit};
+use super::{Client, ClientError, Remote, answer_limit, loaded};
 
 impl Client {
     /// The attached workers, and those that went last.
@@ -64,7 +64,7 @@ pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, Cli
     let files = CredentialFiles { token: None, ..files.clone() };
     let begun = Instant::now();
     let connected = async {
-        let credentials = Credentials::load(&files, endpoint)?;
+        let credentials = loaded(&files, endpoint).await?;
         Ok(endpoint::connect_with(endpoint, &credentials, limit).await?)
     };
     let connection = connected.await.map_err(|error: ClientError| error.without(unused))?;
