@@ -2,7 +2,7 @@
 
 pub(crate) mod operators;
 
-use std::pin::pin;
+use std::panic::resume_unwind;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
@@ -12,21 +12,23 @@ use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
-use osteon_proto::tls_failure::TlsFailure;
+use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
-use osteon_proto::{specification, status};
 use thiserror::Error;
+use tokio::task::spawn_blocking;
 use tokio::time::{Instant, sleep, timeout};
-use tonic::{Code, Response, Status};
+use tonic::Code;
 
-use crate::environment::COORDINATOR;
+use crate::environment::{COORDINATOR, Unused};
 use crate::progress::say;
 use crate::request::Request;
 
 use self::parts::Parts;
+use self::peer::{Peer, unless_silent};
 
 mod parts;
+mod peer;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
@@ -94,6 +96,14 @@ pub(crate) enum ClientError {
         /// The request.
         request_id: String,
     },
+    /// There is no trust, and it may be for want of what the environment holds for another coordinator.
+    #[error("{cause}; {unused}")]
+    Untrusted {
+        /// What became of it.
+        cause: Box<ClientError>,
+        /// Variables that were not used.
+        unused: Unused,
+    },
     /// It sent what cannot be read.
     #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
@@ -109,21 +119,26 @@ impl ClientError {
     pub(crate) fn is_bad_input(&self) -> bool {
         match self {
             Self::Violations(_) | Self::Credentials(_) => true,
+            Self::Untrusted { cause, .. } => cause.is_bad_input(),
             Self::Refused { code, .. } => {
                 matches!(code, Code::NotFound | Code::InvalidArgument | Code::AlreadyExists)
             }
             _ => false,
         }
     }
-}
 
-/// What a user of the command line can do about a refusal, where the coordinator, whose clients are
-/// programs, does not say it.
-fn hint(status: &Status) -> &'static str {
-    match status::missing(status).as_deref() {
-        Some("job") => "; `osteon jobs` lists all jobs",
-        Some("worker") => "; `osteon workers` lists all that are attached",
-        _ => "",
+    /// With what was not used, where that may be the reason.
+    fn without(self, unused: &Unused) -> Self {
+        let of_trust = matches!(
+            self,
+            Self::Credentials(CredentialsError::NoAuthority { .. })
+                | Self::Connect(ConnectError::Tls { .. })
+                | Self::Refused { code: Code::Unauthenticated, .. }
+        );
+        match of_trust && !unused.is_empty() {
+            true => Self::Untrusted { cause: Box::new(self), unused: unused.clone() },
+            false => self,
+        }
     }
 }
 
@@ -155,6 +170,8 @@ pub(crate) struct Remote {
     pub(crate) files: CredentialFiles,
     /// Whether the environment names it, and not the command line.
     pub(crate) from_environment: bool,
+    /// Variables of the environment that were not used for it.
+    pub(crate) unused: Unused,
 }
 
 impl Remote {
@@ -178,7 +195,7 @@ pub(crate) struct SubmitOptions {
 /// A connection to a coordinator.
 #[derive(Debug, Clone)]
 pub(crate) struct Client {
-    endpoint: Endpoint,
+    peer: Peer,
     jobs: JobsClient<Connection>,
 }
 
@@ -186,23 +203,27 @@ impl Client {
     /// Reads the credentials and connects to the coordinator; one that is not there may be about to
     /// come.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
-        let Remote { endpoint, files, .. } = remote;
-        let credentials = Credentials::load(files, endpoint)?;
-        let left = ANSWER_S_MAX - SILENCE_S_MAX;
-        let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
-        unless_silent(Self::find(endpoint, &credentials), notice).await
+        let Remote { endpoint, files, unused, .. } = remote;
+        let found = async {
+            let credentials = loaded(files, endpoint).await?;
+            let left = ANSWER_S_MAX - SILENCE_S_MAX;
+            let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
+            unless_silent(Self::find(endpoint, &credentials), notice).await
+        };
+        let jobs = found.await.map_err(|error: ClientError| error.without(unused))?;
+        Ok(Self { peer: Peer::new(remote), jobs })
     }
 
     /// The connection, as soon as there is one.
-    async fn find(endpoint: &Endpoint, credentials: &Credentials) -> Result<Self, ClientError> {
+    async fn find(
+        endpoint: &Endpoint,
+        credentials: &Credentials,
+    ) -> Result<JobsClient<Connection>, ClientError> {
         let begun = Instant::now();
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
             let error = match endpoint::connect_with(endpoint, credentials, left).await {
-                Ok(connection) => {
-                    let jobs = endpoint::jobs_client(connection);
-                    return Ok(Self { endpoint: endpoint.clone(), jobs });
-                }
+                Ok(connection) => return Ok(endpoint::jobs_client(connection)),
                 Err(error) => error,
             };
             let pause = Duration::from_millis(RETRY_MS);
@@ -233,7 +254,7 @@ impl Client {
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
             let call = self.jobs.submit(message.clone());
-            let error = match answered_within(&self.endpoint, left, call).await {
+            let error = match self.peer.answered_within(left, call).await {
                 Ok(response) => return Ok(response.job),
                 Err(error) => error,
             };
@@ -257,7 +278,7 @@ impl Client {
         let mut page_token = String::new();
         for _ in 0..PAGES_MAX {
             let call = self.jobs.list(v1::ListRequest { page_size: 0, page_token });
-            let page = answered(&self.endpoint, call).await?;
+            let page = self.peer.answered(call).await?;
             jobs.extend(page.jobs);
             page_token = page.next_page_token;
             if page_token.is_empty() {
@@ -270,7 +291,7 @@ impl Client {
     /// The workers that were found to compute wrongly.
     pub(crate) async fn expelled(&mut self) -> Result<Vec<v1::ExpelledWorker>, ClientError> {
         let call = self.jobs.list_expelled(v1::ListExpelledRequest {});
-        Ok(answered(&self.endpoint, call).await?.workers)
+        Ok(self.peer.answered(call).await?.workers)
     }
 
     /// Forgets ended jobs; those that are forgotten.
@@ -281,13 +302,13 @@ impl Client {
     ) -> Result<Vec<String>, ClientError> {
         let keep_for_s = older_than.map(|age| age.as_secs_f64());
         let call = self.jobs.prune(v1::PruneRequest { keep_for_s, keep_last });
-        Ok(answered(&self.endpoint, call).await?.jobs)
+        Ok(self.peer.answered(call).await?.jobs)
     }
 
     /// Cancels a job; how it is then.
     pub(crate) async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });
-        let snapshot = answered(&self.endpoint, call).await?.snapshot;
+        let snapshot = self.peer.answered(call).await?.snapshot;
         self.present(snapshot, "snapshot")
     }
 
@@ -330,7 +351,7 @@ impl Client {
         lost_since: &mut Option<Instant>,
     ) -> Result<Result<JobSnapshot, ClientError>, E> {
         let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
-        let mut stream = match answered(&self.endpoint, call).await {
+        let mut stream = match self.peer.answered(call).await {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),
         };
@@ -343,10 +364,10 @@ impl Client {
                 },
                 Ok(None) => {
                     let reason = "the stream of snapshots ended before the job".to_owned();
-                    let endpoint = self.endpoint.clone();
+                    let endpoint = self.peer.endpoint.clone();
                     return Ok(Err(ClientError::Lost { endpoint, reason }));
                 }
-                Err(status) => return Ok(Err(refused(&self.endpoint, &status))),
+                Err(status) => return Ok(Err(self.peer.refused(&status))),
             };
             *lost_since = None;
             show(&snapshot)?;
@@ -359,11 +380,11 @@ impl Client {
     /// Everything that an ended job left.
     pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
         let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
-        let mut stream = answered(&self.endpoint, call).await?;
+        let mut stream = self.peer.answered(call).await?;
         let mut parts = Parts::default();
         loop {
             let Ok(message) = timeout(answer_limit(), stream.message()).await else {
-                return Err(ClientError::Unanswered { endpoint: self.endpoint.clone() });
+                return Err(self.peer.silent());
             };
             match message {
                 Ok(Some(message)) => {
@@ -371,7 +392,7 @@ impl Client {
                     parts.add(part).map_err(|source| self.malformed(source))?;
                 }
                 Ok(None) => break,
-                Err(status) => return Err(refused(&self.endpoint, &status)),
+                Err(status) => return Err(self.peer.refused(&status)),
             }
         }
         parts.whole().map_err(|source| self.malformed(source))
@@ -382,7 +403,7 @@ impl Client {
     }
 
     fn malformed(&self, source: Malformed) -> ClientError {
-        ClientError::Malformed { endpoint: self.endpoint.clone(), source }
+        ClientError::Malformed { endpoint: self.peer.endpoint.clone(), source }
     }
 }
 
@@ -391,75 +412,18 @@ pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     JOB_STATUS.value(snapshot.status)
 }
 
-/// What `call` gives; after a moment without it the user is told what is waited for.
-async fn unless_silent<T>(call: impl Future<Output = T>, notice: impl Fn() -> String) -> T {
-    let mut call = pin!(call);
-    match timeout(Duration::from_secs(SILENCE_S_MAX), call.as_mut()).await {
-        Ok(answer) => answer,
-        Err(_) => {
-            say(&notice());
-            call.await
-        }
+/// Reads the files. A pipe among them may take a while, in which signals are looked at.
+async fn loaded(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Credentials, ClientError> {
+    let (files, endpoint) = (files.clone(), endpoint.clone());
+    match spawn_blocking(move || Credentials::load(&files, &endpoint)).await {
+        Ok(loaded) => Ok(loaded?),
+        // It is never aborted, so it has panicked.
+        Err(error) => resume_unwind(error.into_panic()),
     }
 }
 
 fn answer_limit() -> Duration {
     Duration::from_secs(ANSWER_S_MAX)
-}
-
-async fn answered<T>(
-    endpoint: &Endpoint,
-    call: impl Future<Output = Result<Response<T>, Status>>,
-) -> Result<T, ClientError> {
-    answered_within(endpoint, answer_limit(), call).await
-}
-
-async fn answered_within<T>(
-    endpoint: &Endpoint,
-    limit: Duration,
-    call: impl Future<Output = Result<Response<T>, Status>>,
-) -> Result<T, ClientError> {
-    let notice = || {
-        let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
-        format!("no answer from {endpoint} yet; waiting for {left:.0} more seconds")
-    };
-    match unless_silent(timeout(limit, call), notice).await {
-        Ok(Ok(response)) => Ok(response.into_inner()),
-        Ok(Err(status)) => Err(unanswered(endpoint, &status)),
-        Err(_) => Err(ClientError::Unanswered { endpoint: endpoint.clone() }),
-    }
-}
-
-/// What the status says that a call ended with before its answer came.
-fn unanswered(endpoint: &Endpoint, status: &Status) -> ClientError {
-    match refused(endpoint, status) {
-        ClientError::Lost { endpoint, .. } => {
-            let reason = endpoint.explained(status);
-            ClientError::Lost { endpoint, reason }
-        }
-        error => error,
-    }
-}
-
-fn refused(endpoint: &Endpoint, status: &Status) -> ClientError {
-    if let Some(violations) = status::violations(status) {
-        return ClientError::Violations(violations);
-    }
-    if let Some(failure) = TlsFailure::of(status) {
-        return ConnectError::Tls { endpoint: endpoint.clone(), failure }.into();
-    }
-    let (endpoint, reason) = (endpoint.clone(), status.message().to_owned());
-    // What the coordinator itself answers has no source: that is an error of the transport.
-    let answered = std::error::Error::source(status).is_none();
-    match status.code() {
-        Code::Unavailable if answered => ClientError::Unavailable { endpoint, reason },
-        Code::Unavailable | Code::Unknown | Code::Cancelled | Code::DeadlineExceeded => {
-            ClientError::Lost { endpoint, reason }
-        }
-        // tonic reports a broken HTTP/2 connection so.
-        Code::Internal if !answered => ClientError::Lost { endpoint, reason },
-        code => ClientError::Refused { endpoint, code, reason, hint: hint(status) },
-    }
 }
 
 #[cfg(test)]

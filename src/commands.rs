@@ -34,7 +34,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
-        Resolved::Worker { config, files } => worker::serve(config, &files).await,
+        Resolved::Worker { config, files, unused } => worker::serve(config, &files, &unused).await,
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {

@@ -1,6 +1,9 @@
 //! Who gets in at a coordinator: options about certificates and tokens, checked against the
 //! address.
 
+use std::os::unix::fs::FileTypeExt as _;
+use std::path::{Path, PathBuf};
+
 use anyhow::anyhow;
 use osteon_coordinator::tls::TlsFiles;
 use osteon_coordinator::{BindError, ListenAddress, Listener, Tls, Tokens};
@@ -53,6 +56,14 @@ impl Door {
             ))
         })?;
         Ok(Self::Tls(tls, tokens))
+    }
+
+    /// The first of the files that is a pipe, if one is: it cannot be read again.
+    pub(crate) fn pipe(arguments: &CoordinatorArguments) -> Option<&Path> {
+        let CoordinatorArguments { tls_ca, tls_cert, tls_key, tokens, token_file, .. } = arguments;
+        let files = [tls_ca, tls_cert, tls_key, tokens, token_file].into_iter().flatten();
+        let is_pipe = |path: &Path| path.metadata().is_ok_and(|file| file.file_type().is_fifo());
+        files.map(PathBuf::as_path).find(|path| is_pipe(path))
     }
 
     /// Binds the address.

@@ -1,6 +1,7 @@
 //! What the environment says of a coordinator: options that every command would repeat.
 
 use std::ffi::OsString;
+use std::fmt;
 use std::path::PathBuf;
 
 use anyhow::anyhow;
@@ -84,21 +85,81 @@ impl Environment {
 
     /// The files for the coordinator at `endpoint`: those of the options, and those of the
     /// environment where there is no option and the address has a use for them. A certificate and
-    /// its key come from the same place.
-    pub(crate) fn files(&self, options: CredentialFiles, endpoint: &Endpoint) -> CredentialFiles {
+    /// its key come from the same place. Where the environment names another coordinator, its files
+    /// are that one's: they are not used, and a token of theirs is not shown to a stranger.
+    pub(crate) fn files(
+        &self,
+        options: CredentialFiles,
+        endpoint: &Endpoint,
+    ) -> (CredentialFiles, Unused) {
         let encrypted = matches!(endpoint, Endpoint::Https(_));
         let private = encrypted || endpoint.is_local();
         let own = options.certificate.is_some() || options.key.is_some();
-        let of_tls = |file: &Option<PathBuf>| file.clone().filter(|_| encrypted);
-        CredentialFiles {
-            ca: options.ca.or_else(|| of_tls(&self.files.ca)),
-            certificate: match own {
-                true => options.certificate,
-                false => of_tls(&self.files.certificate),
-            },
-            key: if own { options.key } else { of_tls(&self.files.key) },
-            token: options.token.or_else(|| self.files.token.clone().filter(|_| private)),
+        let found = |file: &Option<PathBuf>, wanted: bool| file.clone().filter(|_| wanted);
+        let wanted = CredentialFiles {
+            ca: found(&self.files.ca, encrypted && options.ca.is_none()),
+            certificate: found(&self.files.certificate, encrypted && !own),
+            key: found(&self.files.key, encrypted && !own),
+            token: found(&self.files.token, private && options.token.is_none()),
+        };
+        match &self.coordinator {
+            Some(other) if !is_at(other, endpoint) => (options, Unused::of(&wanted)),
+            _ => {
+                let files = CredentialFiles {
+                    ca: options.ca.or(wanted.ca),
+                    certificate: options.certificate.or(wanted.certificate),
+                    key: options.key.or(wanted.key),
+                    token: options.token.or(wanted.token),
+                };
+                (files, Unused::default())
+            }
         }
+    }
+}
+
+/// Whether the text is the address of the coordinator at `endpoint`. Names of hosts have no case.
+fn is_at(text: &str, endpoint: &Endpoint) -> bool {
+    match (text.parse(), endpoint) {
+        (Ok(Endpoint::Https(one)), Endpoint::Https(other))
+        | (Ok(Endpoint::Http(one)), Endpoint::Http(other)) => one.eq_ignore_ascii_case(other),
+        (Ok(named), _) => named == *endpoint,
+        (Err(_), _) => false,
+    }
+}
+
+/// Variables that were not used, because the environment names another coordinator than the command
+/// line; perhaps none.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Unused(Vec<(&'static str, &'static str)>);
+
+impl Unused {
+    fn of(files: &CredentialFiles) -> Self {
+        let all = [
+            (&files.ca, TLS_CA, "--tls-ca FILE"),
+            (&files.certificate, TLS_CERT, "--tls-cert FILE"),
+            (&files.key, TLS_KEY, "--tls-key FILE"),
+            (&files.token, TOKEN_FILE, "--token-file FILE"),
+        ];
+        let named = all.into_iter().filter(|(file, ..)| file.is_some());
+        Self(named.map(|(_, variable, option)| (variable, option)).collect())
+    }
+
+    /// Whether every variable that had a use was used.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl fmt::Display for Unused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (variables, options): (Vec<_>, Vec<_>) = self.0.iter().copied().unzip();
+        let were = if variables.len() == 1 { "was" } else { "were" };
+        let (variables, options) = (variables.join(", "), options.join(" "));
+        write!(
+            f,
+            "{variables} {were} not used, because this coordinator is not the one that {COORDINATOR} \
+             names; give {options}"
+        )
     }
 }
 
@@ -112,18 +173,20 @@ mod tests {
     }
 
     fn all() -> Environment {
-        environment(&[
-            (TLS_CA, "ca"),
-            (TLS_CERT, "cert"),
-            (TLS_KEY, "key"),
-            (TOKEN_FILE, "token"),
-            (COORDINATOR, "https://a:1"),
-        ])
+        of_coordinator(Some("https://a:1"))
+    }
+
+    /// Every file, and the coordinator that is named.
+    fn of_coordinator(named: Option<&str>) -> Environment {
+        let mut variables =
+            vec![(TLS_CA, "ca"), (TLS_CERT, "cert"), (TLS_KEY, "key"), (TOKEN_FILE, "token")];
+        variables.extend(named.map(|url| (COORDINATOR, url)));
+        environment(&variables)
     }
 
     /// Authority, certificate, key and token that are used at `url`.
     fn used(environment: &Environment, options: CredentialFiles, url: &str) -> [String; 4] {
-        let files = environment.files(options, &url.parse().unwrap());
+        let (files, _) = environment.files(options, &url.parse().unwrap());
         [files.ca, files.certificate, files.key, files.token]
             .map(|file| file.map_or("-".to_owned(), |file| file.display().to_string()))
     }
@@ -170,7 +233,43 @@ mod tests {
             // There a token could be read by others.
             ("http://node-1:1", ["-", "-", "-", "-"]),
         ] {
-            assert_eq!(used(&all(), none(), url), expected, "{url}");
+            assert_eq!(used(&of_coordinator(Some(url)), none(), url), expected, "{url}");
         }
+    }
+
+    #[test]
+    fn files_of_the_environment_are_for_the_coordinator_that_it_names() {
+        let none = CredentialFiles::default;
+        let every = ["ca", "cert", "key", "token"];
+        for (named, url, expected) in [
+            (Some("https://a:1"), "https://a:1", every),
+            (Some("https://A:1/"), "https://a:1", every),
+            // Then they are for whatever the command line names.
+            (None, "https://b:1", every),
+            (Some(""), "https://b:1", every),
+            (Some("https://a:1"), "https://b:1", ["-"; 4]),
+            (Some("https://a:1"), "https://a:2", ["-"; 4]),
+            (Some("https://localhost:1"), "http://localhost:1", ["-"; 4]),
+            (Some("unix:A"), "unix:a", ["-"; 4]),
+            (Some("no address"), "https://a:1", ["-"; 4]),
+        ] {
+            assert_eq!(used(&of_coordinator(named), none(), url), expected, "{named:?}: {url}");
+        }
+        let mine = CredentialFiles { ca: Some("mine".into()), ..none() };
+        assert_eq!(used(&all(), mine.clone(), "https://b:1"), ["mine", "-", "-", "-"]);
+        let unused = |options, url: &str| {
+            let (_, unused) = all().files(options, &url.parse().unwrap());
+            (!unused.is_empty()).then(|| unused.to_string())
+        };
+        assert_eq!(unused(none(), "https://a:1"), None);
+        // Neither is missed where there is an option, or no use.
+        assert_eq!(unused(none(), "http://b:1"), None);
+        let told = unused(mine, "https://b:1").unwrap();
+        assert_eq!(
+            told,
+            "OSTEON_TLS_CERT, OSTEON_TLS_KEY, OSTEON_TOKEN_FILE were not used, because this \
+             coordinator is not the one that OSTEON_COORDINATOR names; give --tls-cert FILE \
+             --tls-key FILE --token-file FILE"
+        );
     }
 }

@@ -17,7 +17,7 @@ use crate::arguments::{
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::ending::Failure;
-use crate::environment::Environment;
+use crate::environment::{Environment, Unused};
 use crate::instruction_set;
 use crate::request::Request;
 
@@ -62,6 +62,8 @@ pub(crate) enum Resolved {
         config: WorkerConfig,
         /// Files of certificates and a token.
         files: CredentialFiles,
+        /// Variables that were not used for it.
+        unused: Unused,
     },
     /// `certs`.
     Certs(CertsArguments),
@@ -202,8 +204,8 @@ impl Resolved {
         let remote = |client: ClientArguments| {
             let from_environment = client.coordinator.is_none();
             let endpoint = environment.needed(client.coordinator)?;
-            let files = environment.files(client.credentials.into(), &endpoint);
-            Ok::<_, Failure>(Remote { endpoint, files, from_environment })
+            let (files, unused) = environment.files(client.credentials.into(), &endpoint);
+            Ok::<_, Failure>(Remote { endpoint, files, from_environment, unused })
         };
         let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
         let run = |kind, run| {
@@ -223,9 +225,10 @@ impl Resolved {
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {
                 let endpoint = environment.needed(arguments.coordinator.clone())?;
-                let files = environment.files(arguments.credentials.clone().into(), &endpoint);
+                let given = arguments.credentials.clone().into();
+                let (files, unused) = environment.files(given, &endpoint);
                 let config = resolve_worker(&arguments, endpoint, cores, isa()?);
-                Self::Worker { config, files }
+                Self::Worker { config, files, unused }
             }
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
@@ -290,8 +293,8 @@ fn resolve_run(
     };
     let place = match (there, files.first_given()) {
         (Some(endpoint), _) => {
-            let files = environment.files(files, &endpoint);
-            Place::There(Remote { endpoint, files, from_environment })
+            let (files, unused) = environment.files(files, &endpoint);
+            Place::There(Remote { endpoint, files, from_environment, unused })
         }
         (None, Some(option)) => {
             return Err(Failure::bad_input(anyhow!(

@@ -320,16 +320,6 @@ fn what_is_no_regular_file_is_refused_at_once() {
     check(text(&traces), "a pipe", &["simulate", text(&case), "--out", text(&traces)]);
 
     let secret = pipe("secret");
-    let jobs = ["jobs", "--coordinator", "https://127.0.0.1:1"];
-    check(&secret, "a pipe", &[&jobs[..], &["--token-file", &secret]].concat());
-    check(&secret, "a pipe", &[&jobs[..], &["--tls-ca", &secret]].concat());
-    let store = scratch.path("store");
-    let serve = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(&store)];
-    check(&secret, "a pipe", &[&serve[..], &["--tokens", &secret]].concat());
-    let pem = pipe("authority/ca.pem");
-    let made = scratch.path("made");
-    let authority = scratch.path("authority");
-    check(&pem, "a pipe", &["certs", text(&made), "--ca", text(&authority)]);
     let out = scratch.path("ann.token");
     let token = ["token", "ann", "--role", "read", "--out", text(&out), "--tokens", &secret];
     check(&secret, "a pipe", &token);

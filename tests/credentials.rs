@@ -12,11 +12,13 @@ mod secure;
 mod support;
 
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
-use secure::{door, mode, set_up};
-use support::{Finished, Scratch, run, text};
+use secure::{Secure, door, mode, set_up};
+use support::{Finished, Owned, Scratch, eventually, osteon, run, text};
 
 fn permissions(path: &Path) -> u32 {
     fs::metadata(path).unwrap().permissions().mode() & 0o7777
@@ -238,4 +240,56 @@ fn a_clients_options_are_checked_before_anything_is_sent() {
     let embedded = run(&["identify", text(&job), "--token-file", &token]);
     assert_eq!(embedded.code, Some(2), "{embedded:?}");
     assert!(embedded.stderr.contains("add --coordinator URL"), "{embedded:?}");
+}
+
+/// A named pipe that only its owner reads.
+fn pipe(scratch: &Scratch, name: &str) -> PathBuf {
+    let path = scratch.path(name);
+    let made = Command::new("mkfifo").args(["-m", "600", text(&path)]).status().unwrap();
+    assert!(made.success());
+    path
+}
+
+/// As of a password manager: `--token-file <(pass show osteon)`.
+#[test]
+fn a_token_may_come_through_a_pipe() {
+    let secure = Secure::start();
+    let (ca, token) = (secure.scratch.path("certs/ca.pem"), secure.scratch.path("read.token"));
+    let jobs = ["jobs", "--coordinator", &secure.url, "--tls-ca", text(&ca), "--token-file"];
+    let mut command = osteon();
+    command.args(jobs).arg("/dev/stdin").stdin(Stdio::piped());
+    let mut client = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    client.stdin.take().unwrap().write_all(&fs::read(&token).unwrap()).unwrap();
+    Finished::of(client.wait_with_output().unwrap()).succeeded();
+    // One that nobody writes is not waited for for ever.
+    let silent = pipe(&secure.scratch, "silent");
+    let refused = run(&[&jobs[..], &[text(&silent)]].concat());
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    let expected = "silent: it is a pipe, and nobody wrote it to its end within 10 s";
+    assert!(refused.stderr.contains(expected), "{refused:?}");
+}
+
+#[test]
+fn a_coordinator_keeps_what_came_through_a_pipe() {
+    let scratch = Scratch::new();
+    set_up(&scratch);
+    let list = pipe(&scratch, "list");
+    let lines = fs::read(scratch.path("tokens")).unwrap();
+    let writer = std::thread::spawn({
+        let list = list.clone();
+        move || fs::write(list, lines).unwrap()
+    });
+    let url = format!("unix:{}", scratch.path("socket").display());
+    let mut command = osteon();
+    command.args(["coordinator", "--listen", &url, "--tokens", text(&list), "--store"]);
+    let log = scratch.path("log");
+    let process = Owned::spawn_logging(command.arg(scratch.path("store")), &log);
+    writer.join().unwrap();
+    let token = scratch.path("read.token");
+    let jobs = ["jobs", "--coordinator", &url, "--token-file", text(&token)];
+    run(&jobs).succeeded();
+    process.signal("HUP");
+    let told = "list is a pipe, which cannot be read again";
+    eventually("the log says so", || fs::read_to_string(&log).unwrap().contains(told));
+    run(&jobs).succeeded();
 }

@@ -364,3 +364,40 @@ fn the_environment_names_what_every_command_repeats() {
         .map(|it| (it, nowhere));
     with(&wrong, &["identify", text(&file), "--json"]).succeeded();
 }
+
+/// A token is not shown to whoever else a command line names, and the refusal says so.
+#[test]
+fn files_of_the_environment_are_not_used_for_another_coordinator() {
+    let secure = Secure::start();
+    let scratch = &secure.scratch;
+    let (ca, token) = (scratch.path("certs/ca.pem"), scratch.path("read.token"));
+    let jobs = ["jobs", "--coordinator", &secure.url];
+    let own = [("OSTEON_TLS_CA", ca.as_path()), ("OSTEON_TOKEN_FILE", &token)];
+    // Where the environment names no coordinator, its files are for any.
+    with(&own, &jobs).succeeded();
+    let files = ["worker.pem", "worker-key.pem"].map(|name| scratch.path("certs").join(name));
+    let own = [
+        ("OSTEON_COORDINATOR", Path::new("https://elsewhere.example:7000")),
+        ("OSTEON_TLS_CA", &ca),
+        ("OSTEON_TLS_CERT", &files[0]),
+        ("OSTEON_TLS_KEY", &files[1]),
+        ("OSTEON_TOKEN_FILE", &token),
+    ];
+    let check = |arguments: &[&str], code: i32, expected: &[&str]| {
+        let refused = with(&own, arguments);
+        assert_eq!(refused.code, Some(code), "{refused:?}");
+        for part in expected {
+            assert!(refused.stderr.contains(part), "{part} in {refused:?}");
+        }
+    };
+    let every = "OSTEON_TLS_CA, OSTEON_TLS_CERT, OSTEON_TLS_KEY, OSTEON_TOKEN_FILE were not used";
+    let why = "is not the one that OSTEON_COORDINATOR names";
+    check(&jobs, 2, &["needs --tls-ca FILE", every, why]);
+    check(&["health", "--coordinator", &secure.url], 2, &["needs --tls-ca FILE", every, why]);
+    let with_ca = [&jobs[..], &["--tls-ca", text(&ca)]].concat();
+    check(&with_ca, 1, &["wants a token", "OSTEON_TOKEN_FILE were not used", "--token-file FILE"]);
+    let worker = ["worker", "--coordinator", &secure.url, "--tls-ca", text(&ca)];
+    check(&worker, 1, &["give --tls-cert and --tls-key", "OSTEON_TLS_KEY", why]);
+    let with_token = [&with_ca[..], &["--token-file", text(&token)]].concat();
+    with(&own, &with_token).succeeded();
+}

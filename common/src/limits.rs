@@ -72,6 +72,8 @@ pub const NAME_BYTES_MAX: usize = 256;
 pub const WORKER_MESSAGE_BYTES_MAX: usize = 4 << 20;
 /// Longest file of certificates, keys or tokens, bytes.
 pub const CREDENTIAL_FILE_BYTES_MAX: u64 = 4 << 20;
+/// Longest wait for the end of a pipe in the place of such a file, s.
+pub const CREDENTIAL_PIPE_S_MAX: u64 = 10;
 /// Most tokens that a coordinator knows.
 pub const TOKENS_MAX: usize = 10_000;
 /// Most connections to a coordinator at a time.

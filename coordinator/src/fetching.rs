@@ -1,5 +1,6 @@
 //! Sending what a job left: a few at a time, to those who read, and as it is read.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use osteon_proto::v1::{FetchResponse, HistoryBlock};
 use osteon_proto::{realizations, results, specification};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::spawn_blocking;
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
@@ -25,33 +26,29 @@ use crate::store_thread::Command;
 const AHEAD: usize = 2;
 /// Rows of the history in one message.
 const HISTORY_BLOCK_ROWS: usize = 4096;
+/// While a part is read or computed a block of the history without rows comes this often.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
 /// Realizations in one message.
 const REALIZATION_BLOCK: usize = 65_536;
 
-/// What an ended job left, and the outcomes of its best evaluation; those of its groups are read one
-/// after the other.
-pub(crate) struct Opened {
-    left: Arc<Left>,
-    outcomes: Option<Arc<[Outcome]>>,
-    /// Weak, so that who reads slowly does not keep a coordinator from stopping.
-    store: mpsc::WeakSender<Command>,
-}
-
-/// Reads all that an ended job left but its groups.
-///
-/// # Errors
-/// When the store cannot be read, something is missing in it, or the coordinator has stopped.
-pub(crate) async fn open(store: &mpsc::Sender<Command>, end: EndRecord) -> Result<Opened, Status> {
-    let job = end.job;
-    let record = read(store, |reply| Reading::Job(job, reply)).await?;
-    let summary = read(store, |reply| Reading::Summary(job, reply)).await?;
-    let left = Left { end, specification: record.specification, summary };
-    let outcomes = outcomes(store, job, left.best()).await?;
-    Ok(Opened { left: Arc::new(left), outcomes, store: store.downgrade() })
+/// Asks the store for one record. The store is let go of at once: who waits for a record does not keep a
+/// coordinator from stopping.
+async fn read<T>(
+    store: &mpsc::WeakSender<Command>,
+    what: impl FnOnce(Reply<T>) -> Reading,
+) -> Result<T, Status> {
+    let (reply, record) = oneshot::channel();
+    let sender = store.upgrade().ok_or_else(stopped)?;
+    sender.send(Command::Fetch(what(reply))).await.map_err(|_| stopped())?;
+    drop(sender);
+    record.await.map_err(|_| stopped())?.map_err(|error| match error {
+        ReadError::Pruned { .. } => Status::not_found(error.to_string()),
+        _ => Status::data_loss(error.to_string()),
+    })
 }
 
 async fn outcomes(
-    store: &mpsc::Sender<Command>,
+    store: &mpsc::WeakSender<Command>,
     job: JobId,
     number: Option<u64>,
 ) -> Result<Option<Arc<[Outcome]>>, Status> {
@@ -59,29 +56,31 @@ async fn outcomes(
     read(store, |reply| Reading::Outcomes(job, number, reply)).await.map(Some)
 }
 
-async fn read<T>(
-    store: &mpsc::Sender<Command>,
-    what: impl FnOnce(Reply<T>) -> Reading,
-) -> Result<T, Status> {
-    let (reply, record) = oneshot::channel();
-    store.send(Command::Fetch(what(reply))).await.map_err(|_| stopped())?;
-    record.await.map_err(|_| stopped())?.map_err(|error| match error {
-        ReadError::Pruned { .. } => Status::not_found(error.to_string()),
-        _ => Status::data_loss(error.to_string()),
-    })
-}
-
 fn stopped() -> Status {
     Status::unavailable("the coordinator has stopped; try again when it is back")
 }
 
+/// Reads all that an ended job left but the outcomes.
+async fn left(store: &mpsc::WeakSender<Command>, end: EndRecord) -> Result<Left, Status> {
+    let job = end.job;
+    let record = read(store, |reply| Reading::Job(job, reply)).await?;
+    let summary = read(store, |reply| Reading::Summary(job, reply)).await?;
+    Ok(Left { end, specification: record.specification, summary })
+}
+
 /// Sends one specification, one result, history blocks, realization blocks; where the data are groups
-/// the result and the realization blocks of each. Made as they are sent, and what is computed for them
-/// on a thread of its own.
-pub(crate) async fn send_all(opened: Opened, reader: Reader) -> Result<(), Stop> {
-    let Opened { left, outcomes: of_best, store } = opened;
+/// the result and the realization blocks of each. Read and made as they are sent, and what is computed
+/// for them on a thread of its own.
+pub(crate) async fn send_all(
+    store: mpsc::WeakSender<Command>,
+    end: EndRecord,
+    reader: Reader,
+) -> Result<(), Stop> {
+    let job = end.job;
+    let left = Arc::new(reader.kept_waiting(left(&store, end)).await?);
     reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
-    let (message, of_best) = computed(&left, move |left| {
+    let of_best = reader.kept_waiting(outcomes(&store, job, left.best())).await?;
+    let (message, of_best) = computed(&left, &reader, move |left| {
         let result = left.result(of_best);
         (results::to_message(&result), outcomes_of(result.best))
     })
@@ -93,12 +92,9 @@ pub(crate) async fn send_all(opened: Opened, reader: Reader) -> Result<(), Stop>
     }
     send_realizations(None, &of_best, &reader).await?;
     for set in 0..left.groups() {
-        let read = {
-            let store = store.upgrade().ok_or_else(stopped)?;
-            outcomes(&store, left.end.job, left.best_of(set)).await?
-        };
+        let read = reader.kept_waiting(outcomes(&store, job, left.best_of(set))).await?;
         let number = u32::try_from(set).unwrap_or(u32::MAX);
-        let found = computed(&left, move |left| {
+        let found = computed(&left, &reader, move |left| {
             let found = left.group(set, read)?;
             let message = results::group_to_message(number, &found);
             Some((message, outcomes_of(found.best)))
@@ -114,14 +110,21 @@ fn outcomes_of(best: Option<BestPoint>) -> Vec<Outcome> {
     best.map(|best| best.outcomes).unwrap_or_default()
 }
 
-/// What `compute` makes of what a job left, on a thread that may take its time.
+/// What `compute` makes of what a job left, on a thread that may take its time. It cannot be stopped, so
+/// it keeps the place of its fetch until it has ended: who goes and comes again starts no more of them
+/// than there are places.
 async fn computed<T: Send + 'static>(
     left: &Arc<Left>,
+    reader: &Reader,
     compute: impl FnOnce(&Left) -> T + Send + 'static,
-) -> Result<T, Status> {
-    let left = Arc::clone(left);
-    let done = spawn_blocking(move || compute(&left)).await;
-    done.map_err(|_| Status::internal("the result could not be computed; see the log"))
+) -> Result<T, Stop> {
+    let (left, place) = (Arc::clone(left), Arc::clone(&reader.place));
+    let computing = spawn_blocking(move || {
+        let _place = place;
+        compute(&left)
+    });
+    let failed = |_| Status::internal("the result could not be computed; see the log");
+    reader.kept_waiting(async { computing.await.map_err(failed) }).await
 }
 
 async fn send_realizations(
@@ -141,6 +144,8 @@ async fn send_realizations(
 pub(crate) struct Reader {
     parts: mpsc::Sender<Result<FetchResponse, Status>>,
     until: Instant,
+    /// Its place among the fetches.
+    place: Arc<dyn Send + Sync>,
 }
 
 /// Why no more is sent.
@@ -168,13 +173,37 @@ impl Reader {
             Err(_) => Err(Stop::Told(too_late())),
         }
     }
+
+    /// Waits for what `work` reads or computes, until the fetch has taken too long or the reader has
+    /// gone. Meanwhile the reader, who gives up a silent coordinator, gets signs of life.
+    async fn kept_waiting<T>(
+        &self,
+        work: impl Future<Output = Result<T, Status>>,
+    ) -> Result<T, Stop> {
+        let mut work = pin!(work);
+        loop {
+            let left = self.until.saturating_duration_since(Instant::now());
+            tokio::select! {
+                biased;
+                done = &mut work => return done.map_err(Stop::Told),
+                () = self.parts.closed() => return Err(Stop::Gone),
+                () = sleep(SIGN_OF_LIFE.min(left)) => {}
+            }
+            if Instant::now() >= self.until {
+                return Err(Stop::Told(too_slow()));
+            }
+            let sign = Part::History(HistoryBlock::default());
+            // Who has parts to read already needs none.
+            drop(self.parts.try_send(Ok(FetchResponse { part: Some(sign) })));
+        }
+    }
 }
 
 /// The parts that `produce` sends as a stream. Whoever takes nothing for a while, or takes too long for
 /// all, gets nothing more, so that what the job left, and its `place` among the fetches, are not held for
 /// ever.
 pub(crate) fn paced<F>(
-    place: impl Send + 'static,
+    place: impl Send + Sync + 'static,
     produce: impl FnOnce(Reader) -> F,
 ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send
 where
@@ -183,10 +212,10 @@ where
     let (parts, sent) = mpsc::channel(AHEAD);
     let (told, ending) = oneshot::channel();
     let until = Instant::now() + Duration::from_secs(FETCH_S_MAX);
-    let producing = produce(Reader { parts, until });
+    let producing = produce(Reader { parts, until, place: Arc::new(place) });
     tokio::spawn(async move {
+        // The reader's place ends with it.
         let stopped = producing.await;
-        drop(place);
         if let Err(Stop::Told(status)) = stopped {
             // The reader may be gone by now.
             drop(told.send(status));
@@ -207,13 +236,24 @@ fn too_late() -> Status {
     ))
 }
 
+fn too_slow() -> Status {
+    Status::deadline_exceeded(format!(
+        "the results were not read and computed within {FETCH_S_MAX} s; fetch them again when the \
+         coordinator has less to do"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc as blocking;
+
+    use futures::FutureExt as _;
     use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-    use tokio::time::sleep;
+    use tokio::time::advance;
     use tonic::Code;
 
     use super::*;
+    use crate::leftover::tests::ended;
 
     /// A fetch of so many parts.
     fn parts(
@@ -277,5 +317,100 @@ mod tests {
         drop(parts(10, place(&places).await));
         let back = timeout(patience() / 2, place(&places)).await;
         assert!(back.is_ok());
+    }
+
+    fn is_sign(part: &Part) -> bool {
+        *part == Part::History(HistoryBlock::default())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn signs_of_life_come_while_the_store_is_read() {
+        let (job, search, end, best) = ended();
+        let (store, mut commands) = mpsc::channel(1);
+        let weak = store.downgrade();
+        let slow = tokio::spawn(async move {
+            while let Some(Command::Fetch(reading)) = commands.recv().await {
+                sleep(patience()).await;
+                let answered = match reading {
+                    Reading::Job(_, reply) => reply.send(Ok(job.clone())).is_ok(),
+                    Reading::Summary(_, reply) => reply.send(Ok(search.summary())).is_ok(),
+                    Reading::Outcomes(_, _, reply) => {
+                        reply.send(Ok(Arc::clone(&best.outcomes))).is_ok()
+                    }
+                };
+                assert!(answered, "nobody waits any more");
+            }
+        });
+        let mut stream = Box::pin(paced((), |reader| send_all(weak, end, reader)));
+        let (mut parts, mut signs) = (Vec::new(), 0);
+        while let Some(part) = timeout(2 * SIGN_OF_LIFE, stream.next()).await.unwrap() {
+            let part = part.unwrap().part.unwrap();
+            if is_sign(&part) {
+                signs += 1;
+            } else {
+                parts.push(part);
+            }
+        }
+        // Three records were read.
+        assert!(signs > 3 * 10, "{signs}");
+        assert!(matches!(
+            parts[..],
+            [Part::Specification(_), Part::Result(_), Part::History(_), Part::Realizations(_)]
+        ));
+        drop(store);
+        slow.await.unwrap();
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_store_that_never_answers_is_not_waited_for_for_ever() {
+        let (_, _, end, _) = ended();
+        let (store, _commands) = mpsc::channel(1);
+        let places = Arc::new(Semaphore::new(1));
+        let place = place(&places).await;
+        let stream = paced(place, |reader| send_all(store.downgrade(), end, reader));
+        let limit = Duration::from_secs(FETCH_S_MAX) + patience();
+        let parts: Vec<_> = timeout(limit, stream.collect()).await.unwrap();
+        let last = parts.last().unwrap().as_ref().unwrap_err();
+        assert_eq!(last.code(), Code::DeadlineExceeded);
+        assert!(last.message().contains("not read and computed"), "{last}");
+        assert_eq!(places.available_permits(), 1);
+    }
+
+    /// Lets time pass until the stream has something.
+    async fn next(
+        stream: &mut (impl Stream<Item = Result<FetchResponse, Status>> + Unpin),
+    ) -> Option<Result<FetchResponse, Status>> {
+        for _ in 0..2 * FETCH_S_MAX {
+            if let Some(next) = stream.next().now_or_never() {
+                return next;
+            }
+            // While a thread computes, a paused clock does not move by itself.
+            advance(SIGN_OF_LIFE / 4).await;
+        }
+        panic!("nothing came");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn signs_of_life_come_while_the_result_is_computed_which_keeps_its_place() {
+        let (job, search, end, _) = ended();
+        let summary = search.summary();
+        let left = Arc::new(Left { end, specification: job.specification, summary });
+        let places = Arc::new(Semaphore::new(1));
+        let (release, released) = blocking::channel();
+        let place = place(&places).await;
+        let mut stream = Box::pin(paced(place, |reader| async move {
+            computed(&left, &reader, move |_| released.recv().unwrap()).await
+        }));
+        for _ in 0..10 {
+            let part = next(&mut stream).await.unwrap().unwrap().part.unwrap();
+            assert!(is_sign(&part), "{part:?}");
+        }
+        drop(stream);
+        for _ in 0..10 {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(places.available_permits(), 0, "others may begin to compute");
+        release.send(()).unwrap();
+        drop(places.acquire().await.unwrap());
     }
 }

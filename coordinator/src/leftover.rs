@@ -192,4 +192,4 @@ fn found<T>(
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -32,6 +32,7 @@ use crate::fetching;
 use crate::ids::{JobId, WorkerId};
 use crate::observers;
 use crate::places::{Caller, Places};
+use crate::store::EndRecord;
 use crate::store_thread::Command;
 
 /// Most jobs of one page.
@@ -96,12 +97,12 @@ impl JobsService {
         Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
-    /// Opens what an ended job left.
-    async fn left(&self, job: JobId) -> Result<fetching::Opened, Status> {
-        let Answer::Ended(end) = self.ask(event::Request::Fetch(job)).await? else {
-            return Err(unexpected());
-        };
-        fetching::open(&self.store, end).await
+    /// How an ended job ended.
+    async fn end(&self, job: JobId) -> Result<EndRecord, Status> {
+        match self.ask(event::Request::Fetch(job)).await? {
+            Answer::Ended(end) => Ok(end),
+            _ => Err(unexpected()),
+        }
     }
 }
 
@@ -205,8 +206,9 @@ impl Jobs for JobsService {
         let caller = Caller::of(request.extensions());
         let job = job(&request.into_inner().job)?;
         let place = self.fetches.take(caller).await?;
-        let opened = self.left(job).await?;
-        let sent = fetching::paced(place, |reader| fetching::send_all(opened, reader));
+        let end = self.end(job).await?;
+        let store = self.store.downgrade();
+        let sent = fetching::paced(place, |reader| fetching::send_all(store, end, reader));
         Ok(Response::new(Box::pin(sent)))
     }
 

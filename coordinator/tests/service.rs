@@ -110,7 +110,12 @@ async fn fetch(client: &mut JobsClient<Channel>, job: &str) -> Result<Vec<Part>,
     let mut stream = client.fetch(request).await?.into_inner();
     let mut parts = Vec::new();
     while let Some(response) = stream.message().await? {
-        parts.push(response.part.unwrap());
+        let part = response.part.unwrap();
+        // A sign of life of a coordinator on a busy machine.
+        let is_sign = matches!(&part, Part::History(block) if block.rows.is_empty());
+        if !is_sign {
+            parts.push(part);
+        }
     }
     Ok(parts)
 }

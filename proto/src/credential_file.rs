@@ -2,10 +2,11 @@
 //! secret or change what is trusted. Errors name the file and what to do, never what it holds.
 
 use std::io;
-use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use osteon_common::limits::CREDENTIAL_FILE_BYTES_MAX;
+use osteon_common::limits::{CREDENTIAL_FILE_BYTES_MAX, CREDENTIAL_PIPE_S_MAX};
 use osteon_common::{user_file, visible};
 use thiserror::Error;
 use tokio_rustls::rustls;
@@ -47,6 +48,16 @@ pub enum CredentialError {
         path: PathBuf,
         /// Most bytes.
         max: u64,
+    },
+    /// It is a pipe through which nothing came.
+    #[error(
+        "nothing came through the pipe {}; what came through a pipe once does not come again: name a \
+         file where it is to be read again",
+        visible::path(path)
+    )]
+    EmptyPipe {
+        /// The pipe.
+        path: PathBuf,
     },
     /// It is not a text file.
     #[error("{} is not a text file", visible::path(path))]
@@ -279,11 +290,14 @@ fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
     CredentialError::Pem { path: path.to_owned(), fault: error.into() }
 }
 
-/// The permissions looked at are those of the file that is read, whatever its name means later.
+/// The permissions looked at are those of the file that is read, whatever its name means later. A pipe
+/// will do, so that a secret need not be on a disk; it has permissions, too, and a named one that others
+/// can read would let them have what is meant for us.
 fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
     let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
-    let file = user_file::open(path).map_err(unreadable)?;
-    let mode = file.metadata().map_err(unreadable)?.permissions().mode() & 0o7777;
+    let file = user_file::open_or_pipe(path).map_err(unreadable)?;
+    let metadata = file.metadata().map_err(unreadable)?;
+    let mode = metadata.permissions().mode() & 0o7777;
     match kind {
         Kind::Secret if mode & 0o027 != 0 => {
             return Err(CredentialError::Exposed { path: path.to_owned(), mode });
@@ -294,8 +308,18 @@ fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
         Kind::Secret | Kind::Trusted => {}
     }
     let max = CREDENTIAL_FILE_BYTES_MAX;
-    let bytes = user_file::read_opened(&file, max).map_err(unreadable)?;
-    bytes.ok_or_else(|| CredentialError::TooLong { path: path.to_owned(), max })
+    let piped = metadata.file_type().is_fifo();
+    let bytes = match piped {
+        true => user_file::read_pipe(&file, max, Duration::from_secs(CREDENTIAL_PIPE_S_MAX)),
+        false => user_file::read_opened(&file, max),
+    };
+    match bytes.map_err(unreadable)? {
+        Some(bytes) if piped && bytes.is_empty() => {
+            Err(CredentialError::EmptyPipe { path: path.to_owned() })
+        }
+        Some(bytes) => Ok(bytes),
+        None => Err(CredentialError::TooLong { path: path.to_owned(), max }),
+    }
 }
 
 /// Refuses a certificate that its peer would refuse for its dates. Who trusts it is the peer's

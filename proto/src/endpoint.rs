@@ -143,15 +143,15 @@ fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, En
 }
 
 impl Endpoint {
-    /// What the status of a call says that this peer has not answered before. Where the call broke
-    /// before an answer came, and nothing says that nobody listens, TLS may be the cause.
-    pub fn explained(&self, status: &Status) -> String {
+    /// Why a call ended with the status. Where it broke before this peer had ever answered, and nothing
+    /// says that nobody listens, TLS may be the cause; a peer that has answered speaks what we do.
+    pub fn explained(&self, status: &Status, ever_answered: bool) -> String {
         let Some(cause) = std::error::Error::source(status) else {
             return status.message().to_owned();
         };
         let reason = innermost(cause);
         match self {
-            Self::Http(authority) if !is_refused(cause) => {
+            Self::Http(authority) if !ever_answered && !is_refused(cause) => {
                 format!("{reason}; if the coordinator speaks TLS, write https://{authority}")
             }
             _ => reason,
@@ -420,15 +420,17 @@ mod tests {
         let refused = broken(io::ErrorKind::ConnectionRefused);
         let answer = Status::unavailable("the coordinator stops");
         let hint = "; if the coordinator speaks TLS, write https://a:1";
-        for (url, status, expected) in [
-            ("http://a:1", &reset, format!("connection reset{hint}")),
-            ("http://a:1", &refused, "connection refused".to_owned()),
-            ("http://a:1", &answer, "the coordinator stops".to_owned()),
-            ("https://a:1", &reset, "connection reset".to_owned()),
-            ("unix:a", &reset, "connection reset".to_owned()),
+        for (url, status, ever_answered, expected) in [
+            ("http://a:1", &reset, false, format!("connection reset{hint}")),
+            ("http://a:1", &reset, true, "connection reset".to_owned()),
+            ("http://a:1", &refused, false, "connection refused".to_owned()),
+            ("http://a:1", &answer, false, "the coordinator stops".to_owned()),
+            ("https://a:1", &reset, false, "connection reset".to_owned()),
+            ("unix:a", &reset, false, "connection reset".to_owned()),
         ] {
             let endpoint: Endpoint = url.parse().unwrap();
-            assert_eq!(endpoint.explained(status), expected, "{url}: {status}");
+            let explained = endpoint.explained(status, ever_answered);
+            assert_eq!(explained, expected, "{url}: {status}, {ever_answered}");
         }
     }
 

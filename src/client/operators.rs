@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use osteon_proto::credentials::{CredentialFiles, Credentials};
+use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::v1::backup_response::Part;
@@ -12,19 +12,20 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
-use super::{Client, ClientError, Remote, answer_limit, answered, answered_within, refused};
+use super::peer::Peer;
+use super::{Client, ClientError, Remote, answer_limit, loaded};
 
 impl Client {
     /// The attached workers, and those that went last.
     pub(crate) async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
         let call = self.jobs.list_workers(v1::ListWorkersRequest {});
-        answered(&self.endpoint, call).await
+        self.peer.answered(call).await
     }
 
     /// Sends a worker away; how it is then.
     pub(crate) async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
         let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });
-        let worker = answered(&self.endpoint, call).await?.worker;
+        let worker = self.peer.answered(call).await?.worker;
         self.present(worker, "worker")
     }
 
@@ -35,17 +36,17 @@ impl Client {
         mut take: impl FnMut(&[u8]) -> Result<(), E>,
     ) -> Result<Result<BackupEnd, ClientError>, E> {
         let call = self.jobs.backup(v1::BackupRequest {});
-        let mut stream = match answered(&self.endpoint, call).await {
+        let mut stream = match self.peer.answered(call).await {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),
         };
         loop {
             let Ok(message) = timeout(answer_limit(), stream.message()).await else {
-                return Ok(Err(ClientError::Unanswered { endpoint: self.endpoint.clone() }));
+                return Ok(Err(self.peer.silent()));
             };
             let part = match message {
                 Ok(message) => message.and_then(|message| message.part),
-                Err(status) => return Ok(Err(refused(&self.endpoint, &status))),
+                Err(status) => return Ok(Err(self.peer.refused(&status))),
             };
             match part {
                 Some(Part::Data(data)) => take(&data)?,
@@ -59,14 +60,17 @@ impl Client {
 /// Asks a coordinator once whether it serves, for no longer than `limit`. It needs no token, and
 /// none is sent.
 pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
-    let Remote { endpoint, files, .. } = remote;
+    let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
-    let credentials = Credentials::load(&files, endpoint)?;
     let begun = Instant::now();
-    let connection = endpoint::connect_with(endpoint, &credentials, limit).await?;
+    let connected = async {
+        let credentials = loaded(&files, endpoint).await?;
+        Ok(endpoint::connect_with(endpoint, &credentials, limit).await?)
+    };
+    let connection = connected.await.map_err(|error: ClientError| error.without(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
     let left = limit.saturating_sub(begun.elapsed());
-    let answer = answered_within(endpoint, left, call).await?;
+    let answer = Peer::new(remote).answered_within(left, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

@@ -7,15 +7,16 @@ use osteon_common::job::JobKind;
 use osteon_common::job_file;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener};
-use tokio::net::{UnixListener, UnixStream};
+use tokio::net::{TcpListener, UnixListener, UnixStream};
 use tokio::sync::Notify;
+use tonic::Status;
 
 use super::*;
 
 #[test]
 fn an_answer_is_told_from_a_loss() {
-    let endpoint: Endpoint = "unix:a".parse().unwrap();
-    let shown = |status: &Status| refused(&endpoint, status).to_string();
+    let peer = Peer::new(&at("unix:a".parse().unwrap()));
+    let shown = |status: &Status| peer.refused(status).to_string();
     let answered = Status::unavailable("the store is full");
     assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
     for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
@@ -31,7 +32,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
     let directory = tempfile::tempdir().unwrap();
     let socket = directory.path().join("socket");
     let endpoint = Endpoint::Unix(socket.clone());
-    let remote = Remote { endpoint, files: CredentialFiles::default(), from_environment: false };
+    let remote = at(endpoint);
     let begun = Instant::now();
     let error = Client::connect(&remote).await.unwrap_err().to_string();
     assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
@@ -47,8 +48,12 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
 }
 
 fn remote(socket: &Path) -> Remote {
-    let endpoint = Endpoint::Unix(socket.to_owned());
-    Remote { endpoint, files: CredentialFiles::default(), from_environment: false }
+    at(Endpoint::Unix(socket.to_owned()))
+}
+
+fn at(endpoint: Endpoint) -> Remote {
+    let (files, unused) = (CredentialFiles::default(), Unused::default());
+    Remote { endpoint, files, from_environment: false, unused }
 }
 
 fn example() -> JobSpecification {
@@ -126,4 +131,45 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
     assert!(error.to_string().contains(&told), "{error}");
     assert!(begun.elapsed() <= answer_limit(), "{:?}", begun.elapsed());
     cuts.abort();
+}
+
+/// TLS may be the reason why a coordinator never answers. One that was killed has answered before.
+#[tokio::test(flavor = "multi_thread")]
+async fn tls_is_thought_of_only_where_no_answer_ever_came() {
+    let directory = tempfile::tempdir().unwrap();
+    let there = directory.path().join("there");
+    let coordinator = coordinator(&there).await;
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let endpoint: Endpoint = format!("http://{}", listener.local_addr().unwrap()).parse().unwrap();
+    let (broken, is_broken) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
+    let proxy = tokio::spawn({
+        let (broken, is_broken) = (Arc::clone(&broken), Arc::clone(&is_broken));
+        async move {
+            let (mut client, _) = listener.accept().await.unwrap();
+            let mut server = UnixStream::connect(&there).await.unwrap();
+            tokio::select! {
+                copied = tokio::io::copy_bidirectional(&mut client, &mut server) => drop(copied),
+                () = broken.notified() => {}
+            }
+            drop((client, server));
+            is_broken.notify_one();
+            // As from a port that something else listens on.
+            loop {
+                drop(listener.accept().await.unwrap());
+            }
+        }
+    });
+    let remote = at(endpoint);
+    let mut before = Client::connect(&remote).await.unwrap();
+    before.list().await.unwrap();
+    broken.notify_one();
+    is_broken.notified().await;
+    let error = before.list().await.unwrap_err();
+    assert!(matches!(error, ClientError::Lost { .. }), "{error:?}");
+    assert!(!error.to_string().contains("https://"), "{error}");
+    let mut never = Client::connect(&remote).await.unwrap();
+    let error = never.list().await.unwrap_err().to_string();
+    assert!(error.contains("if the coordinator speaks TLS, write https://"), "{error}");
+    proxy.abort();
+    coordinator.shutdown().await;
 }

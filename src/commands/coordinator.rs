@@ -4,6 +4,7 @@ use std::fs;
 use std::pin::pin;
 
 use anyhow::Context as _;
+use osteon_common::visible;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, open_files};
 
@@ -80,6 +81,16 @@ fn read_again(
     arguments: &CoordinatorArguments,
     address: &ListenAddress,
 ) {
+    let kept = "tokens and certificates stay as they were";
+    // Nobody need write it a second time, and everything else would wait meanwhile.
+    if let Some(pipe) = Door::pipe(arguments) {
+        let reason = format!(
+            "{} is a pipe, which cannot be read again; name a regular file at the next start",
+            visible::path(pipe)
+        );
+        tracing::error!(reason, "{kept}");
+        return;
+    }
     let tokens = match Door::open(arguments, address) {
         Ok(Door::Open) => return,
         Ok(Door::Tokens(tokens)) => tokens,
@@ -89,7 +100,7 @@ fn read_again(
         }
         Err(failure) => {
             let reason = failure.to_string();
-            tracing::error!(reason, "tokens and certificates stay as they were");
+            tracing::error!(reason, "{kept}");
             return;
         }
     };

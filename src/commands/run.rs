@@ -14,6 +14,7 @@ use osteon_proto::v1::JobSnapshot;
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StorePlace};
 use crate::ending::{Ending, Failure, Interruption, stdout_failure};
+use crate::environment::Unused;
 use crate::output::{self, ShownResult};
 use crate::progress::{Progress, say};
 use crate::request::Request;
@@ -147,7 +148,8 @@ async fn here(
     let progress = Arc::new(AtomicU64::new(0));
     let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
     let endpoint = embedded.endpoint().clone();
-    let remote = Remote { endpoint, files: CredentialFiles::default(), from_environment: false };
+    let (files, unused) = (CredentialFiles::default(), Unused::default());
+    let remote = Remote { endpoint, files, from_environment: false, unused };
     let driven = async {
         let client = Client::connect(&remote).await?;
         let note = |snapshot: &JobSnapshot| {

@@ -1,22 +1,40 @@
 //! `worker`: computes for a coordinator until it is told to leave.
 
-use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_worker::WorkerConfig;
+use anyhow::anyhow;
+use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
+use osteon_worker::{WorkerConfig, WorkerError};
+use tonic::Code;
 
 use crate::ending::{Ending, Failure};
+use crate::environment::Unused;
 use crate::signals;
 
 /// Serves until a signal, the time limit, or a reason to give up.
 pub(super) async fn serve(
     config: WorkerConfig,
     files: &CredentialFiles,
+    unused: &Unused,
 ) -> Result<Ending, Failure> {
-    let credentials = Credentials::load(files, &config.endpoint).map_err(Failure::bad_input)?;
+    let credentials = Credentials::load(files, &config.endpoint).map_err(|error| {
+        let of_trust = matches!(error, CredentialsError::NoAuthority { .. });
+        Failure::BadInput(noted(error.into(), of_trust, unused))
+    })?;
     let config = WorkerConfig { credentials, ..config };
     let interruption = signals::interruption()?;
     let interruption = async {
         interruption.await;
     };
-    osteon_worker::run(config, interruption).await.map_err(Failure::failed)?;
+    osteon_worker::run(config, interruption).await.map_err(|error| {
+        let of_trust = matches!(
+            error,
+            WorkerError::Distrust { .. } | WorkerError::Refused { code: Code::Unauthenticated, .. }
+        );
+        Failure::Failed(noted(error.into(), of_trust, unused))
+    })?;
     Ok(Ending::Done)
+}
+
+/// The error, and what was not used, where that may be the reason.
+fn noted(error: anyhow::Error, of_trust: bool, unused: &Unused) -> anyhow::Error {
+    if of_trust && !unused.is_empty() { anyhow!("{error}; {unused}") } else { error }
 }

@@ -8,6 +8,7 @@ use osteon_proto::endpoint::Endpoint;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::tls_failure::TlsFailure;
 use thiserror::Error;
+use tonic::Code;
 
 /// Why a worker ends before it is told to.
 #[derive(Debug, Error)]
@@ -33,6 +34,8 @@ pub enum WorkerError {
     Refused {
         /// Address of the coordinator.
         endpoint: Endpoint,
+        /// The status.
+        code: Code,
         /// What the coordinator says.
         reason: String,
     },

@@ -83,6 +83,7 @@ pub async fn run(
         started: Instant::now(),
         last_attached: Instant::now(),
         ever_attached: false,
+        ever_answered: false,
         endpoint: config.endpoint.clone(),
         credentials: config.credentials.clone(),
     };
@@ -109,6 +110,8 @@ struct Worker {
     /// The last moment with a lease, or the start.
     last_attached: Instant,
     ever_attached: bool,
+    /// Whether a call was ever answered, be it with a refusal.
+    ever_answered: bool,
     endpoint: Endpoint,
     credentials: Credentials,
 }
@@ -165,10 +168,17 @@ impl Worker {
             opened = open(&endpoint, &credentials, hello, &outbox, requests) => opened,
         };
         let mut responses = match opened {
-            Ok(responses) => responses,
+            Ok(responses) => {
+                self.ever_answered = true;
+                responses
+            }
             Err(NotOpened::Unreachable(reason)) => return Ok(End::Lost(reason)),
             Err(NotOpened::Distrust(failure)) => return self.distrusted(failure),
-            Err(NotOpened::Status(status)) => return self.ended_with(&status),
+            Err(NotOpened::Status(status)) => {
+                // Only an error of the transport has a source.
+                self.ever_answered |= std::error::Error::source(&status).is_none();
+                return self.ended_with(&status);
+            }
         };
         let mut ticks = interval(Duration::from_millis(TICK_MS));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -264,17 +274,15 @@ impl Worker {
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
         }
-        let reason = match self.ever_attached {
-            true => status.message().to_owned(),
-            false => self.endpoint.explained(status),
-        };
+        let reason = self.endpoint.explained(status, self.ever_answered);
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument
             | Code::PermissionDenied
             | Code::Unauthenticated
             | Code::Unimplemented => {
-                Err(WorkerError::Refused { endpoint: self.endpoint.clone(), reason })
+                let (endpoint, code) = (self.endpoint.clone(), status.code());
+                Err(WorkerError::Refused { endpoint, code, reason })
             }
             code => Ok(End::Lost(format!("{code}: {reason}"))),
         }

@@ -22,7 +22,7 @@ use crate::store_thread::{Command, serve};
 const JOB: JobId = JobId(1);
 
 /// An ended search of eight evaluations, and the record of its best.
-fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
+pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
     let mut parameters = [1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
     parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
     let specification = Arc::new(JobSpecification {

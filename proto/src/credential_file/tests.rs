@@ -1,4 +1,6 @@
 use std::fs;
+use std::io::Write as _;
+use std::os::fd::AsRawFd as _;
 
 use rcgen::{CertificateParams, KeyPair};
 use tempfile::TempDir;
@@ -111,4 +113,34 @@ fn a_token_is_read_or_refused_without_being_told() {
             assert!(!error.contains(secret), "{error}");
         }
     }
+}
+
+/// As a shell gives it: `--token-file <(pass show osteon)`.
+#[test]
+fn what_comes_through_a_pipe_is_read_once() {
+    let place = Place::new();
+    let secret = format!("osteon_{}", "0123456789abcdef".repeat(4));
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    let path = PathBuf::from(format!("/dev/fd/{}", reader.as_raw_fd()));
+    writeln!(writer, "{secret}").unwrap();
+    drop(writer);
+    assert_eq!(token(&path).unwrap().reveal(), secret);
+    let again = token(&path).unwrap_err();
+    assert!(matches!(again, CredentialError::EmptyPipe { .. }), "{again}");
+    assert!(again.to_string().contains("name a file"), "{again}");
+
+    // Certificates and keys, and pipes that have a name.
+    let (certificate, key) = place.pair("good", 2000, 4000);
+    let named = place.0.path().join("named");
+    assert!(std::process::Command::new("mkfifo").arg(&named).status().unwrap().success());
+    let exposed = identity(&certificate, &named).unwrap_err();
+    assert!(matches!(exposed, CredentialError::Exposed { .. }), "{exposed}");
+    fs::set_permissions(&named, fs::Permissions::from_mode(0o600)).unwrap();
+    let pem = fs::read(&key).unwrap();
+    let writer = std::thread::spawn({
+        let named = named.clone();
+        move || fs::write(named, pem).unwrap()
+    });
+    assert!(identity(&certificate, &named).is_ok());
+    writer.join().unwrap();
 }
