@@ -13,6 +13,7 @@ pub mod credentials;
 pub mod endpoint;
 pub mod malformed;
 pub mod parameter_values;
+mod pipe;
 pub mod realizations;
 pub mod results;
 pub mod setup;
