@@ -16,6 +16,7 @@ use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 
 use super::{Effects, batches, dispatch, jobs};
+use crate::config::Config;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::search::same_point;
@@ -58,7 +59,7 @@ pub(super) fn begin(
             Evaluation::new(number, round, point, realizations)
         }
     };
-    let likely = if speculates(job) { job.search.likely(LIKELY_MAX) } else { Vec::new() };
+    let likely = if speculates(&state.config, job) { job.search.likely(LIKELY_MAX) } else { Vec::new() };
     let round = evaluation.round;
     job.stage = Stage::Computing(evaluation);
     adopt_batches(state, id, round);
@@ -75,7 +76,8 @@ pub(super) fn prepare(
     now: Duration,
     effects: &mut Effects,
 ) {
-    if let Some(job) = state.jobs.get_mut(&id).filter(|job| speculates(job)) {
+    let config = &state.config;
+    if let Some(job) = state.jobs.get_mut(&id).filter(|job| speculates(config, job)) {
         let likely = job.search.likely_after(outcomes, LIKELY_MAX);
         keep(state, id, likely, now, effects);
     }
@@ -150,10 +152,10 @@ pub(super) fn keep_bound(state: &mut State, now: Duration, effects: &mut Effects
 }
 
 /// Whether points are computed ahead for a job.
-fn speculates(job: &Job) -> bool {
+fn speculates(config: &Config, job: &Job) -> bool {
     let specification = &job.record.specification;
-    specification.kind == JobKind::Identification
-        && specification.search.speculation
+    config.speculation
+        && specification.kind == JobKind::Identification
         && specification.monte_carlo.realizations <= REALIZATIONS_MAX
         && !job.cancelled
 }
