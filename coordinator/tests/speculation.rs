@@ -22,7 +22,12 @@ use osteon_coordinator::config::Config;
 
 /// When each of some jobs ended, on a coordinator with or without speculation; every result is that of
 /// a plain loop, to the bit.
-fn run(speculation: bool, threads: &[u32], times: Times, jobs: &[JobSpecification]) -> Vec<Duration> {
+fn run(
+    speculation: bool,
+    threads: &[u32],
+    times: Times,
+    jobs: &[JobSpecification],
+) -> Vec<Duration> {
     let config = Config { speculation, ..Config::default() };
     let ended = Clockwork::with_config(threads, times, config).run(jobs);
     for (job, ended) in jobs.iter().zip(&ended) {
@@ -35,8 +40,9 @@ fn run(speculation: bool, threads: &[u32], times: Times, jobs: &[JobSpecificatio
 /// How many times as long a search takes without speculation, over workers of so many threads.
 fn gain(threads: &[u32], times: Times, realizations: u64, evaluations: u64) -> f64 {
     let job = fake::identification(realizations, evaluations, 3);
-    let [without, with] = [false, true]
-        .map(|speculation| run(speculation, threads, times, slice::from_ref(&job))[0].as_secs_f64());
+    let [without, with] = [false, true].map(|speculation| {
+        run(speculation, threads, times, slice::from_ref(&job))[0].as_secs_f64()
+    });
     println!("{threads:?}, {times:?}, {realizations} realizations: {without:.3} s, {with:.3} s");
     without / with
 }

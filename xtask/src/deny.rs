@@ -45,7 +45,8 @@ fn program() -> Result<PathBuf> {
         String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!(" {VERSION}"))
     });
     if !installed {
-        let install = ["install", "cargo-deny", "--version", VERSION, "--locked", "--force", "--root"];
+        let install =
+            ["install", "cargo-deny", "--version", VERSION, "--locked", "--force", "--root"];
         cargo(cargo_command(&install).arg(&tools))?;
     }
     Ok(program)
@@ -54,10 +55,8 @@ fn program() -> Result<PathBuf> {
 /// Whether the database of advisories could be fetched in time.
 fn is_fetched(command: &mut Command) -> Result<bool> {
     announce(command);
-    let mut child = command
-        .stderr(Stdio::null())
-        .spawn()
-        .with_context(|| format!("cannot run {command:?}"))?;
+    let mut child =
+        command.stderr(Stdio::null()).spawn().with_context(|| format!("cannot run {command:?}"))?;
     let start = Instant::now();
     while start.elapsed() < FETCH_MAX {
         if let Some(status) = child.try_wait()? {

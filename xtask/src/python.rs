@@ -16,7 +16,11 @@ pub(crate) fn test(words: &[String]) -> Result<()> {
     let python = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(python);
     command.current_dir(root()).arg("tests/python/run.py");
-    command.arg("--osteon").arg(programs.join("osteon")).arg("--work").arg(programs.with_file_name("python"));
+    command
+        .arg("--osteon")
+        .arg(programs.join("osteon"))
+        .arg("--work")
+        .arg(programs.with_file_name("python"));
     cargo(command.args(words)).context(
         "the client in Python needs Python 3.10 or later with its module venv (on Debian the \
          packages python3 and python3-venv), and the packages of tests/python/requirements.txt",

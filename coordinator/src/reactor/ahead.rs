@@ -59,7 +59,8 @@ pub(super) fn begin(
             Evaluation::new(number, round, point, realizations)
         }
     };
-    let likely = if speculates(&state.config, job) { job.search.likely(LIKELY_MAX) } else { Vec::new() };
+    let likely =
+        if speculates(&state.config, job) { job.search.likely(LIKELY_MAX) } else { Vec::new() };
     let round = evaluation.round;
     job.stage = Stage::Computing(evaluation);
     adopt_batches(state, id, round);
