@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 20] = [
+const SOURCES: [&str; 22] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -21,6 +21,8 @@ const SOURCES: [&str; 20] = [
     "proto/osteon",
     "proto/src",
     "rust-toolchain.toml",
+    "search/Cargo.toml",
+    "search/src",
     "solver/Cargo.toml",
     "solver/src",
     "src",

@@ -10,7 +10,7 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::results::{Evaluation, JobResult};
 use osteon_common::version::Program;
-use osteon_coordinator::search::{Search, Step};
+use osteon_search::{Search, Step};
 use osteon_solver::{Isa, Solver, Workspace};
 use rayon::prelude::*;
 

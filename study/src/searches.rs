@@ -8,7 +8,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
-use osteon_coordinator::newton;
+use osteon_search::newton;
 
 use crate::Progress;
 use crate::draws::{Draws, OPTIMUM};

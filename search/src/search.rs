@@ -23,7 +23,7 @@ use thiserror::Error;
 
 use self::identification::Identification;
 
-pub(crate) use self::ahead::same_point;
+pub use self::ahead::same_point;
 
 mod advice;
 mod ahead;
@@ -288,7 +288,7 @@ impl Search {
     }
 
     /// Whether the data are groups.
-    pub(crate) fn is_grouped(&self) -> bool {
+    pub fn is_grouped(&self) -> bool {
         matches!(self.specification.data, Some(Data::Groups(_)))
     }
 
