@@ -1,13 +1,12 @@
 //! `study`: tables of how the solvers and the searches do over many draws.
 
-use osteon_common::realization::PointError;
 use osteon_common::version;
 use osteon_solver::Isa;
 use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
-    Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, searches, setups, variance,
+    Draws, Progress, StudyError, Table, accuracy, continuity, convergence, digest, failures,
+    methods, models, refinement, searches, setups, variance,
 };
 
 use crate::arguments::{DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
@@ -20,7 +19,7 @@ use crate::resolved::Format;
 struct OverDraws {
     name: &'static str,
     realizations: u64,
-    table: fn(&Draws, Progress<'_>) -> Result<Table, PointError>,
+    table: fn(&Draws, Progress<'_>) -> Result<Table, StudyError>,
 }
 
 const FAILURES: OverDraws =
@@ -76,7 +75,7 @@ fn over_draws(
     study: &OverDraws,
     arguments: DrawsArguments,
     isa: Isa,
-) -> Result<String, PointError> {
+) -> Result<String, StudyError> {
     let realizations = arguments.realizations.unwrap_or(study.realizations);
     let draws = Draws { realizations, seed: arguments.seed, isa };
     let table = (study.table)(&draws, &say)?;
@@ -84,7 +83,7 @@ fn over_draws(
     Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
 }
 
-fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, PointError> {
+fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, StudyError> {
     let RepetitionsArguments { seeds, seed: first } = arguments;
     let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
     Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
@@ -93,10 +92,10 @@ fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, Point
 fn over_twins(
     name: &str,
     repetitions: u64,
-    table: fn(&Twins, Progress<'_>) -> Result<Table, PointError>,
+    table: fn(&Twins, Progress<'_>) -> Result<Table, StudyError>,
     arguments: TwinsArguments,
     isa: Isa,
-) -> Result<String, PointError> {
+) -> Result<String, StudyError> {
     let repetitions = arguments.repetitions.unwrap_or(repetitions);
     let seed = arguments.seed;
     let table = table(&Twins { repetitions, seed, isa }, &say)?;

@@ -11,6 +11,7 @@ pub mod convergence;
 mod difference;
 pub mod digest;
 mod draws;
+mod error;
 pub mod failures;
 mod generator;
 mod identify;
@@ -25,6 +26,7 @@ pub mod variance;
 
 pub use difference::{Difference, difference};
 pub use draws::{Draws, OPTIMUM};
+pub use error::StudyError;
 pub use table::Table;
 
 /// Hears of every row of a table that is finished.
