@@ -15,7 +15,9 @@ use osteon_solver::{Solver, Workspace};
 use rayon::prelude::*;
 
 /// Does the job on all cores.
-pub(crate) fn run(specification: &JobSpecification) -> Result<Identified, IdentifyError<Infallible>> {
+pub(crate) fn run(
+    specification: &JobSpecification,
+) -> Result<Identified, IdentifyError<Infallible>> {
     let solver = Solver::new(&specification.setup);
     identify(specification, |realizations| {
         let solve = |workspace: &mut Workspace, index| {

@@ -54,7 +54,6 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon", "osteon-proto"),
         ("osteon", "osteon-search"),
         ("osteon", "osteon-solver"),
-        ("osteon", "osteon-study"),
         ("osteon", "osteon-worker"),
         ("osteon-coordinator", "osteon-common"),
         ("osteon-coordinator", "osteon-proto"),
@@ -71,6 +70,21 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
     ];
     let allowed = allowed.map(|(from, to)| (from.to_owned(), to.to_owned()));
     assert_eq!(arrows, BTreeSet::from(allowed));
+}
+
+/// `osteon-study` is no dependency of any crate, as the arrows above say, so what it alone needs is not in
+/// the program as long as nobody else asks for it.
+#[test]
+fn what_only_measures_is_not_shipped() {
+    let metadata = MetadataCommand::new().no_deps().exec().unwrap();
+    for package in metadata.packages.iter().filter(|package| *package.name != "osteon-study") {
+        let dependencies =
+            package.dependencies.iter().filter(|to| to.kind == DependencyKind::Normal);
+        for to in dependencies.filter(|to| to.name == "osteon-solver") {
+            assert_eq!(to.features, Vec::<String>::new(), "{}", package.name);
+        }
+        assert!(package.features.get("default").is_none_or(Vec::is_empty), "{}", package.name);
+    }
 }
 
 #[test]

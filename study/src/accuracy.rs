@@ -3,10 +3,11 @@
 use osteon_common::case::{Bone, Setup};
 use osteon_common::quantile::quantile;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, Isa, Solver, Workspace};
 
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Cell, Draws, arrival, cells};
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, percent, two_digits};
 use crate::{Progress, StudyError};
 

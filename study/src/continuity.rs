@@ -4,11 +4,12 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::sampling;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, fastest_wave};
 
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Draws, arrival, cells, not_elastic};
 use crate::generator::Generator;
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, two_digits};
 use crate::{Progress, StudyError};
 

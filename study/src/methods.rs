@@ -1,10 +1,11 @@
 //! Both methods against a refined solution.
 
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_solver::check::{Difference, difference};
 
 use crate::accuracy::REFERENCE;
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Cell, Draws, arrival, cells};
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, two_digits};
 use crate::{Progress, StudyError};
 

@@ -2,9 +2,10 @@
 
 use osteon_common::limits::REFINEMENT_MAX;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::check::{Difference, difference};
 
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Cell, Draws, arrival, cells};
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, two_digits};
 use crate::{Progress, StudyError};
 

@@ -11,13 +11,14 @@ use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
 use osteon_common::violations::Violations;
+use osteon_solver::check::{Difference, difference, error_max};
 use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 use rayon::prelude::*;
 
 use crate::accuracy::REFERENCE;
-use crate::difference::{Difference, Spread, difference, error_max};
 use crate::draws::{Draws, OPTIMUM};
 use crate::generator::Generator;
+use crate::spread::Spread;
 use crate::table::{Table, percent, two_digits};
 use crate::{Progress, StudyError};
 

@@ -1,5 +1,14 @@
-//! `study`: tables of how the solvers and the searches do over many draws.
+//! Prints a table of how the solvers and the searches do over many draws.
+//!
+//! The table goes to stdout, each of its rows to stderr when it is finished. Exit codes: 0 done, 1 failed,
+//! 2 bad usage.
 
+mod arguments;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
 use osteon_common::version;
 use osteon_solver::Isa;
 use osteon_study::twins::{self, Twins};
@@ -9,11 +18,7 @@ use osteon_study::{
     methods, models, refinement, searches, setups, variance,
 };
 
-use crate::arguments::{DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
-use crate::ending::{Ending, Failure, stdout_failure};
-use crate::output;
-use crate::progress::say;
-use crate::resolved::Format;
+use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
 
 /// A study over draws.
 struct OverDraws {
@@ -47,9 +52,37 @@ const CONTINUITY: OverDraws = OverDraws {
     table: continuity::table,
 };
 
-/// Measures, and prints the table under the command line that makes it again.
-pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
-    let measured = tokio::task::spawn_blocking(move || match study {
+fn main() -> ExitCode {
+    let Arguments { study } = Arguments::parse();
+    let isa = match Isa::chosen(std::env::var_os(Isa::VARIABLE)) {
+        Ok(isa) => isa,
+        Err(error) => return failed(&error, 2),
+    };
+    let text = match measured(study, isa) {
+        Ok(text) => text,
+        Err(error) => return failed(&error, 1),
+    };
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => failed(&error, 1),
+    }
+}
+
+/// Says why there is no table; the exit code.
+fn failed(error: &dyn std::error::Error, code: u8) -> ExitCode {
+    say(&format!("osteon-study: {error}"));
+    ExitCode::from(code)
+}
+
+/// One line on stderr.
+fn say(line: &str) {
+    // Nothing is left to be done when stderr is closed.
+    drop(writeln!(std::io::stderr(), "{line}"));
+}
+
+/// The table of a study under the command line that makes it again.
+fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
+    match study {
         Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
         Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
         Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
@@ -65,10 +98,7 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
             over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
         }
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
-    });
-    let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
-    output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    }
 }
 
 fn over_draws(
@@ -104,5 +134,5 @@ fn over_twins(
 
 /// A table under what makes it again.
 fn titled(arguments: &str, table: &Table) -> String {
-    format!("`osteon study {arguments}` ({})\n\n{table}", version::fingerprint())
+    format!("`osteon-study {arguments}` ({})\n\n{table}", version::fingerprint())
 }
