@@ -21,11 +21,11 @@ const SOURCES: [&str; 20] = [
     "proto/osteon",
     "proto/src",
     "rust-toolchain.toml",
+    "search/Cargo.toml",
+    "search/src",
     "solver/Cargo.toml",
     "solver/src",
     "src",
-    "study/Cargo.toml",
-    "study/src",
     "worker/Cargo.toml",
     "worker/src",
 ];

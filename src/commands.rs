@@ -7,7 +7,6 @@ mod jobs;
 mod operators;
 mod run;
 mod simulate;
-mod study;
 mod token;
 mod worker;
 
@@ -28,9 +27,6 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Simulate { arguments, isa } => {
             let left = "no results were saved";
             unless_interrupted(simulate::simulate(arguments, isa), left).await
-        }
-        Resolved::Study { study, isa } => {
-            unless_interrupted(study::run(study, isa), "no results were saved").await
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,

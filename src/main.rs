@@ -13,7 +13,6 @@ mod ending;
 mod environment;
 #[cfg(test)]
 mod fuzz;
-mod instruction_set;
 mod log_filter;
 mod new_files;
 mod output;

@@ -14,8 +14,8 @@ use osteon_common::sampling::NominalSampling;
 use osteon_proto::v1::{
     BackupEnd, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
+use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure};
-use osteon_study::check::Check;
 use serde_json::{Value, json};
 
 use crate::resolved::Format;

@@ -12,13 +12,12 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
-    DrawArguments, JobsArguments, JobsCommand, RunArguments, SimulateArguments, Study,
-    SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    DrawArguments, JobsArguments, JobsCommand, RunArguments, SimulateArguments, SubmitArguments,
+    TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::ending::Failure;
 use crate::environment::{Environment, Unused};
-use crate::instruction_set;
 use crate::request::Request;
 
 /// Worker processes of a run on this machine, unless given.
@@ -42,13 +41,6 @@ pub(crate) enum Resolved {
     Simulate {
         /// What, and what of it is wanted.
         arguments: SimulateArguments,
-        /// What computes.
-        isa: Isa,
-    },
-    /// `study`.
-    Study {
-        /// What to measure.
-        study: Study,
         /// What computes.
         isa: Isa,
     },
@@ -207,7 +199,7 @@ impl Resolved {
             let (files, unused) = environment.files(client.credentials.into(), &endpoint);
             Ok::<_, Failure>(Remote { endpoint, files, from_environment, unused })
         };
-        let isa = || instruction_set::named(std::env::var_os(instruction_set::VARIABLE));
+        let isa = || Isa::chosen(std::env::var_os(Isa::VARIABLE)).map_err(Failure::bad_input);
         let run = |kind, run| {
             let run = resolve_run(kind, run, cores, &environment)?;
             if matches!(run.place, Place::Here { .. }) {
@@ -220,7 +212,6 @@ impl Resolved {
             Command::Identify(arguments) => run(JobKind::Identification, arguments)?,
             Command::Propagate(arguments) => run(JobKind::Propagation, arguments)?,
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
-            Command::Study(arguments) => Self::Study { study: arguments.study, isa: isa()? },
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {

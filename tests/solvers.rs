@@ -1,4 +1,4 @@
-//! Solvers as a user meets them: instruction sets by name, checks, studies, estimated errors.
+//! Solvers as a user meets them: instruction sets by name, checks, estimated errors.
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
@@ -42,7 +42,6 @@ fn an_unknown_instruction_set_is_refused_wherever_something_is_computed() {
         &["propagate", text(&job)],
         &["identify", text(&job)],
         &["worker", "--coordinator", "unix:nowhere"],
-        &["study", "failures"],
     ] {
         let refused = run_with((VARIABLE, "sse9"), arguments);
         assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{arguments:?}");
@@ -110,18 +109,4 @@ fn a_hybrid_job_runs_on_workers_and_states_its_discretisation() {
     assert_ne!(exact["digest"], result["digest"]);
     assert_eq!(exact["solver"]["method"], "exact");
     assert!(exact["solver"]["pairs"].as_u64().unwrap() > 100);
-}
-
-#[test]
-fn a_study_is_the_same_on_any_number_of_threads() {
-    let study = ["study", "failures", "--realizations", "3", "--seed", "5"];
-    let finished = run(&study);
-    let lines: Vec<&str> = finished.succeeded().lines().collect();
-    assert!(lines[0].starts_with("`osteon study failures --realizations 3 --seed 5` (osteon "));
-    assert_eq!(lines.len(), 2 + 2 + 15, "{}", finished.stdout);
-    assert_eq!(finished.stderr.lines().count(), 15, "progress: {}", finished.stderr);
-    for threads in ["1", "3"] {
-        let again = run_with(("RAYON_NUM_THREADS", threads), &study);
-        assert_eq!(again.stdout, finished.stdout);
-    }
 }

@@ -6,12 +6,12 @@ use std::time::Duration;
 use osteon_proto::batch::Work;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::v1::{JobSnapshot, ListWorkersResponse, WorkerSnapshot};
+use osteon_search::Summary;
 use thiserror::Error;
 
 use crate::event::RecordKey;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::notice::Notice;
-use crate::search::Summary;
 use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
 
 /// Something to do.

@@ -3,10 +3,10 @@
 use osteon_common::outcome::{Solved, encode};
 use osteon_common::parameters::Point;
 use osteon_common::results::JobFailure;
+use osteon_search::ReplayError;
 use thiserror::Error;
 
 use crate::dispute::Contradiction;
-use crate::search::ReplayError;
 
 /// A failure of a job.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use osteon_common::job::{Data, JobSpecification};
 use osteon_common::outcome::Outcome;
 use osteon_common::results::{BestPoint, Evaluation, GroupResult, JobResult};
+use osteon_search::Summary;
 use thiserror::Error;
 use tokio::sync::oneshot;
 
 use crate::ids::JobId;
-use crate::search::Summary;
 use crate::store::{EndRecord, JobRecord, Store, StoreError};
 
 /// What an ended job left.

@@ -2,14 +2,13 @@
 //!
 //! The coordinator is a state ([`state`]), reactions to events ([`event`], [`reactor`]) that are
 //! synchronous and know no clock, and effects ([`effect`]). Around it lies one asynchronous
-//! shell that only moves bytes. [`search`], [`simplex`] and [`newton`] decide the path of a job and
-//! know no worker; [`store`] is what outlives a process. This crate never links the solver: in a job only
-//! a worker solves.
+//! shell that only moves bytes. An [`osteon_search::Search`] decides the path of a job and knows no worker;
+//! [`store`] is what outlives a process. This crate never links the solver: in a job only a worker
+//! solves.
 
 mod accept;
 pub mod access;
 mod access_layer;
-pub mod ask;
 pub mod audit;
 mod backing_up;
 pub mod config;
@@ -27,7 +26,6 @@ pub mod leftover;
 pub mod listen;
 mod losses;
 mod message_body;
-pub mod newton;
 pub mod notice;
 mod observers;
 pub mod open_files;
@@ -37,12 +35,9 @@ mod probation;
 mod rate;
 pub mod reactor;
 pub mod sanity;
-pub mod search;
-pub mod search_box;
 mod service_jobs;
 mod service_workers;
 mod shell;
-pub mod simplex;
 mod snapshot;
 pub mod state;
 pub mod store;

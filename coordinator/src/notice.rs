@@ -5,10 +5,10 @@ use std::fmt;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
+use osteon_search::Ending;
 
 use crate::effect::CloseReason;
 use crate::ids::{JobId, WorkerId};
-use crate::search::Ending;
 use crate::worker_name::WorkerName;
 
 /// Something that an operator wants to read in the log.

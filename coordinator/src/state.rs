@@ -11,6 +11,7 @@ use osteon_common::limits::WORKERS_MAX;
 use osteon_common::parameters::Point;
 use osteon_proto::batch::Work;
 use osteon_proto::specification;
+use osteon_search::Search;
 use prost::Message as _;
 
 use crate::config::Config;
@@ -22,7 +23,6 @@ use crate::notice::Departure;
 use crate::pace::Pace;
 use crate::probation::Probation;
 use crate::rate::Rate;
-use crate::search::Search;
 use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
 use crate::worker_name::WorkerName;
 

@@ -16,10 +16,10 @@ use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, Evaluation, Moments};
 use osteon_common::version::Program;
+use osteon_search::{Ending, Summary};
 use thiserror::Error;
 
 use crate::ids::JobId;
-use crate::search::{Ending, Summary};
 use crate::worker_name::WorkerName;
 
 pub mod memory;

@@ -20,11 +20,11 @@ use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
 use osteon_coordinator::leftover;
 use osteon_coordinator::reactor::{Restored, react};
-use osteon_coordinator::search::{Search, Step};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::store::{EvaluationRecord, JobRecord, Store, StoreError};
 use osteon_proto::batch::Work;
+use osteon_search::{Search, Step};
 use tempfile::TempDir;
 
 /// When a process dies, counted in writes since the beginning of the job.

@@ -10,7 +10,6 @@ use std::time::Duration;
 
 use osteon_common::version;
 use osteon_coordinator::ids::JobId;
-use osteon_coordinator::search::Summary;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
@@ -28,6 +27,7 @@ use osteon_proto::v1::{
     ListRequest, SubmitRequest, WatchRequest, WorkerHello,
 };
 use osteon_proto::{batch, realizations, results, specification, status};
+use osteon_search::Summary;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;

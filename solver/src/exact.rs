@@ -13,9 +13,12 @@ pub(crate) mod growth;
 pub(crate) mod ladder;
 pub(crate) mod look;
 pub(crate) mod plate;
+#[cfg(feature = "measure")]
+pub(crate) mod quantities;
 pub(crate) mod response;
 pub(crate) mod series;
 pub(crate) mod signal;
+#[cfg(feature = "measure")]
 pub mod stages;
 pub(crate) mod tables;
 pub(crate) mod traces;
@@ -25,16 +28,14 @@ use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{self, Grade};
 
-use crate::complex::Complex;
 use crate::exact::ladder::{Held, KeptBytes, Ladder, PAIRS_MARGIN};
 use crate::exact::look::{Estimated, ExactWorkspace, Look, Rung};
-use crate::exact::plate::{AccuratePlate, Plate};
+use crate::exact::plate::Plate;
 use crate::isa::{Isa, Kernel};
-use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
 use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
-use crate::vector::{ComplexVector, Scalar, Vector};
+use crate::vector::Vector;
 
 /// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough grows
 /// from none to full.
@@ -346,25 +347,4 @@ impl<const TERMS: usize> Kernel for FillPlate<'_, TERMS> {
     fn run<V: Vector>(self) {
         self.plate.fill::<V>(self.medium, self.thickness);
     }
-}
-
-/// Bound of the speed, m/s, of every wave along x1 in the bone: √(λ/ρ) with the largest eigenvalue λ
-/// of the Christoffel matrix of x1.
-pub fn fastest_wave(bone: &Bone) -> f64 {
-    Medium::new(bone).fastest
-}
-
-/// Admittance Y(k, s) = û3(0)/p̂(0), m/Pa, of the bone on its marrow.
-///
-/// `k` in rad/m, of either sign; `s` in 1/s with a positive real part.
-pub fn admittance(setup: &Setup, bone: &Bone, k: f64, s: Complex) -> Complex {
-    let medium = Medium::new(bone);
-    let mut plate = AccuratePlate::default();
-    plate.fill::<Scalar>(&medium, setup.layers.bone_thickness);
-    plate.prepare::<Scalar>(&medium, s, (k.abs(), k.abs()));
-    let load = tables::marrow_load(setup, s, k, true);
-    let splat = |z: Complex| ComplexVector { re: Scalar::splat(z.re), im: Scalar::splat(z.im) };
-    let mut impedance = ComplexLanes::ZERO;
-    plate.impedance(Scalar::splat(k), splat(load)).store(&mut impedance, 0);
-    -(Complex::new(1.0, 0.0) / Complex::new(impedance.re.0[0], impedance.im.0[0]))
 }

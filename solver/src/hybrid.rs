@@ -28,6 +28,7 @@
 //! of the changes of its times could make of it, and no less than the error of the waves' speed
 //! on a last mesh of fewer than five nodes per wavelength. It is an estimate of size, not a bound.
 
+#[cfg(feature = "measure")]
 mod convergence;
 mod element;
 mod incident;
@@ -44,6 +45,7 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::Outcome;
 use osteon_common::sampling;
 
+#[cfg(feature = "measure")]
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
 use self::march::Memory;
 use self::passes::Passes;

@@ -5,6 +5,10 @@
 //! multiply-adds, whose results do not depend on how many lanes fit into a register. Without
 //! hardware support a fused multiply-add is a slow but exact function call.
 
+use std::ffi::OsString;
+
+use thiserror::Error;
+
 #[cfg(target_arch = "aarch64")]
 use crate::vector::Neon;
 #[cfg(target_arch = "x86_64")]
@@ -28,7 +32,34 @@ enum Kind {
     Neon,
 }
 
+/// A name that is not one of this machine's instruction sets.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "in {}: {value:?} is not an instruction set of this machine; it offers {} (unset, the fastest is used)",
+    Isa::VARIABLE,
+    Isa::available().into_iter().map(Isa::name).collect::<Vec<_>>().join(", ")
+)]
+pub struct UnknownIsa {
+    /// What was named.
+    pub value: OsString,
+}
+
 impl Isa {
+    /// The environment variable by which users name an instruction set.
+    pub const VARIABLE: &'static str = "OSTEON_INSTRUCTION_SET";
+
+    /// The instruction set that `value` of [`Isa::VARIABLE`] names; without one, or with an empty one, the
+    /// fastest.
+    ///
+    /// # Errors
+    /// When it is not one of this machine's.
+    pub fn chosen(value: Option<OsString>) -> Result<Self, UnknownIsa> {
+        let Some(value) = value.filter(|value| !value.is_empty()) else {
+            return Ok(Self::fastest());
+        };
+        value.to_str().and_then(Self::named).ok_or(UnknownIsa { value })
+    }
+
     /// The instruction sets that this machine offers, slowest first.
     pub fn available() -> Vec<Self> {
         #[cfg_attr(
@@ -155,6 +186,26 @@ mod tests {
         assert_eq!(registers, ["Fma", "Avx2", "Avx512", "Neon"]);
         for register in registers {
             assert!(sources.0.contains(&format!("kernel.run::<{register}>()")), "{register}");
+        }
+    }
+
+    #[test]
+    fn every_set_of_this_machine_is_found_by_its_name() {
+        for isa in Isa::available() {
+            assert_eq!(Isa::chosen(Some(isa.name().into())), Ok(isa));
+        }
+        assert_eq!(Isa::chosen(None), Ok(Isa::fastest()));
+        assert_eq!(Isa::chosen(Some("".into())), Ok(Isa::fastest()));
+    }
+
+    #[test]
+    fn another_name_is_refused_with_those_that_there_are() {
+        for name in ["sse9", "AVX2", "baseline "] {
+            let text = Isa::chosen(Some(name.into())).unwrap_err().to_string();
+            assert!(text.starts_with(&format!("in OSTEON_INSTRUCTION_SET: {name:?} is")), "{text}");
+            for isa in Isa::available() {
+                assert!(text.contains(isa.name()), "{text}");
+            }
         }
     }
 }

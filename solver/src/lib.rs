@@ -13,6 +13,7 @@
 
 #![expect(clippy::needless_range_loop, reason = "matrix indices read as in the formulas")]
 
+pub mod check;
 mod complex;
 mod exact;
 pub mod hybrid;
@@ -26,9 +27,11 @@ mod solver;
 mod vector;
 
 pub use complex::Complex;
+#[cfg(feature = "measure")]
+pub use exact::quantities::{admittance, fastest_wave};
+#[cfg(feature = "measure")]
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
-pub use exact::{admittance, fastest_wave};
 pub use hybrid::{Hybrid, HybridWorkspace};
-pub use isa::Isa;
+pub use isa::{Isa, UnknownIsa};
 pub use solver::{Arrival, Failure, Looks, Sampled, Solver, Workspace};

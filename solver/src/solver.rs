@@ -1,7 +1,8 @@
 //! One realization from bone to velocity, by the method that the setup asks for.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::outcome::{FailureKind, Outcome};
+use osteon_common::outcome::{FailureKind, Outcome, Solved};
+use osteon_common::realization::Ensemble;
 use osteon_common::sampling;
 use osteon_common::settings::Method;
 
@@ -111,6 +112,25 @@ impl Solver {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)
             .map_err(|failure| failure.kind)
+    }
+
+    /// The realization at `index` of `ensemble`, as a worker answers it. A bone that cannot be drawn is
+    /// the failure `not_finite`.
+    pub fn realization(
+        &self,
+        ensemble: &Ensemble,
+        index: u64,
+        workspace: &mut Workspace,
+    ) -> Solved {
+        let Ok(bone) = ensemble.bone(index) else {
+            return Solved::failed(FailureKind::NotFinite);
+        };
+        match self.arrival(&bone, workspace) {
+            Ok(Arrival { velocity, estimated_error, .. }) => {
+                Solved { outcome: Ok(velocity), estimated_error }
+            }
+            Err(failure) => Solved::failed(failure.kind),
+        }
     }
 }
 

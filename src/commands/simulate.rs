@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use osteon_common::case::Case;
 use osteon_common::case_file;
 use osteon_common::plausible::case_warnings;
+use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
-use osteon_study::check::Check;
 
 use crate::arguments::SimulateArguments;
 use crate::ending::{Ending, Failure, stdout_failure};

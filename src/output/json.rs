@@ -8,8 +8,7 @@ use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, DepartedWorker, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
-use osteon_study::Difference;
-use osteon_study::check::Solution;
+use osteon_solver::check::{Difference, Solution};
 use serde_json::{Map, Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_value};

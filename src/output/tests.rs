@@ -5,9 +5,8 @@ use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
+use osteon_solver::check::{Difference, Solution};
 use osteon_solver::{Looks, Sampled};
-use osteon_study::Difference;
-use osteon_study::check::Solution;
 
 use super::*;
 

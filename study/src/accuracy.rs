@@ -2,14 +2,14 @@
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::quantile::quantile;
-use osteon_common::realization::PointError;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, Isa, Solver, Workspace};
 
-use crate::Progress;
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Cell, Draws, arrival, cells};
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, percent, two_digits};
+use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -35,7 +35,7 @@ pub(crate) const REFERENCE: f64 = 5.0;
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[&["plate (mm)", "dispersion"][..], &SUMMARY].concat());
     for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
         table.push(row(&cell));

@@ -2,16 +2,16 @@
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
-use osteon_common::realization::PointError;
 use osteon_common::sampling;
 use osteon_common::settings::SolverSettings;
+use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, fastest_wave};
 
-use crate::Progress;
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Draws, arrival, cells, not_elastic};
 use crate::generator::Generator;
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, two_digits};
+use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -33,7 +33,7 @@ const JUMP_MAX: f64 = 1e-5;
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "plate (mm)",
         "dispersion",

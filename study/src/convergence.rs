@@ -1,16 +1,15 @@
 //! How the hybrid method's error falls with its elements and its time step.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::realization::PointError;
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_solver::Failure;
 use osteon_solver::Isa;
 use osteon_solver::hybrid::{ConvergenceRow, element_convergence, time_step_convergence};
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::draws::{Cell, Draws};
 use crate::table::{Table, millimetres, two_digits};
+use crate::{Progress, StudyError};
 
 /// The bone: the first draw of this seed and dispersion, triclinic, in the paper's 4 mm plate.
 const SEED: u64 = 1;
@@ -37,7 +36,7 @@ struct Series {
 ///
 /// # Errors
 /// When the bone cannot be drawn.
-pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, StudyError> {
     let cell = Cell::new(THICKNESS, DISPERSION, &Draws { realizations: 1, seed: SEED, isa })?;
     let setup = cell.setup(SolverSettings { method: Method::Hybrid, ..SolverSettings::default() });
     let columns = ["elements of order", "size (mm)", "time step (ns)", "error", "falls with order"];

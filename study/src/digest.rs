@@ -3,13 +3,12 @@
 use osteon_common::digest::PathDigest;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::realization::PointError;
 use osteon_common::settings::SolverSettings;
 use osteon_solver::Isa;
 
-use crate::Progress;
 use crate::draws::{Cell, Draws, OPTIMUM, arrival};
 use crate::table::{Table, millimetres};
+use crate::{Progress, StudyError};
 
 /// Thickness of the plate, m, and dispersion: the paper's, and where more is hard.
 const BATCHES: [(f64, f64); 2] = [(4e-3, 0.1029), (2e-3, 0.45)];
@@ -20,7 +19,7 @@ pub const REALIZATIONS: u64 = 2000;
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&["plate (mm)", "dispersion", "instruction set", "digest"]);
     for (thickness, dispersion) in BATCHES {
         for isa in Isa::available() {

@@ -1,12 +1,11 @@
 //! How often a realization has no velocity, and why.
 
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
-use osteon_common::realization::PointError;
 use osteon_common::settings::SolverSettings;
 
-use crate::Progress;
 use crate::draws::{Draws, arrival, cells};
 use crate::table::{Table, millimetres, percent};
+use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -19,7 +18,7 @@ pub const REALIZATIONS: u64 = 100_000;
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut columns = vec!["plate (mm)", "dispersion", "failed (%)"];
     columns.extend(FailureKind::ALL.map(FailureKind::name));
     let mut table = Table::new(&columns);

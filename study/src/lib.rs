@@ -1,16 +1,15 @@
 //! Measures the solvers against each other, the ways of drawing bones ([`variance`]) and the methods of
-//! search ([`searches`]): [`check`] on one case, and studies that end in a [`Table`].
+//! search ([`searches`]) by studies that end in a [`Table`]. The program `osteon-study` prints them.
 //!
 //! A study is a function of its draws alone: realizations are computed on all cores and taken
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
 
 pub mod accuracy;
-pub mod check;
 pub mod continuity;
 pub mod convergence;
-mod difference;
 pub mod digest;
 mod draws;
+mod error;
 pub mod failures;
 mod generator;
 mod identify;
@@ -19,12 +18,13 @@ pub mod models;
 pub mod refinement;
 pub mod searches;
 pub mod setups;
+mod spread;
 mod table;
 pub mod twins;
 pub mod variance;
 
-pub use difference::{Difference, difference};
 pub use draws::{Draws, OPTIMUM};
+pub use error::StudyError;
 pub use table::Table;
 
 /// Hears of every row of a table that is finished.

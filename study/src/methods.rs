@@ -1,13 +1,13 @@
 //! Both methods against a refined solution.
 
-use osteon_common::realization::PointError;
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_solver::check::{Difference, difference};
 
-use crate::Progress;
 use crate::accuracy::REFERENCE;
-use crate::difference::{Difference, Spread, difference};
 use crate::draws::{Cell, Draws, arrival, cells};
+use crate::spread::Spread;
 use crate::table::{Table, millimetres, two_digits};
+use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
@@ -21,7 +21,7 @@ pub const REALIZATIONS: u64 = 50;
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "plate (mm)",
         "dispersion",

@@ -6,11 +6,11 @@ use osteon_common::realization::{Ensemble, PointError};
 use osteon_solver::Workspace;
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::accuracy::{Both, Measured, SUMMARY, summary};
 use crate::draws::{Draws, not_elastic};
 use crate::generator::Generator;
 use crate::table::{Table, millimetres};
+use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
@@ -34,7 +34,7 @@ const TRIES_MAX: usize = 1000;
 ///
 /// # Errors
 /// When a mean model or dispersion has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[&["plate (mm)"][..], &SUMMARY].concat());
     for thickness in THICKNESSES {
         let mut row = vec![millimetres(thickness)];

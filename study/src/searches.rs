@@ -1,5 +1,7 @@
 //! How many evaluations the methods of search need, and where they end.
 
+use std::convert::Infallible;
+
 use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
@@ -8,13 +10,13 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
-use osteon_coordinator::newton;
+use osteon_search::{Identified, IdentifyError, newton};
 
-use crate::Progress;
 use crate::draws::{Draws, OPTIMUM};
 use crate::identify::{Known, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
+use crate::{Progress, StudyError};
 
 /// Realizations of each evaluation, unless chosen otherwise.
 pub const REALIZATIONS: u64 = 500;
@@ -37,7 +39,7 @@ const COSTS: [f64; 3] = [1e-4, 1e-6, 1e-10];
 ///
 /// # Errors
 /// When the optimum has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "start",
         "method",
@@ -109,7 +111,7 @@ fn found(
     method: SearchMethod,
     data: Moments,
     draws: &Draws,
-) -> Result<Found, PointError> {
+) -> Result<Found, IdentifyError<Infallible>> {
     let mut search =
         Search { max_evaluations: EVALUATIONS_MAX, sensitivities: false, ..Search::by(method) };
     if method == SearchMethod::Simplex {
@@ -128,7 +130,7 @@ fn found(
         objective: Objective::default(),
         search,
     };
-    let (result, history) = identify(&specification, &mut Known::new(), draws.isa)?;
+    let Identified { result, history } = identify(&specification, &mut Known::new(), draws.isa)?;
     let costs = history.iter().map(|row| row.cost.unwrap_or(f64::INFINITY));
     Ok(Found {
         status: result.status,

@@ -11,15 +11,16 @@ use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
 use osteon_common::violations::Violations;
+use osteon_solver::check::{Difference, difference, error_max};
 use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::accuracy::REFERENCE;
-use crate::difference::{Difference, Spread, difference, error_max};
 use crate::draws::{Draws, OPTIMUM};
 use crate::generator::Generator;
+use crate::spread::Spread;
 use crate::table::{Table, percent, two_digits};
+use crate::{Progress, StudyError};
 
 /// Cases of the study, unless chosen otherwise.
 pub const REALIZATIONS: u64 = 1000;
@@ -55,7 +56,7 @@ struct Measured {
 ///
 /// # Errors
 /// When a mean model or dispersion has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let measured = measured(draws)?;
     for one in measured.iter().filter(|one| one.is_remarkable()) {
         progress(&one.described());

@@ -1,5 +1,7 @@
 //! Whether an identification finds again what made its data, and how often within its intervals.
 
+use std::convert::Infallible;
+
 use osteon_common::case::Setup;
 use osteon_common::inference::{Inference, Known as HowWell, Quantity};
 use osteon_common::job::{
@@ -8,13 +10,14 @@ use osteon_common::job::{
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::PointError;
+use osteon_search::IdentifyError;
 use osteon_solver::Isa;
 
-use crate::Progress;
 use crate::draws::OPTIMUM;
 use crate::identify::{Known, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
+use crate::{Progress, StudyError};
 
 /// How much to repeat, and what computes.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +60,7 @@ const SEARCHED: [Parameter; 5] = [
 ///
 /// # Errors
 /// When a point has no ensemble.
-pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "set",
         "searched",
@@ -92,7 +95,7 @@ pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, PointError>
 ///
 /// # Errors
 /// When a point has no ensemble.
-pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "quantity",
         "data sets",
@@ -214,8 +217,8 @@ fn found(
     specification: &JobSpecification,
     known: &mut Known,
     isa: Isa,
-) -> Result<Option<Inference>, PointError> {
-    Ok(identify(specification, known, isa)?.0.conclusions.inference)
+) -> Result<Option<Inference>, IdentifyError<Infallible>> {
+    Ok(identify(specification, known, isa)?.result.conclusions.inference)
 }
 
 fn of(found: &Inference, parameter: Parameter) -> Option<Quantity> {

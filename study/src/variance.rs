@@ -3,17 +3,15 @@
 
 use osteon_common::case::Setup;
 use osteon_common::job::{MonteCarlo, Sampling};
-use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::results::{Estimate, Moments};
 use osteon_common::statistics;
-use osteon_solver::{Isa, Solver, Workspace};
-use rayon::prelude::*;
+use osteon_solver::{Isa, Solver};
 
-use crate::Progress;
-use crate::draws::OPTIMUM;
+use crate::draws::{OPTIMUM, solved};
 use crate::table::{Table, two_digits};
+use crate::{Progress, StudyError};
 
 /// Dispersions.
 const DISPERSIONS: [f64; 2] = [0.1029, 0.3];
@@ -54,7 +52,7 @@ pub struct Scatter {
 ///
 /// # Errors
 /// When there are no draws at a dispersion.
-pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table, PointError> {
+pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "dispersion",
         "realizations",
@@ -109,7 +107,8 @@ pub fn scatter(
     for seed in repetitions.first..repetitions.first + repetitions.seeds {
         let plain = MonteCarlo { realizations, seed, sampling, scrambles, ..MonteCarlo::default() };
         let ensemble = Ensemble::drawn(point, plain.germs())?;
-        let outcomes = outcomes(&solver, &ensemble, realizations);
+        let solved = solved(&solver, &ensemble, realizations);
+        let outcomes: Vec<_> = solved.into_iter().map(|one| one.outcome).collect();
         failed += outcomes.iter().filter(|outcome| outcome.is_err()).count();
         for (estimates, control_variate) in estimates.iter_mut().zip([false, true]) {
             let monte_carlo = MonteCarlo { control_variate, ..plain };
@@ -117,14 +116,6 @@ pub fn scatter(
         }
     }
     Ok(estimates.map(|estimates| Scatter::of(&estimates, failed)))
-}
-
-fn outcomes(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<Outcome> {
-    let outcome = |workspace: &mut Workspace, index| match ensemble.bone(index) {
-        Ok(bone) => solver.outcome(&bone, workspace),
-        Err(_) => Err(FailureKind::NotFinite),
-    };
-    (0..count).into_par_iter().map_init(Workspace::default, outcome).collect()
 }
 
 impl Scatter {

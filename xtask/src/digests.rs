@@ -10,11 +10,11 @@ use anyhow::{Result, bail};
 use crate::{cargo, cargo_command, output, say};
 
 /// The study that prints digests.
-const STUDY: [&str; 2] = ["study", "digest"];
+const STUDY: &str = "digest";
 /// The target that is type-checked.
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 
-/// A build of the program.
+/// A build of `osteon-study`.
 struct Build {
     name: &'static str,
     arguments: &'static [&'static str],
@@ -38,13 +38,13 @@ pub(crate) fn compare(words: &[String]) -> Result<()> {
     let mut batches: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for build in BUILDS {
         let mut run = cargo_command(build.arguments);
-        run.arg("--quiet");
+        run.args(["--quiet", "--package", "osteon-study"]);
         if let Some(flags) = build.flags {
             let usual = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
             let apart = PathBuf::from(usual).join("native");
             run.env("RUSTFLAGS", flags).env("CARGO_TARGET_DIR", apart);
         }
-        run.arg("--").args(STUDY).args(words);
+        run.args(["--", STUDY]).args(words);
         let text = output(&mut run)?;
         say(&format!("{}:\n\n{text}", build.name))?;
         let found = digests(&text);
@@ -100,7 +100,7 @@ mod tests {
     fn digests_are_read_by_batch() {
         let (one, two) = ("0a".repeat(32), "0b".repeat(32));
         let text = format!(
-            "`osteon study digest` (osteon 0.1.0)\n\n| plate (mm) | dispersion | instruction set | digest |\n\
+            "`osteon-study digest` (osteon 0.1.0)\n\n| plate (mm) | dispersion | instruction set | digest |\n\
              |--:|--:|--:|--:|\n|  4 | 0.1 | fma | {one} |\n|  1 | 0.4 | avx2 | {two} |\n"
         );
         let expected = [("4, 0.1".to_owned(), one), ("1, 0.4".to_owned(), two)];

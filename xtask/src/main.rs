@@ -29,6 +29,8 @@ enum Action {
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
 const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+/// The program as it is shipped: without the features that tests, benchmarks and `osteon-study` turn on.
+const LINT_SHIPPED: Cargo = &["clippy", "--package", "osteon", "--", "-D", "warnings"];
 const DOCS: Cargo = &["doc", "--workspace", "--no-deps"];
 const TEST: Cargo = &["test", "--workspace"];
 
@@ -110,6 +112,7 @@ fn lint(words: &[String]) -> Result<()> {
     }
     cargo(&mut cargo_command(FORMAT))?;
     cargo(&mut cargo_command(LINT))?;
+    cargo(&mut cargo_command(LINT_SHIPPED))?;
     cargo(cargo_command(DOCS).env("RUSTDOCFLAGS", "-D warnings"))
 }
 

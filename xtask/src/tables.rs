@@ -1,9 +1,9 @@
 //! Makes the tables of docs/validation.md again.
 //!
-//! A table stands between two comments, of which the first says what makes it:
+//! A table stands between two comments, of which the first has the arguments of `osteon-study` that make it:
 //!
 //! ```text
-//! <!-- table: study failures --realizations 100000 -->
+//! <!-- table: failures --realizations 100000 -->
 //! …
 //! <!-- end -->
 //! ```
@@ -32,7 +32,8 @@ pub(crate) fn rewrite(named: &[String]) -> Result<()> {
         bail!("{PAGE} has no table of {name:?}; it has:\n  {}", commands.join("\n  "));
     }
     for command in commands.iter().filter(|command| named.is_empty() || is_named(command)) {
-        let mut run = cargo_command(&["run", "--quiet", "--release", "--"]);
+        let mut run =
+            cargo_command(&["run", "--quiet", "--release", "--package", "osteon-study", "--"]);
         run.args(command.split(' '));
         let table = output(&mut run)?;
         fs::write(&path, replaced(&read()?, command, &table)?)
@@ -69,25 +70,25 @@ fn replaced(page: &str, command: &str, table: &str) -> Result<String> {
 mod tests {
     use super::*;
 
-    const PAGE: &str = "a\n<!-- table: study x -->\nold\n<!-- end -->\nb\n\
-                        <!-- table: study y --seed 2 -->\n<!-- end -->\n";
+    const PAGE: &str = "a\n<!-- table: x -->\nold\n<!-- end -->\nb\n\
+                        <!-- table: y --seed 2 -->\n<!-- end -->\n";
 
     #[test]
     fn one_table_is_replaced_and_all_else_is_kept() {
-        assert_eq!(commands(PAGE).unwrap(), ["study x", "study y --seed 2"]);
-        let page = replaced(PAGE, "study x", "| new |\n").unwrap();
-        let expected = "a\n<!-- table: study x -->\n\n| new |\n\n<!-- end -->\nb\n\
-                        <!-- table: study y --seed 2 -->\n<!-- end -->\n";
+        assert_eq!(commands(PAGE).unwrap(), ["x", "y --seed 2"]);
+        let page = replaced(PAGE, "x", "| new |\n").unwrap();
+        let expected = "a\n<!-- table: x -->\n\n| new |\n\n<!-- end -->\nb\n\
+                        <!-- table: y --seed 2 -->\n<!-- end -->\n";
         assert_eq!(page, expected);
-        assert_eq!(replaced(&page, "study x", "| new |").unwrap(), expected);
-        let page = replaced(&page, "study y --seed 2", "| y |").unwrap();
+        assert_eq!(replaced(&page, "x", "| new |").unwrap(), expected);
+        let page = replaced(&page, "y --seed 2", "| y |").unwrap();
         assert!(page.contains("| new |") && page.ends_with("\n| y |\n\n<!-- end -->\n"));
-        assert!(replaced(PAGE, "study z", "").is_err());
+        assert!(replaced(PAGE, "z", "").is_err());
     }
 
     #[test]
     fn a_table_without_an_end_is_refused() {
-        assert!(commands("<!-- table: study x -->\n| a |\n").is_err());
+        assert!(commands("<!-- table: x -->\n| a |\n").is_err());
     }
 
     #[test]
@@ -95,6 +96,7 @@ mod tests {
         let page = fs::read_to_string(root().join(super::PAGE)).unwrap();
         let commands = commands(&page).unwrap();
         assert!(commands.len() > 5, "{commands:?}");
-        assert!(commands.iter().all(|command| command.starts_with("study ")), "{commands:?}");
+        let made = |command: &String| page.contains(&format!("\n`osteon-study {command}"));
+        assert!(commands.iter().all(made), "{commands:?}");
     }
 }

@@ -20,7 +20,7 @@ const POINTS_MIN: u64 = 16;
 ///
 /// Measured over 64 seeds each at dispersions from 0.05 to 0.3 and 256 to 4096 points: p is 1.1 for
 /// the plain mean, most of which is a smooth function of one germ, and 1 for what is left of it by the
-/// control variate, and for both coefficients of variation. `osteon study variance` shows what it comes to.
+/// control variate, and for both coefficients of variation. `osteon-study variance` shows what it comes to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Doubled([f64; 2]);
 

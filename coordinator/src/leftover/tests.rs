@@ -8,13 +8,13 @@ use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as 
 use osteon_common::outcome::Outcome;
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
+use osteon_search::{Ending, Search, Step};
 
 use tokio::sync::{mpsc, oneshot};
 
 use super::*;
 use crate::effect::Record;
 use crate::event::{Event, RecordKey};
-use crate::search::{Ending, Search, Step};
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, JobRecord};
 use crate::store_thread::{Command, serve};
@@ -110,7 +110,7 @@ fn a_path_without_an_evaluation_leaves_a_result() {
     let mut store = MemoryStore::new();
     store.put_job(&record).unwrap();
     let search = Search::new(record.specification.clone());
-    store.finish_job(&end, &crate::search::Summary::empty()).unwrap();
+    store.finish_job(&end, &osteon_search::Summary::empty()).unwrap();
     let left = read(&mut store, &end).unwrap();
     assert_eq!(left.result, search.result(&end.ending, &end.program));
 }

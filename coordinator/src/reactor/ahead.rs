@@ -14,12 +14,12 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
+use osteon_search::same_point;
 
 use super::{Effects, batches, dispatch, jobs};
 use crate::config::Config;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::search::same_point;
 use crate::state::{Ahead, Assignment, BATCHES_IN_FLIGHT_MAX, Job, Stage, State, Worker};
 use crate::worker_name::WorkerName;
 

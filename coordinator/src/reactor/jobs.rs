@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use osteon_common::results::Status;
 use osteon_common::version::Program;
+use osteon_search::{Ending, Search, Step};
 
 use super::{Effects, ahead, batches, expulsion, reread};
 use crate::effect::{Answer, Effect, Record, Refusal};
@@ -13,7 +14,6 @@ use crate::event::RecordKey;
 use crate::failure::Failure;
 use crate::ids::JobId;
 use crate::notice::Notice;
-use crate::search::{Ending, Search, Step};
 use crate::snapshot;
 use crate::state::{EndedJob, Job, RequestName, Stage, State, Trouble};
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};

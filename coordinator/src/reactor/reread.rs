@@ -4,13 +4,14 @@
 
 use std::time::Duration;
 
+use osteon_search::{Search, Step};
+
 use super::{Effects, batches, jobs};
 use crate::effect::Effect;
 use crate::evaluation::{Before, Evaluation};
 use crate::event::Unread;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::search::{Search, Step};
 use crate::state::{Expelled, Stage, State, Trouble};
 use crate::store::EvaluationRecord;
 

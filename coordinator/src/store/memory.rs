@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use osteon_search::Summary;
+
 use super::{
     EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use crate::ids::JobId;
-use crate::search::Summary;
 use crate::worker_name::WorkerName;
 
 /// A store in memory. Clones share their content, as two openings of one file would.

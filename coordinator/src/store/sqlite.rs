@@ -13,6 +13,7 @@ use std::time::Duration;
 use osteon_common::results::{JobFailure, Moments, Status};
 use osteon_common::version::Program;
 use osteon_proto::{specification, v1};
+use osteon_search::{Ending, Summary};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
@@ -21,7 +22,6 @@ use super::{
     StoreError, StoredJob,
 };
 use crate::ids::JobId;
-use crate::search::{Ending, Summary};
 use crate::worker_name::WorkerName;
 
 mod acknowledged;

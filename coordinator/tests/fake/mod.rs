@@ -13,10 +13,10 @@ use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::effect::Record;
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, WorkerId};
-use osteon_coordinator::search::{Ending, Search as Driven, Step};
 use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
 use osteon_proto::v1::WorkerHello;
+use osteon_search::{Ending, Search as Driven, Step};
 
 /// Starts and bounds of the seven parameters.
 const RANGES: [(f64, f64, f64); 7] = [

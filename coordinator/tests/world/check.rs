@@ -8,9 +8,9 @@ use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
 use osteon_coordinator::effect::Answer;
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::leftover;
-use osteon_coordinator::search::{Ending, Search, Step};
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
+use osteon_search::{Ending, Search, Step};
 
 use super::{World, point_key};
 use crate::fake;

@@ -74,6 +74,7 @@ impl Memory {
 }
 
 /// Eight wavenumbers under a load that `memory` holds; the answer is its record.
+#[cfg(feature = "measure")]
 pub(super) struct Response<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) k: Lanes,
@@ -82,6 +83,7 @@ pub(super) struct Response<'a> {
     pub(super) memory: &'a mut Memory,
 }
 
+#[cfg(feature = "measure")]
 impl Kernel for Response<'_> {
     type Output = ();
 

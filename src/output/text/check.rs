@@ -1,7 +1,6 @@
 //! The table of a check: one case solved in several ways.
 
-use osteon_study::Difference;
-use osteon_study::check::{Check, Solution};
+use osteon_solver::check::{Check, Difference, Solution};
 
 use super::layout::aligned;
 use super::number::{VELOCITY_DIGITS, digits, significant};

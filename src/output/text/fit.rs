@@ -2,7 +2,7 @@
 
 use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_coordinator::search_box::{SearchBox, Side};
+use osteon_search::search_box::{SearchBox, Side};
 use serde_json::Value;
 
 use super::identified;

@@ -3,9 +3,10 @@
 
 use std::fs::File;
 
+use osteon_search::Summary;
+
 use super::SqliteStore;
 use crate::ids::JobId;
-use crate::search::Summary;
 use crate::store::{
     Between, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
 };

@@ -2,12 +2,12 @@
 
 use osteon_common::results::{Evaluation, GroupEnding};
 use osteon_proto::{results, v1};
+use osteon_search::Summary;
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, params};
 
 use super::columns::checksum;
 use crate::ids::JobId;
-use crate::search::Summary;
 
 /// Writes a summary.
 pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {

@@ -1,8 +1,8 @@
 //! How two solutions of one case differ.
 
 use osteon_common::case::Setup;
-use osteon_common::quantile::quantile;
-use osteon_solver::{Arrival, Failure};
+
+use crate::solver::{Arrival, Failure};
 
 /// Picked times further apart than this, in periods of the centre frequency, are not those of one
 /// extremum: neighbouring extrema are about half a period apart, and discretisation moves one by a
@@ -63,8 +63,8 @@ pub fn difference(
     }
 }
 
-/// Largest accepted relative error of a velocity at refinement 1.
-pub(crate) fn error_max(setup: &Setup) -> f64 {
+/// Largest accepted relative error of a velocity at refinement 1, in a case of `setup`.
+pub fn error_max(setup: &Setup) -> f64 {
     let product = setup.layers.bone_thickness * setup.probe.center_frequency;
     if product < THIN { ERROR_MAX_THIN } else { ERROR_MAX }
 }
@@ -77,36 +77,6 @@ fn of_arrivals(setup: &Setup, found: &Arrival, reference: &Arrival) -> Differenc
     }
     let velocity = (found.velocity - reference.velocity).abs() / reference.velocity;
     Difference::Numbers { velocity, time }
-}
-
-/// Many differences in a few numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Spread {
-    /// Relative differences of velocities, ascending.
-    velocities: Vec<f64>,
-    /// Largest difference of picked times, s.
-    pub(crate) largest_time: Option<f64>,
-    /// How many picked differently.
-    pub(crate) different_picks: usize,
-}
-
-impl Spread {
-    pub(crate) fn of(differences: &[Difference]) -> Self {
-        let mut velocities: Vec<f64> =
-            differences.iter().filter_map(|difference| difference.velocity()).collect();
-        velocities.sort_unstable_by(f64::total_cmp);
-        let times = differences.iter().filter_map(|difference| difference.time());
-        Self {
-            velocities,
-            largest_time: times.reduce(f64::max),
-            different_picks: differences.iter().filter(|&&it| it == Difference::Picks).count(),
-        }
-    }
-
-    /// Quantile of the relative differences of velocities.
-    pub(crate) fn velocity(&self, p: f64) -> Option<f64> {
-        quantile(&self.velocities, p)
-    }
 }
 
 #[cfg(test)]
@@ -143,20 +113,5 @@ mod tests {
         check(&reference, &none, Difference::Picks);
         check(&none, &late, Difference::Picks);
         check(&none, &none, Difference::BothFailed);
-    }
-
-    #[test]
-    fn a_spread_counts_picks_apart() {
-        let numbers = |velocity, time| Difference::Numbers { velocity, time };
-        let spread = Spread::of(&[
-            numbers(3e-5, 1e-10),
-            Difference::Picks,
-            numbers(1e-5, 4e-10),
-            Difference::BothFailed,
-        ]);
-        assert_eq!(spread.velocity(1.0), Some(3e-5));
-        assert_eq!(spread.velocity(0.0), Some(1e-5));
-        assert_eq!((spread.largest_time, spread.different_picks), (Some(4e-10), 1));
-        assert_eq!(Spread::of(&[Difference::Picks]).velocity(0.5), None);
     }
 }

@@ -70,7 +70,16 @@ impl Identification {
         self.present.best()
     }
 
-    /// Its outcomes.
+    /// Number of the best evaluation of set number `set`.
+    pub(super) fn best_of(&self, set: usize) -> Option<u64> {
+        match self.ended.get(set) {
+            Some(ending) => ending.best,
+            None if set == self.ended.len() => self.best().map(|row| row.number),
+            None => None,
+        }
+    }
+
+    /// The outcomes of the best evaluation of the present set.
     pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
         self.present.best_outcomes()
     }

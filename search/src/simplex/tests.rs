@@ -67,11 +67,11 @@ fn flat_valley(at: &[f64]) -> f64 {
     let (mut ln_v, mut ln_d) = (0.0, 0.0);
     for i in 0..7 {
         let (lower, upper) = BOUNDS[i];
-        let logarithm = ((lower + at[i] * (upper - lower)) / OPTIMUM[i]).ln();
+        let logarithm = libm::log((lower + at[i] * (upper - lower)) / OPTIMUM[i]);
         ln_v += LN_V[i] * logarithm;
         ln_d += LN_D[i] * logarithm;
     }
-    let (v, d) = (ln_v.exp() - 1.0, ln_d.exp() - 1.0);
+    let (v, d) = (libm::exp(ln_v) - 1.0, libm::exp(ln_d) - 1.0);
     v * v + d * d
 }
 

@@ -1,11 +1,14 @@
 //! One case, solved by both methods and by a refined exact one.
 
+mod difference;
+
 use osteon_common::case::{Case, Setup};
 use osteon_common::limits::REFINEMENT_MAX;
 use osteon_common::settings::{Method, SolverSettings};
-use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 
-use crate::difference::{Difference, difference, error_max};
+pub use self::difference::{Difference, difference, error_max};
+use crate::isa::Isa;
+use crate::solver::{Arrival, Failure, Solver, Workspace};
 
 /// Refinement of the reference over the case's.
 const REFERENCE: f64 = 5.0;
@@ -91,10 +94,12 @@ fn settings(given: &SolverSettings) -> [SolverSettings; 3] {
 #[cfg(test)]
 mod tests {
     use osteon_common::case::Bone;
-
-    use crate::OPTIMUM;
+    use osteon_common::parameters::Point;
 
     use super::*;
+
+    /// The paper's optimum.
+    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     #[test]
     fn settings_follow_the_cases() {

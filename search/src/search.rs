@@ -23,7 +23,7 @@ use thiserror::Error;
 
 use self::identification::Identification;
 
-pub(crate) use self::ahead::same_point;
+pub use self::ahead::same_point;
 
 mod advice;
 mod ahead;
@@ -258,6 +258,15 @@ impl Search {
         }
     }
 
+    /// Number of the best evaluation of set number `set` of the data, if the search has come to it and a
+    /// point was feasible.
+    pub fn best_of(&self, set: usize) -> Option<u64> {
+        match &self.plan {
+            Plan::Identification(identification) => identification.best_of(set),
+            Plan::Propagation { .. } => None,
+        }
+    }
+
     /// What the path comes to so far.
     pub fn summary(&self) -> Summary {
         let groups = match &self.plan {
@@ -288,7 +297,7 @@ impl Search {
     }
 
     /// Whether the data are groups.
-    pub(crate) fn is_grouped(&self) -> bool {
+    pub fn is_grouped(&self) -> bool {
         matches!(self.specification.data, Some(Data::Groups(_)))
     }
 

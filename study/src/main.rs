@@ -1,26 +1,30 @@
-//! `study`: tables of how the solvers and the searches do over many draws.
+//! Prints a table of how the solvers and the searches do over many draws.
+//!
+//! The table goes to stdout, each of its rows to stderr when it is finished. Exit codes: 0 done, 1 failed,
+//! 2 bad usage.
 
-use osteon_common::realization::PointError;
+mod arguments;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
 use osteon_common::version;
 use osteon_solver::Isa;
 use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
-    Draws, Progress, Table, accuracy, continuity, convergence, digest, failures, methods, models,
-    refinement, searches, setups, variance,
+    Draws, Progress, StudyError, Table, accuracy, continuity, convergence, digest, failures,
+    methods, models, refinement, searches, setups, variance,
 };
 
-use crate::arguments::{DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
-use crate::ending::{Ending, Failure, stdout_failure};
-use crate::output;
-use crate::progress::say;
-use crate::resolved::Format;
+use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
 
 /// A study over draws.
 struct OverDraws {
     name: &'static str,
     realizations: u64,
-    table: fn(&Draws, Progress<'_>) -> Result<Table, PointError>,
+    table: fn(&Draws, Progress<'_>) -> Result<Table, StudyError>,
 }
 
 const FAILURES: OverDraws =
@@ -48,9 +52,37 @@ const CONTINUITY: OverDraws = OverDraws {
     table: continuity::table,
 };
 
-/// Measures, and prints the table under the command line that makes it again.
-pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
-    let measured = tokio::task::spawn_blocking(move || match study {
+fn main() -> ExitCode {
+    let Arguments { study } = Arguments::parse();
+    let isa = match Isa::chosen(std::env::var_os(Isa::VARIABLE)) {
+        Ok(isa) => isa,
+        Err(error) => return failed(&error, 2),
+    };
+    let text = match measured(study, isa) {
+        Ok(text) => text,
+        Err(error) => return failed(&error, 1),
+    };
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => failed(&error, 1),
+    }
+}
+
+/// Says why there is no table; the exit code.
+fn failed(error: &dyn std::error::Error, code: u8) -> ExitCode {
+    say(&format!("osteon-study: {error}"));
+    ExitCode::from(code)
+}
+
+/// One line on stderr.
+fn say(line: &str) {
+    // Nothing is left to be done when stderr is closed.
+    drop(writeln!(std::io::stderr(), "{line}"));
+}
+
+/// The table of a study under the command line that makes it again.
+fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
+    match study {
         Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
         Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
         Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
@@ -66,17 +98,14 @@ pub(super) async fn run(study: Study, isa: Isa) -> Result<Ending, Failure> {
             over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
         }
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
-    });
-    let text = measured.await.map_err(Failure::failed)?.map_err(Failure::failed)?;
-    output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    }
 }
 
 fn over_draws(
     study: &OverDraws,
     arguments: DrawsArguments,
     isa: Isa,
-) -> Result<String, PointError> {
+) -> Result<String, StudyError> {
     let realizations = arguments.realizations.unwrap_or(study.realizations);
     let draws = Draws { realizations, seed: arguments.seed, isa };
     let table = (study.table)(&draws, &say)?;
@@ -84,7 +113,7 @@ fn over_draws(
     Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
 }
 
-fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, PointError> {
+fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, StudyError> {
     let RepetitionsArguments { seeds, seed: first } = arguments;
     let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
     Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
@@ -93,10 +122,10 @@ fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, Point
 fn over_twins(
     name: &str,
     repetitions: u64,
-    table: fn(&Twins, Progress<'_>) -> Result<Table, PointError>,
+    table: fn(&Twins, Progress<'_>) -> Result<Table, StudyError>,
     arguments: TwinsArguments,
     isa: Isa,
-) -> Result<String, PointError> {
+) -> Result<String, StudyError> {
     let repetitions = arguments.repetitions.unwrap_or(repetitions);
     let seed = arguments.seed;
     let table = table(&Twins { repetitions, seed, isa }, &say)?;
@@ -105,5 +134,5 @@ fn over_twins(
 
 /// A table under what makes it again.
 fn titled(arguments: &str, table: &Table) -> String {
-    format!("`osteon study {arguments}` ({})\n\n{table}", version::fingerprint())
+    format!("`osteon-study {arguments}` ({})\n\n{table}", version::fingerprint())
 }

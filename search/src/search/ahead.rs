@@ -52,6 +52,6 @@ fn distinct(points: impl IntoIterator<Item = Point>, but: Option<Point>) -> Vec<
 }
 
 /// Whether two points are the same to the bit.
-pub(crate) fn same_point(a: &Point, b: &Point) -> bool {
+pub fn same_point(a: &Point, b: &Point) -> bool {
     a.0.map(f64::to_bits) == b.0.map(f64::to_bits)
 }

@@ -1,0 +1,44 @@
+//! A job in this process, without a coordinator and without gRPC: a search asks for one point after the
+//! other, and all cores compute its realizations.
+//!
+//!     cargo run --release --example identify -- examples/quick.toml
+
+use std::convert::Infallible;
+use std::path::Path;
+
+use anyhow::Context as _;
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job_file;
+use osteon_common::parameters::Parameter;
+use osteon_search::{Identified, IdentifyError, identify};
+use osteon_solver::{Solver, Workspace};
+use rayon::prelude::*;
+
+/// Does the job on all cores.
+pub(crate) fn run(
+    specification: &JobSpecification,
+) -> Result<Identified, IdentifyError<Infallible>> {
+    let solver = Solver::new(&specification.setup);
+    identify(specification, |realizations| {
+        let solve = |workspace: &mut Workspace, index| {
+            solver.realization(&realizations.ensemble, index, workspace)
+        };
+        let indices = (0..realizations.count).into_par_iter();
+        Ok(indices.map_init(Workspace::default, solve).collect())
+    })
+}
+
+#[expect(clippy::print_stdout, reason = "an example shows what it found")]
+fn main() -> anyhow::Result<()> {
+    let path = std::env::args().nth(1).context("usage: identify JOB.toml")?;
+    let specification = job_file::read(Path::new(&path), JobKind::Identification)?;
+    let Identified { result, history } = run(&specification)?;
+    println!("{} after {} evaluations", result.status.name(), history.len());
+    if let Some(best) = &result.best {
+        for parameter in Parameter::ALL {
+            println!("{:<27} {:?}", parameter.name(), best.point.get(parameter));
+        }
+    }
+    println!("{:<27} {}", "digest", result.digest);
+    Ok(())
+}

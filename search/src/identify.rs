@@ -1,0 +1,220 @@
+//! A whole job in one call, for programs that compute the realizations themselves.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::outcome::{FailureKind, Outcome, Solved, decode, encode};
+use osteon_common::parameters::Point;
+use osteon_common::quantile;
+use osteon_common::realization::Ensemble;
+use osteon_common::results::{Evaluation, GroupResult, JobResult};
+use osteon_common::version::Program;
+use osteon_common::violations::Violations;
+use thiserror::Error;
+
+use crate::search::{Ending, Search, Step};
+
+/// The realizations of one point, which are to be computed: those with the indices from 0 to `count` - 1.
+///
+/// A bone's bits depend on the specification, the point and its index alone, so realizations may be
+/// computed in any order and on any number of threads.
+#[derive(Debug, Clone)]
+pub struct Realizations {
+    /// The point.
+    pub point: Point,
+    /// The random bones of the point. One that cannot be drawn is the failure
+    /// [`FailureKind::NotFinite`] of its index.
+    pub ensemble: Ensemble,
+    /// How many realizations there are.
+    pub count: u64,
+}
+
+/// What a job found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identified {
+    /// Status, digest, best point or what was found for each group, and what the data determine.
+    pub result: JobResult,
+    /// Rows of all evaluations, in order.
+    pub history: Vec<Evaluation>,
+}
+
+/// Why a job has no result.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum IdentifyError<E> {
+    /// The specification breaks rules.
+    #[error("the specification is not acceptable:\n{0}")]
+    Specification(Violations),
+    /// The caller could not compute the realizations of a point.
+    #[error("the realizations of evaluation {number} at {at:?} were not computed: {cause:#}", at = .point.0)]
+    Evaluation {
+        /// Number of the evaluation.
+        number: u64,
+        /// The point.
+        point: Box<Point>,
+        /// What the caller said.
+        cause: E,
+    },
+    /// The caller computed another number of realizations than was asked for.
+    #[error(
+        "evaluation {number} has {found} outcomes; it must have {expected}, one of each realization"
+    )]
+    Count {
+        /// Number of the evaluation.
+        number: u64,
+        /// How many outcomes came.
+        found: usize,
+        /// How many realizations there are.
+        expected: u64,
+    },
+    /// An outcome is none that a realization can have.
+    #[error(
+        "realization {index} of evaluation {number} is {solved:?}; a velocity must be finite and above 0, \
+         its estimated error finite and at least 0, and 0 where there is no velocity"
+    )]
+    Unsound {
+        /// Number of the evaluation.
+        number: u64,
+        /// Index of the realization.
+        index: usize,
+        /// What came.
+        solved: Solved,
+    },
+}
+
+/// Does the job of `specification` in this process: asks `evaluate` for the outcomes, in index order, of
+/// one point after the other, until the search ends.
+///
+/// The result is that of the same job submitted to a coordinator, to the bit, where `evaluate` computes
+/// what a worker computes: for that solve each bone with `osteon_solver::Solver::realization`. Only the
+/// commit of the program is not known here. An identification goes the path of its search, and a
+/// propagation is one evaluation at the start.
+///
+/// ```
+/// use std::convert::Infallible;
+///
+/// use osteon_common::case::Setup;
+/// use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+/// use osteon_common::outcome::Solved;
+/// use osteon_common::results::Status;
+///
+/// let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+/// parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
+/// parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
+/// let specification = JobSpecification {
+///     kind: JobKind::Identification,
+///     setup: Setup::default(),
+///     data: Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
+///     parameters,
+///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
+///     objective: Objective::Moments,
+///     search: Search::default(),
+/// };
+/// // In place of a solver: the speed of the bulk wave along the bone.
+/// let found = osteon_search::identify(&specification, |realizations| {
+///     let speed = |index| {
+///         let bone = realizations.ensemble.bone(index).expect("this dispersion is small");
+///         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
+///     };
+///     let solved = |index| Solved { outcome: Ok(speed(index)), estimated_error: 0.0 };
+///     Ok::<_, Infallible>((0..realizations.count).map(solved).collect())
+/// })?;
+/// assert_eq!(found.result.status, Status::Converged);
+/// let best = found.result.best.expect("a search that converges has a best point");
+/// assert!((best.velocity.expect("it is feasible").moments.mean - 3900.0).abs() < 0.1);
+/// # Ok::<_, osteon_search::IdentifyError<Infallible>>(())
+/// ```
+///
+/// # Errors
+/// When the specification breaks rules, `evaluate` fails, or what it computed cannot be meant.
+pub fn identify<E>(
+    specification: &JobSpecification,
+    mut evaluate: impl FnMut(&Realizations) -> Result<Vec<Solved>, E>,
+) -> Result<Identified, IdentifyError<E>> {
+    let violations = specification.check();
+    if !violations.is_empty() {
+        return Err(IdentifyError::Specification(violations));
+    }
+    let mut search = Search::new(Arc::new(specification.clone()));
+    let mut best = BestOfGroups::default();
+    loop {
+        match search.ask() {
+            Step::Evaluate(point) => {
+                let number = search.evaluations();
+                let solved = solve(specification, number, point, &mut evaluate)?;
+                let outcomes: Arc<[Outcome]> = solved.iter().map(|one| one.outcome).collect();
+                let successes = solved.iter().filter(|one| one.outcome.is_ok());
+                let errors = successes.map(|one| one.estimated_error).collect();
+                search.tell(Arc::clone(&outcomes), quantile::estimated_error(errors));
+                best.keep(&search, outcomes);
+            }
+            Step::Done(ending) => return Ok(identified(specification, &search, &ending, &best)),
+        }
+    }
+}
+
+/// The realizations of a point, as `evaluate` computes them. Where no bone can be drawn, all of them
+/// are failures, as they are for a worker.
+fn solve<E>(
+    specification: &JobSpecification,
+    number: u64,
+    point: Point,
+    evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<Solved>, E>,
+) -> Result<Vec<Solved>, IdentifyError<E>> {
+    let count = specification.monte_carlo.realizations;
+    let Ok(ensemble) = Ensemble::drawn(&point, specification.monte_carlo.germs()) else {
+        return Ok((0..count).map(|_| Solved::failed(FailureKind::NotFinite)).collect());
+    };
+    let solved = evaluate(&Realizations { point, ensemble, count })
+        .map_err(|cause| IdentifyError::Evaluation { number, point: Box::new(point), cause })?;
+    if solved.len() as u64 != count {
+        return Err(IdentifyError::Count { number, found: solved.len(), expected: count });
+    }
+    match solved.iter().position(|one| !is_sound(one)) {
+        Some(index) => Err(IdentifyError::Unsound { number, index, solved: solved[index] }),
+        None => Ok(solved),
+    }
+}
+
+fn is_sound(solved: &Solved) -> bool {
+    let (code, velocity) = encode(solved.outcome);
+    decode(code, velocity).is_some() && solved.is_sound()
+}
+
+/// The outcomes of the best point of each group so far. A search keeps those of one set of data only.
+#[derive(Debug, Default)]
+struct BestOfGroups(BTreeMap<usize, Arc<[Outcome]>>);
+
+impl BestOfGroups {
+    /// Keeps the outcomes of the evaluation that `search` was told last, if it is the best of its group.
+    fn keep(&mut self, search: &Search, outcomes: Arc<[Outcome]>) {
+        let last = search.history().last().filter(|_| search.is_grouped());
+        if let Some(row) = last {
+            let set = row.role.group as usize;
+            if search.best_of(set) == Some(row.number) {
+                self.0.insert(set, outcomes);
+            }
+        }
+    }
+}
+
+fn identified(
+    specification: &JobSpecification,
+    search: &Search,
+    ending: &Ending,
+    best: &BestOfGroups,
+) -> Identified {
+    let mut result = search.result(ending, &Program::this(None));
+    let summary = search.summary();
+    let group = |set: usize| -> Option<GroupResult> {
+        let found = summary.groups[set].best.zip(best.0.get(&set));
+        let best = found
+            .and_then(|(number, outcomes)| summary.best_point(specification, number, outcomes));
+        summary.group(specification, set, best)
+    };
+    result.groups = (0..summary.groups.len()).filter_map(group).collect();
+    Identified { result, history: summary.history }
+}
+
+#[cfg(test)]
+mod tests;

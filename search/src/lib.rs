@@ -1,0 +1,17 @@
+//! Searches as ask/tell state machines: which point to evaluate next, what its outcomes mean, and when
+//! to stop.
+//!
+//! [`Search`] decides the path of a job. It asks a method for points, [`simplex`] or [`newton`], in the
+//! box of the free parameters ([`search_box`]). [`identify()`] does a whole job in one call, for programs
+//! that compute the realizations themselves. Nothing here knows a solver, a worker, a clock or a
+//! file: a search is a function of its specification and of the outcomes told.
+
+pub mod ask;
+mod identify;
+pub mod newton;
+mod search;
+pub mod search_box;
+pub mod simplex;
+
+pub use identify::{Identified, IdentifyError, Realizations, identify};
+pub use search::{Ending, ReplayError, Search, Step, Summary, same_point};

@@ -1,0 +1,48 @@
+//! A job in the process of a Rust program against the same job by coordinator and workers.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+#[path = "../examples/identify.rs"]
+#[expect(dead_code, reason = "its `main` is not called")]
+mod example;
+
+use std::path::Path;
+
+use osteon_common::job::JobKind;
+use osteon_common::job_file;
+use osteon_common::parameters::Parameter;
+use support::{Scratch, job, run, text};
+
+/// Compares what the example finds with what `osteon identify` prints.
+fn check(file: &Path) {
+    let specification = job_file::read(file, JobKind::Identification).unwrap();
+    let found = example::run(&specification).unwrap();
+    let printed = run(&["identify", text(file), "--json", "--workers", "2"]).json();
+    let result = found.result;
+    assert_eq!(printed["digest"], result.digest.as_str(), "{}", file.display());
+    assert_eq!(printed["status"], result.status.name());
+    assert_eq!(printed["evaluations"], result.evaluations);
+    let best = result.best.unwrap();
+    for parameter in Parameter::ALL {
+        let value = match parameter {
+            Parameter::Dispersion => &printed["dispersion"],
+            other => &printed["parameters"][other.name()],
+        };
+        let value = value.as_f64().unwrap();
+        assert_eq!(value.to_bits(), best.point.get(parameter).to_bits(), "{parameter:?}");
+    }
+    let largest = printed["solver"]["estimated_error"]["largest"].as_f64();
+    assert_eq!(largest, best.estimated_error.map(|errors| errors.largest));
+}
+
+#[test]
+fn a_program_of_its_own_gives_the_bits_of_the_service() {
+    let scratch = Scratch::new();
+    // By simplex with independent germs; by Newton steps with Sobol' points.
+    check(&scratch.write("job.toml", &job(40, 30)));
+    check(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/fast.toml"));
+}
