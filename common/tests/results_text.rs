@@ -289,7 +289,7 @@ fn what_is_no_result_is_refused_with_the_key_and_the_line() {
     let of_density = "`parameters.density`: invalid type: string \"a\", expected f64 at line 9";
     check(&changed("1598.8", "\"a\""), of_density);
     check(&changed("\"converged\"", "\"merged\""), "`status`: unknown variant `merged`, expected");
-    check(&changed("\"direct_wave_first\"", "\"late\""), "`failures.late`: unknown variant");
+    check(&changed("\"direct_wave_first\"", "\"late\""), "`failures`: unknown variant `late`");
     check(&changed("\"seed\"", "\"seeds\""), "missing field `seed`");
     check(&changed("3906.27", "[]"), "`velocity`: invalid type");
     let long = "x".repeat(100_000);

@@ -51,7 +51,10 @@ impl From<serde_path_to_error::Error<serde_json::Error>> for ReadError {
         // A path without a key is a dot.
         let path = match error.path().iter().len() {
             0 => "the object".to_owned(),
-            _ => format!("`{}`", shortened(&error.path().to_string())),
+            // A key that is no name has none to show.
+            _ => {
+                format!("`{}`", shortened(error.path().to_string().trim_end_matches(".?")))
+            }
         };
         let cause = error.into_inner();
         if cause.is_data() {
