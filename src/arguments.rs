@@ -5,7 +5,7 @@ mod operators;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use osteon_proto::endpoint::Endpoint;
 
 use crate::program;
@@ -59,6 +59,8 @@ pub(crate) enum Command {
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list
     Token(TokenArguments),
+    /// Print the JSON Schema of a file that osteon writes
+    Schema(SchemaArguments),
 }
 
 /// Of `identify` and `propagate`.
@@ -370,6 +372,22 @@ pub(crate) struct TokenArguments {
     /// Add the line to this file for the coordinator's --tokens instead of printing it
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
+}
+
+/// Of `schema`.
+#[derive(Debug, Args)]
+pub(crate) struct SchemaArguments {
+    /// The file: result is result.json and what --json prints of a run
+    #[arg(value_enum, value_name = "FILE")]
+    pub(crate) file: SchemaFile,
+}
+
+/// A file that has a schema.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum SchemaFile {
+    /// `result.json`.
+    #[value(help = None)]
+    Result,
 }
 
 /// Longest span that a command line may ask for, s: a year.

@@ -6,6 +6,7 @@ mod draw;
 mod jobs;
 mod operators;
 mod run;
+mod schema;
 mod simulate;
 mod token;
 mod worker;
@@ -33,6 +34,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Worker { config, files, unused } => worker::serve(config, &files, &unused).await,
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
+        Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
             let left = "the job may be accepted all the same (see `osteon jobs`)";

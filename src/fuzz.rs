@@ -7,12 +7,13 @@ use std::path::Path;
 use osteon_common::document::Format as FileFormat;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
+use osteon_common::report::ResultFile;
 use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
 use crate::output::{self, ShownResult};
 use crate::resolved::Format;
 use crate::results_directory::{self, ResultsDirectory};
-use crate::verdict;
+use crate::{sample_result, verdict};
 
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
 
@@ -23,20 +24,19 @@ fn specification(kind: JobKind) -> JobSpecification {
 
 /// Does with `result.json` what commands do.
 fn check_result(json: &str) {
-    for kind in KINDS {
-        let specification = specification(kind);
-        let ended = bounded(json.len(), || verdict::ending(kind, &specification, json));
-        let cancelled = bounded(json.len(), || verdict::is_cancelled(json));
-        assert!(!cancelled || kind == JobKind::Propagation || ended == crate::Ending::RunFailed);
-        let specification = &specification;
-        let shown = ShownResult { kind, specification, json, directory: None };
-        for format in [Format::Text, Format::Json] {
-            let mut bytes = Vec::new();
-            let mut output = output::on(format, Box::new(&mut bytes));
-            bounded(json.len(), || output.result(&shown)).unwrap();
-            drop(output);
-            assert!(String::from_utf8(bytes).unwrap().len() < 64 * json.len() + 4096);
-        }
+    let Ok(result) = bounded(json.len(), || ResultFile::from_json(json)) else { return };
+    let specification = specification(result.kind());
+    let specification = &specification;
+    let ended = bounded(json.len(), || verdict::ending(specification, &result));
+    let cancelled = verdict::is_cancelled(&result);
+    assert!(!cancelled || ended == crate::Ending::RunFailed);
+    let shown = ShownResult { specification, result: &result, directory: None };
+    for format in [Format::Text, Format::Json] {
+        let mut bytes = Vec::new();
+        let mut output = output::on(format, Box::new(&mut bytes));
+        bounded(json.len(), || output.result(&shown)).unwrap();
+        drop(output);
+        assert!(String::from_utf8(bytes).unwrap().len() < 64 * json.len() + 4096);
     }
 }
 
@@ -56,9 +56,11 @@ fn check_directory(job: &str, json: &str) {
         let same =
             read.is_some_and(|read| job_file::to_toml(&read) == job_file::to_toml(&specification));
         match stored {
-            Ok(stored) => assert!(same && stored.as_deref() == Some(json)),
+            Ok(stored) => assert!(same && stored == ResultFile::from_json(json).ok()),
             Err(failure) => {
-                assert!(!same && failure.exit_code() == 2 && failure.to_string().len() < 4096);
+                let read = ResultFile::from_json(json);
+                assert!(!same || read.is_err() || read.is_ok_and(|read| read.kind() != kind));
+                assert!(failure.exit_code() == 2 && failure.to_string().len() < 4096);
             }
         }
         let _ = bounded(job.len(), || results_directory::job_of(directory.path(), kind));
@@ -82,7 +84,9 @@ fn every_seed_is_shown() {
 fn large_results_take_no_more_than_their_share() {
     let counts: Vec<_> = (0..30_000).map(|i| format!("\"k{i}\": 1")).collect();
     check_result(&format!("{{\"failures\": {{{}}}}}", counts.join(",")));
-    check_result(&format!("{{\"reason\": \"{}\"}}", "x".repeat(400_000)));
+    let reason = format!("{{\"reason\": \"{}\"}}", "x".repeat(400_000));
+    check_result(&reason);
+    check_result(&sample_result::identification(&reason).to_json());
     check_result(&"[".repeat(400_000));
     check_directory(&"\n".repeat(400_000), "");
 }

@@ -22,6 +22,8 @@ mod request;
 mod resolved;
 mod result_files;
 mod results_directory;
+#[cfg(test)]
+mod sample_result;
 mod signals;
 mod simulation_directory;
 mod unsearched_groups;

@@ -8,27 +8,24 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use osteon_common::case::Setup;
-use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::results_json;
+use osteon_common::job::JobSpecification;
+use osteon_common::report::{ResultFile, Solver};
 use osteon_common::sampling::NominalSampling;
 use osteon_proto::v1::{
     BackupEnd, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
 use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure};
-use serde_json::{Value, json};
 
 use crate::resolved::Format;
 
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShownResult<'a> {
-    /// What the job was.
-    pub(crate) kind: JobKind,
-    /// Its specification.
+    /// The specification.
     pub(crate) specification: &'a JobSpecification,
-    /// The text of `result.json`.
-    pub(crate) json: &'a str,
+    /// The result.
+    pub(crate) result: &'a ResultFile,
     /// Where the files are, if they are kept.
     pub(crate) directory: Option<&'a Path>,
 }
@@ -47,18 +44,17 @@ pub(crate) struct ShownSimulation<'a> {
 }
 
 /// The object `solver` of one solved case: the sampling that decided, where it is known.
-fn solver_value(setup: &Setup, arrival: Option<&Arrival>) -> Value {
-    let estimated_error = json!(arrival.map(|arrival| arrival.estimated_error));
-    let mut value =
-        results_json::solver(&setup.solver, NominalSampling::of(setup), estimated_error);
-    if let Some(looks) = arrival.and_then(|arrival| arrival.looks) {
-        value["band"] = json!(looks.last.band);
-        value["period"] = json!(looks.last.period);
-        value["pairs"] = json!(looks.last.pairs);
-        value["pairs_computed"] = json!(looks.pairs_computed);
-        value["looks"] = json!(looks.count);
+fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
+    let error = arrival.map(|arrival| arrival.estimated_error);
+    let mut solver = Solver::new(&setup.solver, NominalSampling::of(setup), error);
+    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, looks, .. }) =
+        (arrival.and_then(|arrival| arrival.looks), &mut solver)
+    {
+        (*band, *period) = (Some(used.last.band), Some(used.last.period));
+        (*pairs, *pairs_computed) = (Some(used.last.pairs), Some(used.pairs_computed));
+        *looks = Some(used.count);
     }
-    value
+    solver
 }
 
 /// One way to print. Every method writes whole lines.

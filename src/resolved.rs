@@ -12,8 +12,8 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
-    DrawArguments, JobsArguments, JobsCommand, RunArguments, SimulateArguments, SubmitArguments,
-    TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    DrawArguments, JobsArguments, JobsCommand, RunArguments, SchemaArguments, SimulateArguments,
+    SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::ending::Failure;
@@ -61,6 +61,8 @@ pub(crate) enum Resolved {
     Certs(CertsArguments),
     /// `token`.
     Token(TokenArguments),
+    /// Print a schema.
+    Schema(SchemaArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -223,6 +225,7 @@ impl Resolved {
             }
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
+            Command::Schema(arguments) => Self::Schema(arguments),
             Command::Submit(arguments) => {
                 let coordinator = remote(arguments.client.clone())?;
                 resolve_submit(arguments, coordinator)?

@@ -13,8 +13,9 @@ use anyhow::{Context as _, anyhow, bail};
 use osteon_common::document::Format;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
+use osteon_common::report::ResultFile;
 use osteon_common::results::{GroupResult, JobResult, Status};
-use osteon_common::{job_file, results_csv, results_json, user_file, visible};
+use osteon_common::{job_file, results_csv, user_file, visible};
 
 use crate::client::Fetched;
 use crate::ending::Failure;
@@ -45,24 +46,17 @@ pub(crate) struct ResultsDirectory {
     _lock: File,
 }
 
-/// The object of `result.json` and `--json`.
-pub(crate) fn result_json(kind: JobKind, fetched: &Fetched) -> String {
-    match kind {
-        JobKind::Identification => results_json::identification(&fetched.result),
-        JobKind::Propagation => results_json::propagation(&fetched.result),
-    }
-}
-
 impl ResultsDirectory {
-    /// The text of `result.json` if `path` holds a result of `specification`, be it that of a
-    /// cancelled job; `None` if there is no run, or one that did not end.
+    /// The result that `path` holds of `specification`, be it that of a cancelled job; `None` if there
+    /// is no run, or one that did not end.
     ///
     /// # Errors
-    /// Bad input when another specification was run there; failed when it cannot be read.
+    /// Bad input when another specification was run there, or the file is no result of it; failed when
+    /// it cannot be read.
     pub(crate) fn stored(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<String>, Failure> {
+    ) -> Result<Option<ResultFile>, Failure> {
         let job = path.join(JOB);
         if path.exists() && !path.is_dir() {
             return Err(Failure::bad_input(anyhow!(
@@ -89,7 +83,17 @@ impl ResultsDirectory {
             }
             None => {}
         }
-        Ok(result)
+        let Some(text) = result else { return Ok(None) };
+        let result = read_result(path, &text).map_err(Failure::BadInput)?;
+        if result.kind() != specification.kind {
+            return Err(Failure::bad_input(anyhow!(
+                "{} is the result of a {}, not of a {}; choose another --out directory",
+                result_path(path),
+                result.kind().name(),
+                specification.kind.name()
+            )));
+        }
+        Ok(Some(result))
     }
 
     /// As [`stored`](Self::stored), of runs only that would end the same way again: what a run
@@ -100,8 +104,8 @@ impl ResultsDirectory {
     pub(crate) fn finished(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<String>, Failure> {
-        Ok(Self::stored(path, specification)?.filter(|json| !verdict::may_end_otherwise(json)))
+    ) -> Result<Option<ResultFile>, Failure> {
+        Ok(Self::stored(path, specification)?.filter(|result| !verdict::may_end_otherwise(result)))
     }
 
     /// Makes the directory, if there is none, and holds it. What was stored there before may
@@ -165,13 +169,13 @@ impl ResultsDirectory {
         result_files::write(&self.path.join(JOB), &text).map_err(Failure::Failed)
     }
 
-    /// Writes all that an ended job left, `result.json` last; its text.
+    /// Writes all that an ended job left, `result.json` last; the result.
     pub(crate) fn write_results(
         &self,
         kind: JobKind,
         fetched: &Fetched,
-    ) -> Result<String, Failure> {
-        let text = result_json(kind, fetched);
+    ) -> Result<ResultFile, Failure> {
+        let written = ResultFile::from_job(kind, &fetched.result);
         let write_all = || -> anyhow::Result<()> {
             let mut files = ResultFiles::begin(&self.path)?;
             files.write(JOB, &job_file::to_toml(&fetched.specification))?;
@@ -188,7 +192,7 @@ impl ResultsDirectory {
             files.write(REALIZATIONS, &realizations(fetched))?;
             let JobResult { program, digest, seed, .. } = &fetched.result;
             let (digest, seed) = (Some(digest.as_str()), Some(*seed));
-            files.finish(&text, &Origin { kind: kind.name(), program, digest, seed })
+            files.finish(&written.to_json(), &Origin { kind: kind.name(), program, digest, seed })
         };
         write_all().map_err(Failure::Failed)?;
         if fetched.result.status != Status::Cancelled {
@@ -196,7 +200,7 @@ impl ResultsDirectory {
             self.forget_request();
             drop(fs::remove_dir_all(self.store()));
         }
-        Ok(text)
+        Ok(written)
     }
 }
 
@@ -296,14 +300,30 @@ pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
     Some(format!("line {}: `{}` there, `{}` here", line + 1, shown(there), shown(here)))
 }
 
-/// The text of `result.json` in `directory`.
+/// The result in `directory`.
 ///
 /// # Errors
 /// When there is none, or it cannot be read.
-pub(crate) fn result_of(directory: &Path) -> anyhow::Result<String> {
-    let path = directory.join(RESULT);
-    let text = read_if_there(&path)?;
-    text.with_context(|| format!("cannot read {}: no such file", visible::path(&path)))
+pub(crate) fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
+    let text = read_if_there(&directory.join(RESULT))?;
+    let cannot = || format!("cannot read {}: no such file", result_path(directory));
+    read_result(directory, &text.with_context(cannot)?)
+}
+
+/// The path of the result in `directory`, for messages.
+pub(crate) fn result_path(directory: &Path) -> String {
+    visible::path(&directory.join(RESULT))
+}
+
+/// The result of a text, or which file is to be replaced.
+fn read_result(directory: &Path, text: &str) -> anyhow::Result<ResultFile> {
+    ResultFile::from_json(text).map_err(|error| {
+        anyhow!(
+            "{} is not the result of a job: {error}; remove the file and run the job again, or choose \
+             another directory",
+            result_path(directory)
+        )
+    })
 }
 
 /// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.

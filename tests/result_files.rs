@@ -282,3 +282,40 @@ fn provenance_tells_of_every_file(runs: &Runs) {
         assert_eq!(listed, there);
     }
 }
+
+/// Editors and programs take the schema from the repository.
+#[test]
+fn the_schema_is_the_committed_one_and_describes_every_key() {
+    let printed = run(&["schema", "result"]);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/result.schema.json");
+    let committed = fs::read_to_string(path).unwrap();
+    let hint = "after a change: cargo run -- schema result > docs/result.schema.json";
+    assert_eq!(printed.succeeded(), committed, "{hint}");
+    let schema: Value = serde_json::from_str(&committed).unwrap();
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+    let mut undescribed = Vec::new();
+    let count = undescribed_keys(&schema, "", &mut undescribed);
+    assert!(count > 100, "only {count} keys were found");
+    assert!(undescribed.is_empty(), "without a description: {undescribed:?}");
+}
+
+/// Counts the keys that a schema names, and lists those that it does not describe.
+fn undescribed_keys(schema: &Value, path: &str, undescribed: &mut Vec<String>) -> usize {
+    let mut count = 0;
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        count += 1;
+        // The kind tells the alternatives apart, and so does the method of a solver.
+        if property.get("description").is_none() && property.get("const").is_none() {
+            undescribed.push(format!("{path}.{name}"));
+        }
+    }
+    let below: Vec<(String, &Value)> = match schema {
+        Value::Object(entries) => entries.iter().map(|(key, value)| (key.clone(), value)).collect(),
+        Value::Array(entries) => entries.iter().map(|value| (String::new(), value)).collect(),
+        _ => Vec::new(),
+    };
+    for (key, value) in below {
+        count += undescribed_keys(value, &format!("{path}/{key}"), undescribed);
+    }
+    count
+}

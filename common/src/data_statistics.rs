@@ -3,6 +3,8 @@
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::job::Sampling;
 use crate::outcome::Outcome;
@@ -47,7 +49,7 @@ pub struct MomentIntervals {
 }
 
 /// Kolmogorov's test of two samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KolmogorovTest {
     /// Largest difference of the empirical distribution functions, 0 to 1.
     pub distance: f64,

@@ -1,5 +1,7 @@
 //! The specification of a job: everything that its result depends on.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Setup;
@@ -174,7 +176,8 @@ impl Range {
 }
 
 /// How realizations are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// Independent germs, one ChaCha stream per realization.
     #[default]
@@ -244,7 +247,8 @@ impl MonteCarlo {
 }
 
 /// What is minimised.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Objective {
     /// The paper's cost: relative squared errors of mean and coefficient of variation.
     #[default]
@@ -267,7 +271,8 @@ impl Objective {
 }
 
 /// How the minimum is searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum SearchMethod {
     /// The Nelder-Mead simplex (the paper's).
     #[default]
@@ -290,7 +295,7 @@ impl SearchMethod {
 }
 
 /// A value that a free parameter is drawn to.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Prior {
     /// The value, within the parameter's bounds, in its unit.
     pub value: f64,

@@ -32,9 +32,10 @@ pub mod quantile;
 pub mod reach;
 mod reader;
 pub mod realization;
+pub mod report;
 pub mod results;
 pub mod results_csv;
-pub mod results_json;
+
 pub mod sampling;
 pub mod settings;
 mod setup_section;

@@ -1,8 +1,14 @@
 //! What became of one realization: a velocity, or a typed failure.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Why a realization has no velocity. The discriminant is the code byte of the digest, of the
 /// wire format and of the store; 0 is success. Codes are never reused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
 #[repr(u8)]
 pub enum FailureKind {
     /// At some receiver no extremum qualifies as the first arrival.

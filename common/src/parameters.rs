@@ -1,11 +1,17 @@
 //! The seven parameters of the identification: the mean model a = (ρ, e_L, ν_L, g_L, e_T, ν_T)
 //! and the dispersion δ (the paper, Sec. 5).
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::elasticity::EngineeringConstants;
 
 /// One of the seven parameters. The order of the variants is the order of the columns of
 /// `history.csv`, of the digest and of every vector of seven numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
 pub enum Parameter {
     /// Mass density ρ of the bone, kg/m³.
     Density,

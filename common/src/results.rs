@@ -1,5 +1,8 @@
 //! What a job leaves: the result and the history of its evaluations.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::data_statistics::{KolmogorovTest, MomentIntervals, moment_intervals};
 use crate::inference::Conclusions;
 use crate::job::{Data, Objective, Sampling, Search};
@@ -10,7 +13,8 @@ use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
 
 /// How a job ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Status {
     /// The search met a tolerance, or the propagation is complete.
     Converged,
@@ -18,7 +22,7 @@ pub enum Status {
     MaxEvaluations,
     /// A user cancelled the job.
     Cancelled,
-    /// It has no result to rely on; [`JobFailure`] says of which kind.
+    /// The job has no result to rely on.
     Failed,
 }
 
@@ -38,8 +42,9 @@ impl Status {
     }
 }
 
-/// Why a job failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The kind of a job's failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum JobFailure {
     /// No point that was evaluated is feasible: too many realizations failed at each, or it has no
     /// cost.
@@ -67,9 +72,9 @@ impl JobFailure {
         }
     }
 
-    /// Whether the cause lies in the machines that the job ran on: another run of the same job may
-    /// end otherwise.
-    pub fn lies_in_machines(self) -> bool {
+    /// Whether the machines that the job ran on caused the failure, so that running the job again may
+    /// succeed.
+    pub fn is_retryable(self) -> bool {
         match self {
             Self::NoFeasiblePoint => false,
             Self::IntegrityError | Self::LostRealization | Self::Store => true,
@@ -155,32 +160,22 @@ pub struct Evaluation {
 }
 
 /// What the best point of a search is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PointMeaning {
     /// Of the points that were evaluated, the one with the least cost.
+    #[serde(rename = "of the points evaluated, the one with the least cost")]
     LeastCost,
     /// Of the points that match the data, the one where the simplex ended.
+    #[serde(rename = "of the points that match the data, the one where the simplex ended")]
     SimplexEnd,
     /// Of the points that match the data, the one nearest to the start.
+    #[serde(rename = "of the points that match the data, the one nearest to the start")]
     NearestToStart,
 }
 
 impl PointMeaning {
     /// Every meaning.
     pub const ALL: [Self; 3] = [Self::LeastCost, Self::SimplexEnd, Self::NearestToStart];
-
-    /// The meaning in words, as in `result.json`.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::LeastCost => "of the points evaluated, the one with the least cost",
-            Self::SimplexEnd => {
-                "of the points that match the data, the one where the simplex ended"
-            }
-            Self::NearestToStart => {
-                "of the points that match the data, the one nearest to the start"
-            }
-        }
-    }
 }
 
 /// What is known of the data of one search.

@@ -1,7 +1,11 @@
 //! How a velocity is picked, and how the waves are computed.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Which extremum of the first arriving packet gives the time of flight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Extremum {
     /// E1, the packet's first extremum (the paper's criterion).
     #[default]
@@ -24,7 +28,7 @@ impl Extremum {
 }
 
 /// The criterion of the first arriving signal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Picking {
     /// Which extremum of the packet.
     pub extremum: Extremum,
@@ -40,7 +44,8 @@ impl Default for Picking {
 }
 
 /// How the transient waves are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Exact layers in (frequency, wavenumber).
     #[default]

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use osteon_common::document::Format;
 use osteon_common::job::JobKind;
-use osteon_common::parameters::Parameter;
-use osteon_common::{case_file, job_file, results_json};
+use osteon_common::report::ResultFile;
+use osteon_common::{case_file, job_file};
 use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties, texts};
 
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
@@ -75,18 +75,15 @@ fn check_velocities(csv: &[u8]) {
 }
 
 fn check_result(text: &str) {
-    match bounded(text.len(), || results_json::best_point(text)) {
-        Ok(point) => {
-            assert!(point.0.iter().all(|number| number.is_finite()), "{point:?}");
-            let number = |parameter: Parameter| point.get(parameter);
-            let parameters: serde_json::Map<_, _> = Parameter::ALL
-                .iter()
-                .map(|&parameter| (parameter.name().to_owned(), number(parameter).into()))
-                .collect();
-            let dispersion = number(Parameter::Dispersion);
-            let written =
-                serde_json::json!({"parameters": parameters, "dispersion": dispersion}).to_string();
-            assert_eq!(results_json::best_point(&written).unwrap(), point);
+    match bounded(text.len(), || ResultFile::from_json(text)) {
+        Ok(result) => {
+            let written = result.to_json();
+            let again = ResultFile::from_json(&written).unwrap();
+            assert_eq!(again.to_json(), written);
+            assert_eq!(again, result);
+            if let Ok(point) = result.best_point(None) {
+                assert!(point.0.iter().all(|number| number.is_finite()), "{point:?}");
+            }
         }
         Err(error) => check_refusal(&error),
     }
@@ -109,8 +106,8 @@ fn some_seeds_are_accepted() {
     assert!(texts("jobs").iter().filter(accepted).count() >= 3);
     let accepted = |text: &&String| case_file::parse(text, Format::Toml).is_ok();
     assert!(texts("cases").iter().filter(accepted).count() >= 3);
-    let accepted = |text: &&String| results_json::best_point(text).is_ok();
-    assert!(texts("results").iter().filter(accepted).count() >= 1);
+    let accepted = |text: &&String| ResultFile::from_json(text).is_ok();
+    assert!(texts("results").iter().filter(accepted).count() >= 4);
 }
 
 /// A file that is large in one way, of about so many bytes.

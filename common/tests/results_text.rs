@@ -14,14 +14,15 @@ use osteon_common::job::{
 };
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::report::{MeanModel, ReadError, ResultFile, Solver};
 use osteon_common::results::{
     BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
     JobResult, Moments, Role, Status,
 };
 use osteon_common::sampling::NominalSampling;
-use osteon_common::settings::{Method, Picking, SolverSettings};
+use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_common::version::Program;
-use osteon_common::{job_file, results_csv, results_json};
+use osteon_common::{job_file, results_csv};
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
@@ -79,6 +80,14 @@ fn result() -> JobResult {
     }
 }
 
+fn identification_text(result: &JobResult) -> String {
+    ResultFile::from_job(JobKind::Identification, result).to_json()
+}
+
+fn propagation_text(result: &JobResult) -> String {
+    ResultFile::from_job(JobKind::Propagation, result).to_json()
+}
+
 /// With every default.
 fn specification() -> JobSpecification {
     let fixed =
@@ -110,7 +119,7 @@ fn identified_by(specification: &JobSpecification, result: &JobResult) -> String
         BestPoint { meaning: Some(meaning(specification, cost)), penalty, ..best }
     });
     let moments = result.data.unwrap().moments;
-    results_json::identification(&JobResult {
+    identification_text(&JobResult {
         data: Some(DataSummary {
             moments,
             ..DataSummary::of(specification.data.as_ref().unwrap(), 0)
@@ -129,6 +138,7 @@ fn identified(result: &JobResult) -> String {
 
 fn check(name: &str, text: &str) {
     assert!(text.ends_with("}\n"));
+    assert_eq!(ResultFile::from_json(text).unwrap().to_json(), text, "{name}");
     // The sampling's numbers are tested where they are chosen.
     let text = (["band", "period", "pairs"]).iter().fold(text.to_owned(), |text, key| {
         let lines = text.lines().map(|line| match line.split_once(&format!("\"{key}\": ")) {
@@ -192,15 +202,16 @@ fn a_likelihood_has_an_error_and_no_tolerance() {
 
 #[test]
 fn propagation() {
-    check("result_propagation", &results_json::propagation(&result()));
-    check("result_propagation_failed", &results_json::propagation(&failed()));
+    check("result_propagation", &propagation_text(&result()));
+    check("result_propagation_failed", &propagation_text(&failed()));
 }
 
 #[test]
 fn the_solver_states_its_method_and_sampling() {
     let keys = |setup: &Setup| -> Vec<String> {
         let nominal = NominalSampling::of(setup);
-        let solver = results_json::solver(&setup.solver, nominal, 2e-5.into());
+        let solver = Solver::new(&setup.solver, nominal, Some(2e-5));
+        let solver = serde_json::to_value(solver).unwrap();
         let numbers = ["refinement", "band", "period", "pairs", "element_size", "estimated_error"];
         for key in numbers.iter().filter(|key| solver.get(key).is_some()) {
             assert!(solver[key].as_f64().unwrap() > 0.0, "{key}: {solver}");
@@ -239,25 +250,88 @@ fn the_best_point_is_read_back_to_the_bit() {
     let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
     for point in [POINT, odd] {
         result.best.as_mut().unwrap().point = point;
-        let read = results_json::best_point(&identified(&result)).unwrap();
+        let read = best_point(&identified(&result)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
-        let read = results_json::best_point(&results_json::propagation(&result)).unwrap();
+        let read = best_point(&propagation_text(&result)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
     }
 }
 
+/// The best point in the text of a result; `None` where there is none.
+fn best_point(text: &str) -> Option<Point> {
+    ResultFile::from_json(text).unwrap().best_point(None).ok()
+}
+
 #[test]
 fn a_result_without_a_point_gives_none() {
+    assert_eq!(best_point(&identified(&failed())), None);
+    assert_eq!(best_point(&propagation_text(&failed())), None);
+    let text = identified(&result());
+    assert_eq!(best_point(&text.replace("\"dispersion\": 0.1029", "\"dispersion\": null")), None);
+}
+
+#[test]
+fn what_is_no_result_is_refused_with_the_key_and_the_line() {
     let check = |text: &str, expected: &str| {
-        let message = results_json::best_point(text).unwrap_err().to_string();
-        assert!(message.starts_with(expected), "{message}");
+        let message = ResultFile::from_json(text).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
     };
     check("", "not valid JSON: EOF");
-    check("[]", "`parameters.density` is missing; it must be a number");
-    check("{\"parameters\": {\"density\": \"a\"}}", "`parameters.density` is a string;");
-    check(&identified(&failed()), "`parameters.density` is null;");
+    check("{\"schema\": 1, \"kind\"", "not valid JSON: EOF");
+    check("[]", "the object: invalid length 0, expected an object with `schema` and `kind`");
+    check("{}", "the object: missing field `schema`");
+    check("{\"schema\": 1, \"kind\": \"simulation\"}", "`kind` is \"simulation\"; it must be");
     let text = identified(&result());
-    check(&text.replace("\"dispersion\"", "\"d\""), "`dispersion` is missing;");
+    let changed = |old: &str, new: &str| {
+        assert!(text.contains(old), "{old}");
+        text.replace(old, new)
+    };
+    let of_density = "`parameters.density`: invalid type: string \"a\", expected f64 at line 9";
+    check(&changed("1598.8", "\"a\""), of_density);
+    check(&changed("\"converged\"", "\"merged\""), "`status`: unknown variant `merged`, expected");
+    check(&changed("\"direct_wave_first\"", "\"late\""), "`failures`: unknown variant `late`");
+    check(&changed("\"seed\"", "\"seeds\""), "missing field `seed`");
+    check(&changed("3906.27", "[]"), "`velocity`: invalid type");
+    let long = "x".repeat(100_000);
+    let message = ResultFile::from_json(&changed("converged", &long)).unwrap_err().to_string();
+    assert!(message.len() < 1000 && message.contains("at line 4"), "{message}");
+}
+
+/// Keys of a later program are no reason to refuse a file, another meaning of keys is.
+#[test]
+fn other_keys_are_tolerated_and_other_schemas_are_refused() {
+    let text = identified(&result());
+    let more = text.replace("\"status\"", "\"later\": {\"a\": [1]},\n  \"status\"");
+    assert_eq!(ResultFile::from_json(&more).unwrap().to_json(), text);
+    let more = text.replace("\"controlled\"", "\"later\": null,\n  \"controlled\"");
+    assert_eq!(ResultFile::from_json(&more).unwrap().to_json(), text);
+    let other = text.replace("\"schema\": 1", "\"schema\": 7");
+    let refused = ResultFile::from_json(&other).unwrap_err();
+    assert!(matches!(refused, ReadError::Schema { found: 7 }));
+    let expected =
+        "`schema` is 7, and this program reads 1; use the version of osteon that wrote it";
+    assert_eq!(refused.to_string(), expected);
+}
+
+#[test]
+fn names_in_files_are_those_of_messages() {
+    fn check<T: Copy + serde::Serialize>(all: &[T], name: impl Fn(T) -> &'static str) {
+        for &one in all {
+            assert_eq!(serde_json::to_value(one).unwrap(), name(one));
+        }
+    }
+    check(&Status::ALL, Status::name);
+    check(&JobFailure::ALL, JobFailure::name);
+    check(&Objective::ALL, Objective::name);
+    check(&SearchMethod::ALL, SearchMethod::name);
+    check(&Sampling::ALL, Sampling::name);
+    check(&Method::ALL, Method::name);
+    check(&Extremum::ALL, Extremum::name);
+    check(&Parameter::ALL, Parameter::name);
+    check(&FailureKind::ALL, FailureKind::name);
+    let model = serde_json::to_value(MeanModel::from(&POINT)).unwrap();
+    let names = Parameter::ALL[..6].iter().map(|parameter| parameter.name());
+    assert!(model.as_object().unwrap().keys().eq(names));
 }
 
 #[test]
@@ -449,11 +523,14 @@ fn the_best_point_of_a_group_is_found_by_its_name() {
     let mut result = JobResult { best: None, data: None, ..result() };
     result.groups =
         vec![group("left", Status::Converged, Some(best)), group("none", Status::Failed, None)];
-    let text = results_json::identification(&result);
-    assert_eq!(results_json::group_names(&text).unwrap(), ["left", "none"]);
-    assert_eq!(results_json::best_point_of_group(&text, "left").unwrap(), POINT);
-    let refused = |name| results_json::best_point_of_group(&text, name).unwrap_err().to_string();
-    assert!(refused("none").starts_with("`parameters.density` is null;"));
+    let text = identification_text(&result);
+    let read = ResultFile::from_json(&text).unwrap();
+    let names: Vec<&str> = read.groups().iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names, ["left", "none"]);
+    assert_eq!(read.best_point(Some("left")).unwrap(), POINT);
+    let refused = |name| read.best_point(Some(name)).unwrap_err().to_string();
+    assert_eq!(refused("none"), "the result has no best point: none was feasible");
     assert_eq!(refused("right"), "there is no group \"right\"; the groups are \"left\", \"none\"");
-    assert!(results_json::group_names(&identified(&failed())).unwrap().is_empty());
+    assert!(ResultFile::from_json(&identified(&failed())).unwrap().groups().is_empty());
+    assert_eq!(read.to_json(), text);
 }

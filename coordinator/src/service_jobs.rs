@@ -8,6 +8,7 @@ use futures::Stream;
 use osteon_common::limits::{
     FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
 };
+use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
     BackupRequest, BackupResponse, CancelRequest, CancelResponse, DrainWorkerRequest,
@@ -290,7 +291,8 @@ fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
         return Err(too_long("job", text));
     }
-    JobId::parse(text).ok_or_else(|| status::no_job(text, format!("no such job: `{text}`")))
+    JobId::parse(text)
+        .ok_or_else(|| status::not_found(Resource::Job, text, format!("no such job: `{text}`")))
 }
 
 fn too_long(field: &str, value: &str) -> Status {
@@ -301,8 +303,10 @@ fn too_long(field: &str, value: &str) -> Status {
 fn refused(refusal: &Refusal) -> Status {
     let message = refusal.to_string();
     match refusal {
-        Refusal::NoJob { job } => status::no_job(job.to_string(), message),
-        Refusal::NoWorker { worker } => status::no_worker(worker.to_string(), message),
+        Refusal::NoJob { job } => status::not_found(Resource::Job, job.to_string(), message),
+        Refusal::NoWorker { worker } => {
+            status::not_found(Resource::Worker, worker.to_string(), message)
+        }
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
             status::resource_exhausted(message, RETRY)

@@ -60,23 +60,38 @@ pub fn bad_field(field: &str, message: &str) -> Status {
     Status::with_error_details(Code::InvalidArgument, format!("{field} {message}"), details)
 }
 
-/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the `job`.
-pub fn no_job(job: impl Into<String>, message: impl Into<String>) -> Status {
+/// Something that a request may name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Resource {
+    /// A job.
+    Job,
+    /// A worker.
+    Worker,
+}
+
+impl Resource {
+    const ALL: [Self; 2] = [Self::Job, Self::Worker];
+
+    /// The type of the resource in a `google.rpc.ResourceInfo`.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Job => "job",
+            Self::Worker => "worker",
+        }
+    }
+}
+
+/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the resource by its `id`.
+pub fn not_found(resource: Resource, id: impl Into<String>, message: impl Into<String>) -> Status {
     let message = message.into();
-    let details = ErrorDetails::with_resource_info("job", job, "", &message);
+    let details = ErrorDetails::with_resource_info(resource.name(), id, "", &message);
     Status::with_error_details(Code::NotFound, message, details)
 }
 
-/// The type of what there is not, `job` or `worker`, if that is what `status` says.
-pub fn missing(status: &Status) -> Option<String> {
-    Some(status.get_details_resource_info()?.resource_type)
-}
-
-/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the `worker`.
-pub fn no_worker(worker: impl Into<String>, message: impl Into<String>) -> Status {
-    let message = message.into();
-    let details = ErrorDetails::with_resource_info("worker", worker, "", &message);
-    Status::with_error_details(Code::NotFound, message, details)
+/// The resource that there is not, if that is what `status` says.
+pub fn missing(status: &Status) -> Option<Resource> {
+    let name = status.get_details_resource_info()?.resource_type;
+    Resource::ALL.into_iter().find(|resource| resource.name() == name)
 }
 
 #[cfg(test)]
@@ -130,7 +145,8 @@ mod tests {
         expected.add("page_token", "is not one that List returned");
         assert_eq!(violations(&status), Some(expected));
 
-        let status = no_job("17", "there is no job 17");
+        let status = not_found(Resource::Job, "17", "there is no job 17");
+        assert_eq!(missing(&status), Some(Resource::Job));
         assert_eq!((status.code(), status.message()), (Code::NotFound, "there is no job 17"));
         let resource = status.get_details_resource_info().unwrap();
         assert_eq!(

@@ -11,13 +11,14 @@ use osteon_common::inference::Conclusions;
 use osteon_common::job::{JobKind, JobSpecification, Sampling};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, Solved};
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::report::ResultFile;
 use osteon_common::results::{
     BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
     JobResult, Moments, PointMeaning, Role, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;
-use osteon_common::{job_file, results_csv, results_json};
+use osteon_common::{job_file, results_csv};
 use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::batch::{self, Work};
 use osteon_proto::v1::fetch_response::Part;
@@ -276,7 +277,8 @@ fn check_result(message: &v1::JobResult) {
     let again = results::from_message(&written, outcomes(), Vec::new()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    for text in [results_json::identification(&result), results_json::propagation(&result)] {
+    for kind in [JobKind::Identification, JobKind::Propagation] {
+        let text = ResultFile::from_job(kind, &result).to_json();
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
 }
@@ -288,7 +290,7 @@ fn check_group(message: &v1::GroupResult) {
     let again = results::group_to_message(message.group, &again);
     assert_eq!(again.encode_to_vec(), written.encode_to_vec());
     let result = JobResult { groups: vec![found], data: None, ..identification().2 };
-    let text = results_json::identification(&result);
+    let text = ResultFile::from_job(JobKind::Identification, &result).to_json();
     serde_json::from_str::<serde_json::Value>(&text).unwrap();
     // A row after the header; a name may have line breaks of its own.
     let (job, history, _) = identification();

@@ -5,7 +5,7 @@ use std::pin::pin;
 use std::time::Duration;
 
 use osteon_proto::endpoint::{ConnectError, Endpoint};
-use osteon_proto::status;
+use osteon_proto::status::{self, Resource};
 use osteon_proto::tls_failure::TlsFailure;
 use tokio::time::timeout;
 use tonic::{Code, Response, Status};
@@ -117,10 +117,10 @@ impl Peer {
 /// Advice to a user of the command line about a refusal, which the coordinator, whose clients are
 /// programs, does not give.
 fn hint(status: &Status) -> &'static str {
-    match status::missing(status).as_deref() {
-        Some("job") => "; `osteon jobs` lists all jobs",
-        Some("worker") => "; `osteon workers` lists all that are attached",
-        _ => "",
+    match status::missing(status) {
+        Some(Resource::Job) => "; `osteon jobs` lists all jobs",
+        Some(Resource::Worker) => "; `osteon workers` lists all that are attached",
+        None => "",
     }
 }
 

@@ -7,7 +7,7 @@ use osteon_common::case::Case;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
-use osteon_common::{case_file, job_file, results_json};
+use osteon_common::{case_file, job_file, report};
 
 use crate::arguments::DrawArguments;
 use crate::ending::{Ending, Failure, stdout_failure};
@@ -77,17 +77,16 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
 
 /// The best point of the result in `directory`, or that of one of its groups.
 fn best_point(directory: &Path, group: Option<&str>) -> anyhow::Result<Point> {
-    let text = results_directory::result_of(directory)?;
-    let read = || {
-        let names = results_json::group_names(&text)?;
-        match group {
-            None if names.is_empty() => Ok(results_json::best_point(&text)?),
-            None => Err(anyhow!(
-                "the result is one of groups; name one of them by --group: {}",
-                results_json::listed(&names)
-            )),
-            Some(name) => Ok(results_json::best_point_of_group(&text, name)?),
-        }
-    };
-    read().with_context(|| directory.join("result.json").display().to_string())
+    let result = results_directory::result_of(directory)?;
+    let groups = result.groups();
+    if group.is_none() && !groups.is_empty() {
+        let names: Vec<String> = groups.iter().map(|group| group.name.clone()).collect();
+        return Err(anyhow!(
+            "{}: the result is one of groups; name one of them by --group: {}",
+            results_directory::result_path(directory),
+            report::listed(&names)
+        ));
+    }
+    let point = result.best_point(group);
+    point.with_context(|| results_directory::result_path(directory))
 }

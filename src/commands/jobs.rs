@@ -5,10 +5,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
+use osteon_common::report::ResultFile;
 use osteon_common::results::Status;
 use osteon_common::{job_file, visible};
 use osteon_proto::v1::JobSnapshot;
-use serde_json::Value;
 use tonic::Code;
 
 use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
@@ -16,7 +16,7 @@ use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::request::Request;
 use crate::resolved::Format;
-use crate::results_directory::{self, ResultsDirectory};
+use crate::results_directory::ResultsDirectory;
 use crate::{unsearched_groups, verdict, warnings};
 
 /// Shortest time between two lines of `watch`.
@@ -127,29 +127,26 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
 
 /// Whether the fetched result takes the place of the one stored in `out`: not if it is the same,
 /// and nothing takes the place of a run that is done.
-fn replaces(fetched: &Fetched, stored: &str, out: &Path) -> Result<bool, Failure> {
+fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, Failure> {
     let specification = &fetched.specification;
-    let new = results_directory::result_json(specification.kind, fetched);
-    let read = |json: &str| serde_json::from_str::<Value>(json).unwrap_or_default();
-    let (there, here) = (read(stored), read(&new));
+    let new = ResultFile::from_job(specification.kind, &fetched.result);
     // The digest is over everything that was computed; another version may have computed it.
-    if ["status", "digest"].iter().all(|key| there[key] == here[key]) {
+    if (stored.status(), stored.digest()) == (new.status(), new.digest()) {
         return Ok(false);
     }
-    let ending = |json: &str| verdict::ending(specification.kind, specification, json);
-    let better = ending(stored) == Ending::RunFailed && !verdict::is_cancelled(&new);
-    if better || verdict::is_cancelled(stored) {
+    let failed = verdict::ending(specification, stored) == Ending::RunFailed;
+    if failed && !verdict::is_cancelled(&new) || verdict::is_cancelled(stored) {
         return Ok(true);
     }
-    let shown = |value: &Value| {
-        let text = |key: &str| value[key].as_str().unwrap_or_default().to_owned();
-        format!("{} digest {}", text("status"), text("digest")).trim_start().to_owned()
+    let shown = |result: &ResultFile| {
+        let status = result.status().map_or("", Status::name);
+        format!("{status} digest {}", result.digest()).trim_start().to_owned()
     };
     Err(Failure::bad_input(anyhow!(
         "{} holds another result of this job ({} there, {} fetched); choose another --out directory",
         out.display(),
-        shown(&there),
-        shown(&here)
+        shown(stored),
+        shown(&new)
     )))
 }
 

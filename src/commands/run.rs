@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
+use osteon_common::report::ResultFile;
 use osteon_common::results::Status;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
@@ -19,7 +20,7 @@ use crate::output::{self, ShownResult};
 use crate::progress::{Progress, say};
 use crate::request::Request;
 use crate::resolved::{Place, Run};
-use crate::results_directory::{self, ResultsDirectory};
+use crate::results_directory::ResultsDirectory;
 use crate::signals;
 use crate::{unsearched_groups, verdict, warnings};
 
@@ -27,8 +28,8 @@ use crate::{unsearched_groups, verdict, warnings};
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let noted = job_file::read_noting(&run.job, run.kind).map_err(Failure::bad_input)?;
     let specification = &noted.specification;
-    if let Some(json) = finished(&run, specification)? {
-        return show(&run, specification, &json);
+    if let Some(result) = finished(&run, specification)? {
+        return show(&run, specification, &result);
     }
     if let Some(reason) = failed_before(&run, specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
@@ -49,8 +50,8 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
     // Another run may have ended between the look and the lock.
-    if let Some(json) = finished(&run, specification)? {
-        return show(&run, specification, &json);
+    if let Some(result) = finished(&run, specification)? {
+        return show(&run, specification, &result);
     }
     let fetched = match computers {
         Computers::Here { workers, threads } => {
@@ -62,8 +63,8 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
             there(*client, job, directory.as_ref(), interruption).await?
         }
     };
-    let json = keep(run.kind, &fetched, directory.as_ref())?;
-    show(&run, specification, &json)
+    let result = keep(run.kind, &fetched, directory.as_ref())?;
+    show(&run, specification, &result)
 }
 
 /// A job, and what people call it.
@@ -91,7 +92,7 @@ impl Computers {
     }
 }
 
-fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<String>, Failure> {
+fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<ResultFile>, Failure> {
     match &run.out {
         Some(path) => ResultsDirectory::finished(path, specification),
         None => Ok(None),
@@ -104,15 +105,15 @@ fn failed_before(run: &Run, specification: &JobSpecification) -> Result<Option<S
         Some(path) => ResultsDirectory::stored(path, specification)?,
         None => None,
     };
-    Ok(stored.and_then(|json| verdict::machine_failure(&json)))
+    Ok(stored.as_ref().and_then(verdict::machine_failure).map(str::to_owned))
 }
 
-/// Writes what an ended job left, if there is a directory for it; the text of the result.
+/// Writes what an ended job left, if there is a directory for it; the result.
 fn keep(
     kind: JobKind,
     fetched: &Fetched,
     directory: Option<&ResultsDirectory>,
-) -> Result<String, Failure> {
+) -> Result<ResultFile, Failure> {
     let missing = verdict::missing_result(fetched);
     if let Some(directory) = directory
         && (missing.is_some() || fetched.result.status == Status::Cancelled)
@@ -125,14 +126,18 @@ fn keep(
     }
     match directory {
         Some(directory) => directory.write_results(kind, fetched),
-        None => Ok(results_directory::result_json(kind, fetched)),
+        None => Ok(ResultFile::from_job(kind, &fetched.result)),
     }
 }
 
-fn show(run: &Run, specification: &JobSpecification, json: &str) -> Result<Ending, Failure> {
-    let shown = ShownResult { kind: run.kind, specification, json, directory: run.out.as_deref() };
+fn show(
+    run: &Run,
+    specification: &JobSpecification,
+    result: &ResultFile,
+) -> Result<Ending, Failure> {
+    let shown = ShownResult { specification, result, directory: run.out.as_deref() };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
-    Ok(verdict::ending(run.kind, specification, json))
+    Ok(verdict::ending(specification, result))
 }
 
 /// The job on worker processes of this one.

@@ -3,15 +3,16 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use osteon_common::results_json;
+use osteon_common::report::{CheckedSolution, Receiver, Simulation};
+use osteon_common::version::Program;
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, DepartedWorker, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
 use osteon_solver::check::{Difference, Solution};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
-use super::{Output, ShownResult, ShownSimulation, solver_value};
+use super::{Output, ShownResult, ShownSimulation, solver_of};
 use crate::output::text::operators::standing_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
@@ -34,12 +35,12 @@ impl<'a> JsonOutput<'a> {
 }
 
 impl Output for JsonOutput<'_> {
-    fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()> {
-        self.verbatim(result.json)
+    fn result(&mut self, shown: &ShownResult<'_>) -> io::Result<()> {
+        self.verbatim(&shown.result.to_json())
     }
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
-        self.value(&simulation_value(simulation))
+        self.verbatim(&self::simulation(simulation))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
@@ -92,44 +93,41 @@ impl Output for JsonOutput<'_> {
     }
 }
 
-/// The object of a simulation.
-fn simulation_value(simulation: &ShownSimulation<'_>) -> Value {
-    let ShownSimulation { setup, arrival, .. } = *simulation;
-    let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
-        let time = arrival.as_ref().ok().and_then(|arrival| arrival.times.get(j));
-        json!({ "x1": x1, "time": time })
-    });
-    let mut object = Map::new();
-    let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
-    results_json::head(&mut put, "simulation");
-    put("velocity", json!(arrival.as_ref().ok().map(|arrival| arrival.velocity)));
-    put("failure", json!(arrival.as_ref().err().map(|failure| failure.kind.name())));
-    put("detail", json!(arrival.as_ref().err().map(|failure| failure.detail.as_str())));
-    put("receivers", receivers.collect());
-    put("picking", results_json::picking(&setup.picking));
-    put("solver", solver_value(setup, arrival.as_ref().ok()));
-    if let Some(check) = simulation.check {
-        put("check", check.solutions().into_iter().map(solution_value).collect());
-    }
-    results_json::program(&mut put, &program::this());
-    Value::Object(object)
-}
-
 /// The text of the object of a simulation, with a final newline.
 pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
-    format!("{:#}\n", simulation_value(simulation))
+    let ShownSimulation { setup, arrival, check, .. } = *simulation;
+    let Program { version, numerics, commit } = program::this();
+    let (found, failed) = (arrival.as_ref().ok(), arrival.as_ref().err());
+    let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
+        let time = found.and_then(|arrival| arrival.times.get(j).copied());
+        Receiver { x1, time }
+    });
+    let written = Simulation {
+        velocity: found.map(|arrival| arrival.velocity),
+        failure: failed.map(|failure| failure.kind),
+        detail: failed.map(|failure| failure.detail.clone()),
+        receivers: receivers.collect(),
+        picking: setup.picking,
+        solver: solver_of(setup, found),
+        check: check.map(|check| check.solutions().into_iter().map(checked).collect()),
+        version,
+        numerics,
+        commit,
+    };
+    written.to_json()
 }
 
-/// The object `solver` of one solution, with what came out and how it differs from the refined one.
-fn solution_value(solution: &Solution) -> Value {
+/// One solution, with what came out and how it differs from the refined one.
+fn checked(solution: &Solution) -> CheckedSolution {
     let arrival = solution.arrival.as_ref();
-    let mut value = solver_value(&solution.setup, arrival.ok());
-    value["velocity"] = json!(arrival.ok().map(|arrival| arrival.velocity));
-    value["failure"] = json!(arrival.err().map(|failure| failure.kind.name()));
-    value["same_pick"] = json!(solution.difference != Difference::Picks);
-    value["time_difference"] = json!(solution.difference.time());
-    value["relative_difference"] = json!(solution.difference.velocity());
-    value
+    CheckedSolution {
+        solver: solver_of(&solution.setup, arrival.ok()),
+        velocity: arrival.ok().map(|arrival| arrival.velocity),
+        failure: arrival.err().map(|failure| failure.kind),
+        same_pick: solution.difference != Difference::Picks,
+        time_difference: solution.difference.time(),
+        relative_difference: solution.difference.velocity(),
+    }
 }
 
 fn expelled_value(worker: &ExpelledWorker) -> Value {

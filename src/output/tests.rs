@@ -1,5 +1,5 @@
 use osteon_common::document::Format as FileFormat;
-use osteon_common::job::{Objective, Search, SearchMethod};
+use osteon_common::job::{JobKind, Objective, Search, SearchMethod};
 use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
@@ -9,6 +9,7 @@ use osteon_solver::check::{Difference, Solution};
 use osteon_solver::{Looks, Sampled};
 
 use super::*;
+use crate::sample_result::{identification, propagation};
 
 fn printed(format: Format, print: impl FnOnce(&mut dyn Output)) -> String {
     let mut bytes = Vec::new();
@@ -66,8 +67,12 @@ const RESULT: &str = r#"{
 fn shown(kind: JobKind, free: &[&str], json: &str) -> String {
     let specification = specification(kind, free);
     let directory = Some(Path::new("results"));
-    let result = ShownResult { kind, specification: &specification, json, directory };
-    printed(Format::Text, |output| output.result(&result).unwrap())
+    let result = match kind {
+        JobKind::Identification => identification(json),
+        JobKind::Propagation => propagation(json),
+    };
+    let shown = ShownResult { specification: &specification, result: &result, directory };
+    printed(Format::Text, |output| output.result(&shown).unwrap())
 }
 
 #[test]
@@ -97,9 +102,9 @@ fn a_search_for_the_nearest_point_says_so() {
     let mut specification = specification(JobKind::Identification, &free);
     specification.search = Search { cost_tolerance: 1e-10, ..Search::by(SearchMethod::Newton) };
     let shown = |json: &str| {
-        let kind = JobKind::Identification;
-        let result = ShownResult { kind, specification: &specification, json, directory: None };
-        printed(Format::Text, |output| output.result(&result).unwrap())
+        let result = &identification(json);
+        let shown = ShownResult { specification: &specification, result, directory: None };
+        printed(Format::Text, |output| output.result(&shown).unwrap())
     };
     let nearest = "this is the one nearest to the start";
     let text = unwrapped(&shown(RESULT));
@@ -124,10 +129,9 @@ fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
     let mut specification = specification(JobKind::Identification, &free);
     specification.objective = Objective::Likelihood;
-    let json = detailed();
-    let kind = JobKind::Identification;
-    let result = ShownResult { kind, specification: &specification, json: &json, directory: None };
-    insta::assert_snapshot!(printed(Format::Text, |output| output.result(&result).unwrap()));
+    let result = &identification(&detailed());
+    let shown = ShownResult { specification: &specification, result, directory: None };
+    insta::assert_snapshot!(printed(Format::Text, |output| output.result(&shown).unwrap()));
 }
 
 /// `RESULT` of a likelihood, with intervals of the data, a test, and what failures may have done.
@@ -236,19 +240,21 @@ fn identified(matched: bool) -> String {
         "bulk_velocity": quantity(known(3964.41, 2.0311)),
         "dispersion": quantity(known(0.1029, 0.00412)),
         "parameters": { "density": null, "dispersion": null },
+        "directions": [],
         "free_directions": [{ "density": 1.0 }],
     });
     let point = |density: f64, cost: f64| {
         let mut point = serde_json::json!({ "parameters": value["parameters"], "dispersion": 0.1,
-            "cost": cost });
+            "cost": cost, "start": 0, "evaluations": 100 });
         point["parameters"]["density"] = density.into();
         point
     };
     // √(c1111/ρ) is 3960.13 m/s at 1598.8 kg/m³, and falls with the root of the density.
     let points = [point(1598.8, 1e-13), point(1700.0, 1e-12), point(1900.0, 1e-3)];
-    let spread = serde_json::json!({ "density": { "smallest": 1598.8, "largest": 1700.0 } });
+    let spread = serde_json::json!({
+        "density": { "smallest": 1598.8, "largest": 1700.0, "mean": 1650.0 } });
     value["solutions"] = serde_json::json!({
-        "matching": 2, "spread": { "parameters": spread }, "points": points });
+        "matching": 2, "spread": { "parameters": spread, "mandel": {} }, "points": points });
     value["search"] = serde_json::json!({ "cost_tolerance": 1e-10, "below_noise_from": 17 });
     value["sensitivities"] = serde_json::json!({ "density": {}, "dispersion": {} });
     value.to_string()
@@ -338,13 +344,10 @@ fn a_propagation_shows_moments() {
 #[test]
 fn json_is_what_stands_in_the_file() {
     let specification = specification(JobKind::Identification, &["dispersion"]);
-    let result = ShownResult {
-        kind: JobKind::Identification,
-        specification: &specification,
-        json: RESULT,
-        directory: None,
-    };
-    assert_eq!(printed(Format::Json, |output| output.result(&result).unwrap()), RESULT);
+    let file = include_str!("../../fuzz/corpus/results/identification.json");
+    let result = &identification(file);
+    let shown = ShownResult { specification: &specification, result, directory: None };
+    assert_eq!(printed(Format::Json, |output| output.result(&shown).unwrap()), file);
 }
 
 fn arrival() -> Arrival {
@@ -370,7 +373,7 @@ fn simulation(format: Format, arrival: &Result<Arrival, Failure>, check: Option<
     let shown =
         ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
     // Each build has its own.
-    let commit = format!("\"commit\": {}", json!(crate::program::COMMIT));
+    let commit = format!("\"commit\": {}", serde_json::json!(crate::program::COMMIT));
     printed(format, |output| output.simulation(&shown).unwrap())
         .replace(&commit, "\"commit\": \"(of the build)\"")
 }
@@ -559,14 +562,13 @@ fn what_others_say_is_shown_without_hidden_characters() {
         ..JobSnapshot::default()
     }];
     let specification = specification(JobKind::Identification, &["dispersion"]);
-    let reason = format!("\"failed\", \"reason\": {}", json!(hostile));
+    let reason = format!("\"failed\", \"reason\": {}", serde_json::json!(hostile));
     let json = RESULT.replace("\"converged\"", &reason);
     assert_ne!(json, RESULT);
     let directory = Path::new(hostile);
     let result = ShownResult {
-        kind: JobKind::Identification,
         specification: &specification,
-        json: &json,
+        result: &identification(&json),
         directory: Some(directory),
     };
     let print = |format: Format| {

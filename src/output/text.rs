@@ -20,7 +20,7 @@ use osteon_proto::v1::{
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
 use self::number::{VELOCITY_DIGITS, digits, significant};
-use super::{Output, ShownResult, ShownSimulation, solver_value};
+use super::{Output, ShownResult, ShownSimulation, solver_of};
 use crate::client;
 use crate::progress::{Observed, line, span};
 
@@ -172,8 +172,8 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
             text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
         }
     }
-    let solver = solver_value(simulation.setup, simulation.arrival.as_ref().ok());
-    text.push_str(&format!("\n{}", wrapped(&solver::line(&solver))));
+    let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
+    text.push_str(&format!("\n{}", wrapped(&solver::line_of_one(&solver))));
     if let Some(check) = simulation.check {
         text.push_str(&format!("\n{}", check::table(check)));
     }

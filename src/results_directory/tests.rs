@@ -57,13 +57,13 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let directory = ResultsDirectory::open(&path).unwrap();
         let request = directory.request().unwrap();
         fs::create_dir(directory.store()).unwrap();
-        let text = directory.write_results(JobKind::Identification, &fetched(status)).unwrap();
+        let written = directory.write_results(JobKind::Identification, &fetched(status)).unwrap();
 
         let ended = status != Status::Cancelled;
         let finished = ResultsDirectory::finished(&path, &specification()).unwrap();
-        assert_eq!(finished.as_ref(), ended.then_some(&text), "{status:?}");
+        assert_eq!(finished.as_ref(), ended.then_some(&written), "{status:?}");
         let stored = ResultsDirectory::stored(&path, &specification()).unwrap();
-        assert_eq!(stored, Some(text), "{status:?}");
+        assert_eq!(stored, Some(written), "{status:?}");
         assert_eq!(directory.store().exists(), !ended, "{status:?}");
         assert_eq!(directory.request().unwrap() == request, !ended, "{status:?}");
         directory.forget_request();
@@ -76,14 +76,39 @@ fn a_directory_belongs_to_one_specification() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
     let specification = specification();
-    let text =
+    let written =
         directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
     let stored = |specification| ResultsDirectory::stored(scratch.path(), specification);
-    assert_eq!(stored(&specification).unwrap(), Some(text));
+    assert_eq!(stored(&specification).unwrap(), Some(written));
     let mut other = specification.clone();
     other.monte_carlo.control_variate = true;
     let refusal = stored(&other).unwrap_err().to_string();
     assert!(refusal.contains("`control_variate = true` here"), "{refusal}");
+}
+
+#[test]
+fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
+    let scratch = tempfile::tempdir().unwrap();
+    let directory = ResultsDirectory::open(scratch.path()).unwrap();
+    directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    let path = scratch.path().join(RESULT);
+    let text = fs::read_to_string(&path).unwrap();
+    let refused = |text: String| {
+        fs::write(&path, text).unwrap();
+        let failure = ResultsDirectory::stored(scratch.path(), &specification()).unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        failure.to_string()
+    };
+    let refusal = refused(text.replace("\"seed\": 1", "\"seed\": -1"));
+    for part in ["result.json", "`seed`: invalid value", "line", "remove the file", "directory"] {
+        assert!(refusal.contains(part), "{refusal}");
+    }
+    let refusal = refused(text.replace("\"schema\": 1", "\"schema\": 2"));
+    assert!(refusal.contains("`schema` is 2, and this program reads 1"), "{refusal}");
+    let kind = text.replace("\"kind\": \"identification\"", "\"kind\": \"propagation\"");
+    let refusal = refused(kind);
+    let expected = "is the result of a propagation, not of a identification";
+    assert!(refusal.contains(expected), "{refusal}");
 }
 
 #[test]

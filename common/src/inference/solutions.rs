@@ -1,5 +1,8 @@
 //! The answers of searches from several starts: a sample of what matches the data equally well.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::is_of;
 use crate::elasticity::Elasticity;
 use crate::parameters::{Parameter, Point};
@@ -19,7 +22,7 @@ pub struct Solution {
 }
 
 /// Smallest, largest and mean value of something over solutions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spread {
     /// Smallest.
     pub smallest: f64,

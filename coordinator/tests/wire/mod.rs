@@ -1,8 +1,11 @@
 //! What a client that knows nothing but the wire gets of an identification.
 
+use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
+use osteon_common::report::ResultFile;
 use osteon_common::results::JobResult;
-use osteon_common::{results_csv, results_json};
+use osteon_common::results_csv;
+
 use osteon_proto::v1::{GroupResult, HistoryBlock, JobResult as ResultMessage};
 
 use super::*;
@@ -72,7 +75,9 @@ async fn a_result_needs_no_more_than_the_wire() {
             "grouped" => include_str!("grouped.json"),
             other => panic!("{other} has no file"),
         };
-        assert_eq!(results_json::identification(&result), expected, "{name}");
+        let written = ResultFile::from_job(JobKind::Identification, &result).to_json();
+        assert_eq!(written, expected, "{name}");
+        assert_eq!(ResultFile::from_json(expected).unwrap().to_json(), expected, "{name}");
         if name == "grouped" {
             let rows = parts.history.iter().flat_map(|block| &block.rows);
             let history: Vec<_> =

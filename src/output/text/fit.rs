@@ -2,13 +2,13 @@
 
 use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::report::{Data, Identification, Moment};
 use osteon_search::search_box::{SearchBox, Side};
-use serde_json::Value;
 
 use super::identified;
 use super::layout::{glued, wrapped};
 use super::number::{DIGITS, digits, significant};
-use super::result::{by_likelihood, readable};
+use super::result::readable;
 
 /// Standard errors that a moment of the model may be off, as where intervals are computed.
 const ERRORS_MAX: f64 = 3.0;
@@ -17,46 +17,52 @@ const EXACT: f64 = 1e-4;
 
 /// Whether the model at the best point fits the data: what the derivatives said, or else what cost
 /// and moments say.
-pub(super) fn fits(value: &Value, specification: &JobSpecification) -> bool {
-    if let Some(matched) = value["identified"]["matched"].as_bool() {
-        return matched;
+pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> bool {
+    if let Some(identified) = found.identified() {
+        return identified.matched;
     }
-    is_reached(value, specification)
-        || ["mean", "coefficient_of_variation"].iter().all(|key| is_within_noise(value, key))
+    is_reached(found, specification)
+        || Moment::ALL.into_iter().all(|moment| is_within_noise(found, moment))
 }
 
 /// Whether the search came to the cost that it was asked for.
-fn is_reached(value: &Value, specification: &JobSpecification) -> bool {
-    let cost = value["cost"].as_f64().unwrap_or(f64::INFINITY);
-    !by_likelihood(value) && cost <= specification.search.cost_tolerance
+fn is_reached(found: &Identification, specification: &JobSpecification) -> bool {
+    let cost = found.cost.unwrap_or(f64::INFINITY);
+    found.objective != Objective::Likelihood && cost <= specification.search.cost_tolerance
 }
 
 /// Whether a moment of the model is within the noise of both.
-fn is_within_noise(value: &Value, key: &str) -> bool {
-    let Some(difference) = difference(value, key) else { return false };
-    let relative = |error: f64, moment: &Value| error / moment.as_f64().unwrap_or(f64::NAN);
-    let of_model = value["velocity"]["standard_error"][key].as_f64().unwrap_or(0.0);
+fn is_within_noise(found: &Identification, moment: Moment) -> bool {
+    let Some(difference) = difference(found, moment) else { return false };
+    let relative = |error: f64, moment: Option<f64>| error / moment.unwrap_or(f64::NAN);
+    let of_model = found.velocity.standard_error.get(moment).unwrap_or(0.0);
+    let data = found.data.as_ref();
     // An interval of 95 % reaches two standard errors to each side.
-    let ends = &value["data"]["interval"][key];
-    let of_data = match (ends[0].as_f64(), ends[1].as_f64()) {
-        (Some(low), Some(high)) => (high - low) / 4.0,
-        _ => 0.0,
-    };
-    let errors =
-        [relative(of_model, &value["velocity"][key]), relative(of_data, &value["data"][key])];
+    let of_data = data.and_then(Data::intervals).map_or(0.0, |intervals| {
+        let [low, high] = intervals.get(moment);
+        (high - low) / 4.0
+    });
+    let errors = [
+        relative(of_model, found.velocity.moments.get(moment)),
+        relative(of_data, data.and_then(|data| data.moments.get(moment))),
+    ];
     let noise = errors[0].hypot(errors[1]);
     difference.abs() <= (ERRORS_MAX * noise).max(EXACT)
 }
 
 /// How far a moment of the model is above that of the data, relative.
-fn difference(value: &Value, key: &str) -> Option<f64> {
-    Some(value["velocity"][key].as_f64()? / value["data"][key].as_f64()? - 1.0)
+fn difference(found: &Identification, moment: Moment) -> Option<f64> {
+    Some(found.velocity.moments.get(moment)? / found.data.as_ref()?.moments.get(moment)? - 1.0)
 }
 
 /// That the model misses the data, by how much, and which parameters it ran into.
-pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecification) -> String {
-    let off = |key: &str| {
-        let difference = difference(value, key)?;
+pub(super) fn misfit(
+    found: &Identification,
+    point: &Point,
+    specification: &JobSpecification,
+) -> String {
+    let off = |moment: Moment| {
+        let difference = difference(found, moment)?;
         // Of other units than the model's, say.
         if !(-0.5..=1.0).contains(&difference) {
             return Some(format!("{} times the data's", digits(1.0 + difference, 2)));
@@ -66,7 +72,7 @@ pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecificat
         Some(format!("{percent} {side} the data's"))
     };
     let mut text = "The model does not fit the data, so no intervals can be given.".to_owned();
-    if let (Some(mean), Some(variation)) = (off("mean"), off("coefficient_of_variation")) {
+    if let [Some(mean), Some(variation)] = Moment::ALL.map(off) {
         text.push_str(&format!(
             " Its mean velocity is {mean}, its coefficient of variation {variation}."
         ));
@@ -86,14 +92,18 @@ pub(super) fn misfit(value: &Value, point: &Point, specification: &JobSpecificat
 }
 
 /// Which of the found numbers the data determine, and what the others are, for a model that fits.
-pub(super) fn uniqueness(value: &Value, point: &Point, specification: &JobSpecification) -> String {
+pub(super) fn uniqueness(
+    found: &Identification,
+    point: &Point,
+    specification: &JobSpecification,
+) -> String {
     let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
     let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
     let dispersion = free(Parameter::Dispersion);
     let Ok(elasticity) = point.constants().elasticity() else { return String::new() };
     let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
     let speed = glued(&format!("√(c1111/ρ) = {} m/s", digits(speed, DIGITS)));
-    let shown_below = identified::has_intervals(value);
+    let shown_below = identified::has_intervals(found);
     if searched - usize::from(dispersion) < 2 {
         return if shown_below {
             String::new()
@@ -108,7 +118,7 @@ pub(super) fn uniqueness(value: &Value, point: &Point, specification: &JobSpecif
     let constrained =
         if dispersion { "√(c1111/ρ) and the dispersion are" } else { "√(c1111/ρ) is" };
     let nearest =
-        is_reached(value, specification) && specification.search.method == SearchMethod::Newton;
+        is_reached(found, specification) && specification.search.method == SearchMethod::Newton;
     let this = if nearest {
         "many other parameter sets fit equally well, and this is the one nearest to the start \
          (distances in units of the bounds)."

@@ -1,8 +1,9 @@
-//! The tables of groups, made from the text of `result.json`: one below the other, so that each is
-//! narrow, then why a group has no result or no intervals.
+//! The tables of groups: one below the other, so that each is narrow, then why a group has no result
+//! or no intervals.
 
 use osteon_common::parameters::Parameter;
-use serde_json::Value;
+use osteon_common::report::{Data, Group, Moment, QuantityEstimate};
+use osteon_common::results::Status;
 
 use super::result::scale;
 use super::{aligned, significant};
@@ -20,15 +21,19 @@ struct Cell {
 }
 
 /// The tables, after the beginning of a line.
-pub(super) fn table(groups: &[Value]) -> String {
+pub(super) fn table(groups: &[Group]) -> String {
     let mut text = "\n".to_owned();
     let measured = [
-        data(groups, "mean", "DATA: MEAN VELOCITY (m/s)"),
-        data(groups, "coefficient_of_variation", "COEFFICIENT OF VARIATION"),
+        data(groups, Moment::Mean, "DATA: MEAN VELOCITY (m/s)"),
+        data(groups, Moment::CoefficientOfVariation, "COEFFICIENT OF VARIATION"),
     ];
     let identified = [
-        quantities(groups, "√(c1111/ρ) (m/s)", 1.0, |group| &group["identified"]["bulk_velocity"]),
-        quantities(groups, "DISPERSION", 1.0, |group| &group["identified"]["dispersion"]),
+        quantities(groups, "√(c1111/ρ) (m/s)", 1.0, |group| {
+            group.identified.as_ref().map(|known| known.bulk_velocity)
+        }),
+        quantities(groups, "DISPERSION", 1.0, |group| {
+            group.identified.as_ref().map(|known| known.dispersion)
+        }),
     ];
     text.push_str(&overview(groups));
     text.push_str(&side_by_side(groups, measured));
@@ -47,87 +52,81 @@ pub(super) fn table(groups: &[Value]) -> String {
     text
 }
 
-fn overview(groups: &[Value]) -> String {
+fn overview(groups: &[Group]) -> String {
     let mut rows = vec![["GROUP", "VELOCITIES", "STATUS", "COST"].map(str::to_owned)];
     for group in groups {
         let mark = if note(group).is_some() { " *" } else { "" };
-        let status = group["status"].as_str().unwrap_or_default();
-        let cost = group["cost"].as_f64().map(|cost| significant(cost, 3));
+        let cost = group.cost.map(|cost| significant(cost, 3));
+        let count = group.data.count.flatten().map(|count| count.to_string());
         rows.push([
-            name(group),
-            group["data"]["count"].to_string(),
-            format!("{status}{mark}"),
+            group.name.clone(),
+            count.unwrap_or_default(),
+            format!("{}{mark}", group.status.name()),
             cost.unwrap_or_default(),
         ]);
     }
     format!("\n{}", aligned(&rows))
 }
 
-fn side_by_side(groups: &[Value], columns: [Column; 2]) -> String {
+fn side_by_side(groups: &[Group], columns: [Column; 2]) -> String {
     let mut rows =
         vec![["GROUP".to_owned(), columns[0].heading.clone(), columns[1].heading.clone()]];
     let [first, second] = columns.map(|column| shown(&column.cells));
     for (at, group) in groups.iter().enumerate() {
         let cell = |cells: &[String]| cells.get(at).cloned().unwrap_or_default();
-        rows.push([name(group), cell(&first), cell(&second)]);
+        rows.push([group.name.clone(), cell(&first), cell(&second)]);
     }
     format!("\n{}", aligned(&rows))
 }
 
-fn name(group: &Value) -> String {
-    group["name"].as_str().unwrap_or_default().to_owned()
-}
-
 /// A moment of the data of each group.
-fn data(groups: &[Value], key: &str, heading: &str) -> Column {
-    let cell = |group: &Value| Cell {
-        value: group["data"][key].as_f64(),
-        ends: ends(&group["data"]["interval"][key], 1.0),
+fn data(groups: &[Group], moment: Moment, heading: &str) -> Column {
+    let cell = |Group { data, .. }: &Group| Cell {
+        value: data.moments.get(moment),
+        ends: Data::intervals(data).map(|intervals| intervals.get(moment)),
     };
     Column { heading: heading.to_owned(), cells: groups.iter().map(cell).collect() }
 }
 
 /// A quantity that the data say something of, for each group, in a readable unit.
-fn quantities<'a>(
-    groups: &'a [Value],
+fn quantities(
+    groups: &[Group],
     heading: &str,
     scale: f64,
-    of: impl Fn(&'a Value) -> &'a Value,
+    of: impl Fn(&Group) -> Option<QuantityEstimate>,
 ) -> Column {
     let cell = |group| {
         let quantity = of(group);
-        let value = quantity["value"].as_f64().map(|value| value * scale);
-        Cell { value, ends: ends(&quantity["interval"], scale) }
+        let ends = quantity.and_then(|quantity| quantity.ends());
+        Cell {
+            value: quantity.and_then(|quantity| quantity.value).map(|value| value * scale),
+            ends: ends.map(|ends| ends.map(|end| end * scale)),
+        }
     };
     Column { heading: heading.to_owned(), cells: groups.iter().map(cell).collect() }
 }
 
-fn of_parameter(groups: &[Value], parameter: Parameter) -> Column {
+fn of_parameter(groups: &[Group], parameter: Parameter) -> Column {
     let (scale, unit) = scale(parameter);
     let heading = parameter.name().replace('_', " ").to_uppercase();
     let unit = unit.trim();
     let heading = if unit.is_empty() { heading } else { format!("{heading} ({unit})") };
-    let of = |group| &value(group, "parameters")[parameter.name()];
-    quantities(groups, &heading, scale, of)
+    quantities(groups, &heading, scale, |group| known(group, parameter))
 }
 
-fn value<'a>(group: &'a Value, key: &str) -> &'a Value {
-    &group["identified"][key]
+/// What the data of a group say of a parameter.
+fn known(group: &Group, parameter: Parameter) -> Option<QuantityEstimate> {
+    *group.identified.as_ref()?.parameters.get(&parameter)?
 }
 
 /// The free parameters of the mean model that the data of some group fix.
-fn known_parameters(groups: &[Value]) -> Vec<Parameter> {
-    let known = |parameter: &Parameter| {
-        let of = |group| value(group, "parameters")[parameter.name()]["interval"].is_array();
+fn known_parameters(groups: &[Group]) -> Vec<Parameter> {
+    let is_known = |parameter: &Parameter| {
+        let of = |group| known(group, *parameter).is_some_and(|found| found.interval.is_some());
         groups.iter().any(of)
     };
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
-    elastic.filter(known).collect()
-}
-
-fn ends(interval: &Value, scale: f64) -> Option<[f64; 2]> {
-    let end = |at: usize| interval[at].as_f64().map(|end| end * scale);
-    Some([end(0)?, end(1)?])
+    elastic.filter(is_known).collect()
 }
 
 /// The cells of a column, all with the decimals of its narrowest interval: two digits of half of it.
@@ -153,12 +152,12 @@ fn shown(cells: &[Cell]) -> Vec<String> {
 }
 
 /// Why a group has no result, or no intervals.
-fn note(group: &Value) -> Option<String> {
-    let reason = group["reason"].as_str().and_then(|reason| reason.lines().next());
-    let unmatched = group["identified"]["matched"] == false;
-    match (reason, group["status"].as_str()) {
+fn note(group: &Group) -> Option<String> {
+    let reason = group.reason.as_deref().and_then(|reason| reason.lines().next());
+    let unmatched = group.identified.as_ref().is_some_and(|known| !known.matched);
+    match (reason, group.status) {
         (Some(reason), _) => Some(reason.to_owned()),
-        (None, Some("max_evaluations")) => Some("the evaluations are used up".to_owned()),
+        (None, Status::MaxEvaluations) => Some("the evaluations are used up".to_owned()),
         (None, _) if unmatched => {
             Some("the model does not match the data within their noise: no intervals".to_owned())
         }
@@ -166,21 +165,21 @@ fn note(group: &Value) -> Option<String> {
     }
 }
 
-fn notes(groups: &[Value]) -> String {
-    let note = |group: &Value| Some(format!("* {}: {}\n", name(group), note(group)?));
+fn notes(groups: &[Group]) -> String {
+    let note = |group: &Group| Some(format!("* {}: {}\n", group.name, note(group)?));
     let notes: String = groups.iter().filter_map(note).collect();
     if notes.is_empty() { notes } else { format!("\n{notes}") }
 }
 
 /// What so few data cannot say, where several parameters of the mean model are searched.
-fn caveat(groups: &[Value]) -> String {
-    let searched = groups.iter().find_map(|group| group["sensitivities"].as_object());
+fn caveat(groups: &[Group]) -> String {
+    let searched = groups.iter().find_map(|group| group.sensitivities.as_ref());
     let Some(searched) = searched else { return String::new() };
-    let dispersion = searched.contains_key(Parameter::Dispersion.name());
+    let dispersion = searched.contains_key(&Parameter::Dispersion);
     if searched.len() < 2 + usize::from(dispersion) {
         return String::new();
     }
-    let by_likelihood = groups.iter().any(|group| group.get("cost_standard_error").is_some());
+    let by_likelihood = groups.iter().any(|group| group.cost_standard_error.is_some());
     let data = if by_likelihood { "The law of one velocity" } else { "Two moments" };
     let known = if dispersion { " and the dispersion are" } else { " is" };
     format!(

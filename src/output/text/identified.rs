@@ -1,8 +1,9 @@
-//! What the data say, made from the text of `result.json`.
+//! What the data say.
 
 use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::parameters::{Parameter, Point};
-use serde_json::Value;
+use osteon_common::inference::Spread;
+use osteon_common::parameters::Parameter;
+use osteon_common::report::{Answer, Identification, Identified, Moments, QuantityEstimate};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, digits, measured, significant};
@@ -12,24 +13,19 @@ use super::result::{readable, scale};
 const SPEED: &str = "√(c1111/ρ)";
 
 /// Whether the data say anything of a number.
-pub(super) fn has_intervals(value: &Value) -> bool {
-    value["identified"]["matched"] == true && !rows(&value["identified"]).is_empty()
+pub(super) fn has_intervals(found: &Identification) -> bool {
+    found.identified().is_some_and(|known| known.matched && !rows(known).is_empty())
 }
 
 /// Intervals of what is identified, and what is left open; empty where nothing is known.
-pub(super) fn text(value: &Value) -> String {
+pub(super) fn text(found: &Identification) -> String {
     let mut text = String::new();
-    if has_intervals(value) {
-        let identified = &value["identified"];
-        text.push_str(&format!(
-            "\n{}{}",
-            wrapped(&heading(identified)),
-            aligned(&rows(identified))
-        ));
-        text.push_str(&condition(value));
+    if let Some(known) = found.identified().filter(|_| has_intervals(found)) {
+        text.push_str(&format!("\n{}{}", wrapped(&heading(known)), aligned(&rows(known))));
+        text.push_str(&condition(found, known));
     }
-    text.push_str(&solutions(value));
-    if let Some(from) = value["search"]["below_noise_from"].as_u64() {
+    text.push_str(&solutions(found));
+    if let Some(from) = found.search.below_noise_from {
         text.push('\n');
         text.push_str(&wrapped(&format!(
             "After evaluation {from} all further improvement was below the sampling noise."
@@ -39,26 +35,26 @@ pub(super) fn text(value: &Value) -> String {
 }
 
 /// A row for each number of which the data say something.
-fn rows(identified: &Value) -> Vec<[String; 3]> {
+fn rows(known: &Identified) -> Vec<[String; 3]> {
     let mut rows = Vec::new();
-    rows.extend(row(SPEED, &identified["bulk_velocity"], 1.0, " m/s"));
-    rows.extend(row("dispersion", &identified["dispersion"], 1.0, ""));
-    for parameter in Parameter::ALL {
-        let known = &identified["parameters"][parameter.name()];
-        if parameter != Parameter::Dispersion {
-            let (scale, unit) = scale(parameter);
-            rows.extend(row(&readable(parameter), known, scale, unit));
+    rows.extend(row(SPEED, &known.bulk_velocity, 1.0, " m/s"));
+    rows.extend(row("dispersion", &known.dispersion, 1.0, ""));
+    for (parameter, quantity) in &known.parameters {
+        if *parameter != Parameter::Dispersion
+            && let Some(quantity) = quantity
+        {
+            let (scale, unit) = scale(*parameter);
+            rows.extend(row(&readable(*parameter), quantity, scale, unit));
         }
     }
     rows
 }
 
 /// Name, value and interval of what is known, to the same decimal.
-fn row(name: &str, quantity: &Value, scale: f64, unit: &str) -> Option<[String; 3]> {
-    let value = quantity["value"].as_f64()? * scale;
-    let error = quantity["standard_error"].as_f64()? * scale;
-    let ends = quantity["interval"].as_array()?;
-    let [lower, upper] = [ends.first()?.as_f64()? * scale, ends.get(1)?.as_f64()? * scale];
+fn row(name: &str, quantity: &QuantityEstimate, scale: f64, unit: &str) -> Option<[String; 3]> {
+    let value = quantity.value? * scale;
+    let error = quantity.standard_error? * scale;
+    let [lower, upper] = quantity.ends()?.map(|end| end * scale);
     let shown = |number: f64| match Decimals::of_error(error) {
         Some(decimals) => decimals.show(number),
         None => digits(number, DIGITS),
@@ -71,44 +67,42 @@ fn row(name: &str, quantity: &Value, scale: f64, unit: &str) -> Option<[String; 
 }
 
 /// What the intervals are, and which noise they count.
-fn heading(identified: &Value) -> String {
-    let percent = |error: &Value| {
-        let error = error.as_f64().map_or("?".to_owned(), |error| digits(100.0 * error, 2));
+fn heading(known: &Identified) -> String {
+    let percent = |error: Option<f64>| {
+        let error = error.map_or("?".to_owned(), |error| digits(100.0 * error, 2));
         glued(&format!("{error} %"))
     };
-    let of = |noise: &Value| {
-        format!("{} and {}", percent(&noise["mean"]), percent(&noise["coefficient_of_variation"]))
+    let of = |noise: &Moments| {
+        format!("{} and {}", percent(noise.mean), percent(noise.coefficient_of_variation))
     };
-    let level = significant(100.0 * identified["level"].as_f64().unwrap_or_default(), 3);
-    let given = if leaves_free(identified) { ", given the other parameters" } else { "" };
-    let noise = &identified["noise"];
-    let sampling = format!("sampling {}", of(&noise["sampling"]));
-    let counted = if noise["data"].is_object() {
-        format!(
+    let level = significant(100.0 * known.level, 3);
+    let given = if leaves_free(known) { ", given the other parameters" } else { "" };
+    let sampling = format!("sampling {}", of(&known.noise.sampling));
+    let counted = match &known.noise.data {
+        Some(data) => format!(
             "(relative noise of mean and coefficient of variation: data {}, {sampling}):",
-            of(&noise["data"])
-        )
-    } else {
-        format!(
+            of(data)
+        ),
+        None => format!(
             "(relative noise of mean and coefficient of variation: {sampling}; only the data's \
              moments were given, so their uncertainty is not included: these intervals are too \
              narrow):"
-        )
+        ),
     };
     format!("{level} % confidence intervals{given} {counted}")
 }
 
 /// Whether parameters can be moved without changing the moments.
-fn leaves_free(identified: &Value) -> bool {
-    identified["free_directions"].as_array().is_some_and(|free| !free.is_empty())
+fn leaves_free(known: &Identified) -> bool {
+    !known.free_directions.is_empty()
 }
 
 /// What the intervals do not say.
-fn condition(value: &Value) -> String {
-    if !leaves_free(&value["identified"]) {
+fn condition(found: &Identification, known: &Identified) -> String {
+    if !leaves_free(known) {
         return String::new();
     }
-    let how_far = match value["solutions"]["matching"].as_u64() {
+    let how_far = match found.solutions.as_ref().map(|solutions| solutions.matching) {
         Some(2..) => "the ranges below show how far",
         _ => "`[search] starts` shows how far",
     };
@@ -119,24 +113,24 @@ fn condition(value: &Value) -> String {
 }
 
 /// How far apart the answers of several starts are.
-fn solutions(value: &Value) -> String {
-    let solutions = &value["solutions"];
-    let Some(matching) = solutions["matching"].as_u64().filter(|count| *count > 1) else {
+fn solutions(found: &Identification) -> String {
+    let Some(solutions) = found.solutions.as_ref().filter(|found| found.matching > 1) else {
         return String::new();
     };
-    let row = |parameter: Parameter| {
-        let spread = &solutions["spread"]["parameters"][parameter.name()];
-        let (scale, unit) = scale(parameter);
-        let end = |key: &str| Some(spread[key].as_f64()? * scale);
-        let ends = [end("smallest")?, end("largest")?];
-        Some([readable(parameter), format!("{}{unit}", range(ends))])
+    let spreads = solutions.spread.iter().flat_map(|spread| &spread.parameters);
+    let row = |(parameter, spread): (&Parameter, &Spread)| {
+        let (scale, unit) = scale(*parameter);
+        let ends = [spread.smallest * scale, spread.largest * scale];
+        [readable(*parameter), format!("{}{unit}", range(ends))]
     };
     let mut rows = Vec::new();
-    rows.extend(speeds(value).map(|ends| [SPEED.to_owned(), format!("{} m/s", range(ends))]));
-    rows.extend(Parameter::ALL.into_iter().filter_map(row));
+    let speeds = speeds(found, &solutions.points);
+    rows.extend(speeds.map(|ends| [SPEED.to_owned(), format!("{} m/s", range(ends))]));
+    rows.extend(spreads.map(row));
     let heading = format!(
-        "The searches from {matching} starts found different parameter sets that fit the data. \
-         Their ranges:"
+        "The searches from {} starts found different parameter sets that fit the data. Their \
+         ranges:",
+        solutions.matching
     );
     format!("\n{}{}", wrapped(&heading), aligned(&rows))
 }
@@ -152,29 +146,17 @@ fn range([smallest, largest]: [f64; 2]) -> String {
 }
 
 /// The smallest and the largest √(c1111/ρ) of the points that match the data, m/s.
-fn speeds(value: &Value) -> Option<[f64; 2]> {
+fn speeds(found: &Identification, points: &[Answer]) -> Option<[f64; 2]> {
     // As where the solutions are counted: a likelihood has no cost that is low enough.
-    let best = value["cost"].as_f64()?;
-    let most = value["search"]["cost_tolerance"].as_f64().map_or(best, |most| most.max(best));
-    let points = value["solutions"]["points"].as_array()?;
-    let matching =
-        points.iter().filter(|one| one["cost"].as_f64().is_some_and(|cost| cost <= most));
-    let speeds = matching.filter_map(|one| Some(bulk_velocity(&point(one)?).ok()?.logarithm.exp()));
+    let best = found.cost?;
+    let most = found.search.cost_tolerance.map_or(best, |most| most.max(best));
+    let matching = points.iter().filter(|one| one.cost.is_some_and(|cost| cost <= most));
+    let speeds = matching.filter_map(|one| {
+        let point = one.parameters.point(one.dispersion)?;
+        Some(bulk_velocity(&point).ok()?.logarithm.exp())
+    });
     let ends = speeds.fold([f64::INFINITY, f64::NEG_INFINITY], |[smallest, largest], speed| {
         [speed.min(smallest), speed.max(largest)]
     });
     Some(ends).filter(|[smallest, largest]| smallest <= largest)
-}
-
-/// The point of a solution.
-fn point(solution: &Value) -> Option<Point> {
-    let mut point = Point([0.0; 7]);
-    for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
-        let found = match parameter {
-            Parameter::Dispersion => &solution["dispersion"],
-            _ => &solution["parameters"][parameter.name()],
-        };
-        *slot = found.as_f64()?;
-    }
-    Some(point)
 }

@@ -1,5 +1,6 @@
 //! Tables of jobs and workers for people.
 
+use osteon_common::results::Status;
 use osteon_common::visible;
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
@@ -10,7 +11,8 @@ use osteon_proto::v1::{
 use unicode_width::UnicodeWidthStr as _;
 
 use super::layout::{INDENT, WIDTH, glued, wrapped};
-use super::{kind_name, progress, state_name, status_name};
+use super::{kind_name, progress, state_name};
+use crate::client;
 use crate::output::times::utc;
 use crate::progress::span;
 
@@ -42,9 +44,9 @@ pub(super) fn jobs(jobs: &[JobSnapshot]) -> String {
 /// How a job stands, or ended: a propagation that is complete has not converged to anything, and
 /// one that no worker computes does not run.
 pub(super) fn state(job: &JobSnapshot) -> &'static str {
-    match (status_name(job), job.kind(), job.state()) {
-        (Some("converged"), JobKind::Propagation, _) => "done",
-        (Some(status), ..) => status,
+    match (client::job_status(job), job.kind(), job.state()) {
+        (Some(Status::Converged), JobKind::Propagation, _) => "done",
+        (Some(status), ..) => status.name(),
         (None, _, JobState::Running) if job.workers == 0 => "waiting",
         (None, ..) => state_name(job),
     }

@@ -1,10 +1,13 @@
-//! The table of a result, made from the text of `result.json`: a result that was stored looks as
-//! one that was just computed.
+//! The table of a result: one that was stored looks as one that was just computed.
 
-use osteon_common::job::{JobKind, JobSpecification, Objective, Range};
+use std::collections::BTreeMap;
+
+use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::{results_json, visible};
-use serde_json::Value;
+use osteon_common::report::{Data, Identification, Moment, Propagation, ResultFile, Velocity};
+use osteon_common::results::Status;
+use osteon_common::visible;
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
@@ -14,72 +17,71 @@ use crate::verdict;
 
 /// The table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
-    let Ok(value) = serde_json::from_str::<Value>(shown.json) else {
-        return format!("the stored result is not valid JSON:\n{}\n", visible::lines(shown.json));
-    };
     let mut text = String::new();
-    match shown.kind {
-        JobKind::Identification => identification(&mut text, &value, shown),
-        JobKind::Propagation => propagation(&mut text, &value, shown),
-    }
-    let solver = solver::line(&value["solver"]);
-    if !solver.is_empty() {
-        text.push_str(&format!("\n{}", wrapped(&solver)));
-    }
-    if let Some(digest) = value["digest"].as_str() {
-        text.push_str(&format!("\ndigest {}\n", visible::line(digest)));
-    }
+    let solver = match shown.result {
+        ResultFile::Identification(found) => {
+            identification(&mut text, found, shown.specification);
+            &found.solver
+        }
+        ResultFile::Propagation(found) => {
+            propagation(&mut text, found, shown.specification);
+            &found.solver
+        }
+    };
+    text.push_str(&format!("\n{}", wrapped(&solver::line(solver))));
+    text.push_str(&format!("\ndigest {}\n", visible::line(shown.result.digest())));
     if let Some(directory) = shown.directory {
         text.push_str(&wrapped(&format!("files in {}", visible::path(directory))));
     }
     text
 }
 
-fn identification(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
-    let specification = shown.specification;
-    text.push_str(&headline(value, specification));
-    let (evaluations, realizations) = (&value["evaluations"], &value["realizations"]);
+fn identification(text: &mut String, found: &Identification, specification: &JobSpecification) {
+    text.push_str(&headline(found, specification));
+    let Identification { evaluations, realizations, .. } = found;
     let mut count = format!("{evaluations} evaluations of {realizations} realizations");
-    if let Some(measured) = value["sensitivities"].as_object() {
+    if let Some(measured) = found.sensitivities() {
         count.push_str(&format!(" and {} for derivatives", measured.len()));
     }
-    if let Some(groups) = value["groups"].as_array() {
+    if let Some(groups) = &found.groups {
         text.push_str(&count);
         text.push_str(&groups::table(groups));
         return;
     }
     // Without a finite cost a point says nothing about the data.
-    let feasible = value["cost"].is_number();
-    let Some(point) = results_json::best_point(shown.json).ok().filter(|_| feasible) else {
+    let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
+    let Some(point) = point else {
         text.push_str(&wrapped(&format!("{count}; no point was feasible")));
         return;
     };
-    text.push_str(&wrapped(&format!("{count}; {} at the best point", failures(value))));
+    let failed = failures(&found.failures);
+    text.push_str(&wrapped(&format!("{count}; {failed} at the best point")));
     text.push('\n');
-    text.push_str(&moments(value, true));
-    text.push_str(&notes(value));
+    text.push_str(&moments_and_cost(found));
+    let data = found.data.as_ref();
+    text.push_str(&notes(found.control_variate, &found.velocity, &found.failures));
+    text.push_str(&data.and_then(kolmogorov).unwrap_or_default());
     text.push('\n');
-    text.push_str(&parameters(value, &point, specification));
-    if value["status"] == "failed" {
+    text.push_str(&parameters(found, &point, specification));
+    if found.status == Status::Failed {
         return;
     }
-    if fit::fits(value, specification) {
-        text.push_str(&fit::uniqueness(value, &point, specification));
-        text.push_str(&identified::text(value));
+    if fit::fits(found, specification) {
+        text.push_str(&fit::uniqueness(found, &point, specification));
+        text.push_str(&identified::text(found));
     } else {
-        text.push_str(&fit::misfit(value, &point, specification));
+        text.push_str(&fit::misfit(found, &point, specification));
     }
 }
 
 /// How the search ended, and why.
-fn headline(value: &Value, specification: &JobSpecification) -> String {
-    let status = value["status"].as_str().unwrap_or("unknown");
-    let reason = value["reason"].as_str().filter(|reason| !reason.is_empty());
-    let headline = match status {
-        "converged" => "Converged",
-        "max_evaluations" => "Not converged",
-        "cancelled" => "Cancelled",
-        _ => "Failed",
+fn headline(found: &Identification, specification: &JobSpecification) -> String {
+    let reason = found.reason.as_deref().filter(|reason| !reason.is_empty());
+    let headline = match found.status {
+        Status::Converged => "Converged",
+        Status::MaxEvaluations => "Not converged",
+        Status::Cancelled => "Cancelled",
+        Status::Failed => "Failed",
     };
     let used_up = || {
         let search = &specification.search;
@@ -88,7 +90,7 @@ fn headline(value: &Value, specification: &JobSpecification) -> String {
     };
     // A search that stops early says itself why.
     let reason = match reason {
-        None if status == "max_evaluations" => Some(used_up()),
+        None if found.status == Status::MaxEvaluations => Some(used_up()),
         reason => reason.map(str::to_owned),
     };
     let Some(reason) = reason else { return format!("{headline}\n") };
@@ -98,80 +100,77 @@ fn headline(value: &Value, specification: &JobSpecification) -> String {
     if rest.is_empty() { first } else { format!("{first}{}\n", visible::lines(rest.trim_end())) }
 }
 
-fn propagation(text: &mut String, value: &Value, shown: &ShownResult<'_>) {
-    if let Some(reason) = verdict::propagation_failure(shown.specification, value) {
+fn propagation(text: &mut String, found: &Propagation, specification: &JobSpecification) {
+    if let Some(reason) = verdict::propagation_failure(specification, found) {
         text.push_str(&wrapped(&format!("Failed: {reason}")));
     }
-    text.push_str(&wrapped(&format!(
-        "{} realizations; {}",
-        value["realizations"],
-        failures(value)
-    )));
+    let failed = failures(&found.failures);
+    text.push_str(&wrapped(&format!("{} realizations; {failed}", found.realizations)));
     text.push('\n');
-    text.push_str(&moments(value, false));
-    text.push_str(&notes(value));
+    text.push_str(&aligned(&moments(&found.velocity, None)));
+    text.push_str(&notes(found.control_variate, &found.velocity, &found.failures));
 }
 
 /// How many realizations failed, by kind, by its name.
-fn failures(value: &Value) -> String {
-    let failures = value["failures"].as_object().into_iter().flatten();
-    let named = failures.map(|(kind, count)| (kind.replace('_', " "), count.as_u64().unwrap_or(0)));
-    let counts: Vec<(String, u64)> = named.collect();
-    let all = failure_count(value);
-    match counts.as_slice() {
-        [] => "no failures".to_owned(),
-        [(kind, 1)] => format!("1 failure ({kind})"),
-        [(kind, _)] => format!("{all} failures ({kind})"),
-        counts => {
+fn failures(counts: &BTreeMap<FailureKind, u64>) -> String {
+    let all = failure_count(counts);
+    let mut named = counts.iter().map(|(kind, count)| (kind.name().replace('_', " "), *count));
+    match (named.next(), counts.len()) {
+        (None, _) => "no failures".to_owned(),
+        (Some((kind, 1)), 1) => format!("1 failure ({kind})"),
+        (Some((kind, _)), 1) => format!("{all} failures ({kind})"),
+        (Some(first), _) => {
+            let counts = [first].into_iter().chain(named);
             let counts: Vec<String> =
-                counts.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+                counts.map(|(kind, count)| format!("{count} {kind}")).collect();
             format!("{all} failures ({})", counts.join(", "))
         }
     }
 }
 
-fn failure_count(value: &Value) -> u64 {
-    let counts = value["failures"].as_object().into_iter().flatten();
+fn failure_count(counts: &BTreeMap<FailureKind, u64>) -> u64 {
     // A file may say anything.
-    counts.filter_map(|(_, count)| count.as_u64()).fold(0, u64::saturating_add)
+    counts.values().copied().fold(0, u64::saturating_add)
 }
 
-/// Moments with their standard errors, against the data's.
-fn moments(value: &Value, with_data: bool) -> String {
-    let row = |name: &str, key: &str| {
-        let error = value["velocity"]["standard_error"][key].as_f64().unwrap_or(f64::NAN);
-        let model = value["velocity"][key].as_f64();
-        let [data, interval] = of_data(value, key, error);
-        let model = model.map_or("none".to_owned(), |number| measured(number, error));
-        [name.to_owned(), model, data, interval]
-    };
-    let mut rows = Vec::new();
-    if with_data {
-        let level = value["data"]["interval"]["level"].as_f64();
-        let interval = level.map(|level| format!("{} % interval", significant(100.0 * level, 3)));
-        let header = ["", "model ± standard error", "data", &interval.unwrap_or_default()];
-        rows.push(header.map(str::to_owned));
-    }
-    rows.push(row("mean velocity (m/s)", "mean"));
-    rows.push(row("coefficient of variation", "coefficient_of_variation"));
-    if let Some(cost) = value["cost"].as_f64() {
-        let error = value["cost_standard_error"].as_f64().unwrap_or(f64::NAN);
-        let (name, shown) = if by_likelihood(value) {
-            ("cost (nats)", measured(cost, error))
-        } else {
-            ("cost", digits(cost, 3))
+/// Moments with their standard errors against the data's, and the cost.
+fn moments_and_cost(found: &Identification) -> String {
+    let level = found.data.as_ref().and_then(Data::intervals).map(|intervals| intervals.level);
+    let interval = level.map(|level| format!("{} % interval", significant(100.0 * level, 3)));
+    let header = ["", "model ± standard error", "data", &interval.unwrap_or_default()];
+    let mut rows = vec![header.map(str::to_owned)];
+    rows.extend(moments(&found.velocity, found.data.as_ref()));
+    if let Some(cost) = found.cost {
+        let error = found.cost_standard_error.flatten().unwrap_or(f64::NAN);
+        let (name, shown) = match found.objective {
+            Objective::Likelihood => ("cost (nats)", measured(cost, error)),
+            Objective::Moments => ("cost", digits(cost, 3)),
         };
         rows.push([name.to_owned(), shown, String::new(), String::new()]);
     }
     aligned(&rows)
 }
 
+/// A row for each moment: the model's with its standard error, and the data's.
+fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
+    let row = |name: &str, moment: Moment| {
+        let error = velocity.standard_error.get(moment).unwrap_or(f64::NAN);
+        let model = velocity.moments.get(moment);
+        let model = model.map_or("none".to_owned(), |number| measured(number, error));
+        let [data, interval] = data.map(|data| of_data(data, moment, error)).unwrap_or_default();
+        [name.to_owned(), model, data, interval]
+    };
+    [
+        row("mean velocity (m/s)", Moment::Mean),
+        row("coefficient of variation", Moment::CoefficientOfVariation),
+    ]
+}
+
 /// A moment of the data and its interval: to the decimal that the interval leaves, or where there
 /// is none, to that of the model's error.
-fn of_data(value: &Value, key: &str, error_of_model: f64) -> [String; 2] {
-    let Some(number) = value["data"][key].as_f64() else { return [String::new(), String::new()] };
-    let ends = &value["data"]["interval"][key];
-    let (Some(low), Some(high)) = (ends[0].as_f64(), ends[1].as_f64()) else {
+fn of_data(data: &Data, moment: Moment, error_of_model: f64) -> [String; 2] {
+    let Some(number) = data.moments.get(moment) else { return [String::new(), String::new()] };
+    let Some([low, high]) = data.intervals().map(|intervals| intervals.get(moment)) else {
         let shown = Decimals::of_error(error_of_model).map(|decimals| decimals.show(number));
         return [shown.unwrap_or_else(|| digits(number, DIGITS)), String::new()];
     };
@@ -185,16 +184,24 @@ fn of_data(value: &Value, key: &str, error_of_model: f64) -> [String; 2] {
 }
 
 /// What is to be known of the moments besides.
-fn notes(value: &Value) -> String {
-    let notes = [uncontrolled(value), effect_of_failures(value), kolmogorov(value)];
+fn notes(
+    control_variate: bool,
+    velocity: &Velocity,
+    failures: &BTreeMap<FailureKind, u64>,
+) -> String {
+    let uncontrolled = uncontrolled(control_variate, velocity, failures);
+    let notes = [uncontrolled, effect_of_failures(velocity, failures)];
     notes.into_iter().flatten().map(|note| wrapped(&note)).collect()
 }
 
 /// That the control variate which was asked for could not be used.
-fn uncontrolled(value: &Value) -> Option<String> {
-    let asked = value["control_variate"].as_bool()?;
-    let used = value["velocity"]["controlled"].as_bool()?;
-    let failed = match failure_count(value) {
+fn uncontrolled(
+    asked: bool,
+    velocity: &Velocity,
+    failures: &BTreeMap<FailureKind, u64>,
+) -> Option<String> {
+    let used = velocity.controlled?;
+    let failed = match failure_count(failures) {
         0 => String::new(),
         count => format!(" ({count} failed)"),
     };
@@ -207,16 +214,20 @@ fn uncontrolled(value: &Value) -> Option<String> {
 }
 
 /// How large a bias the failed realizations may have left, if there are any.
-fn effect_of_failures(value: &Value) -> Option<String> {
-    value["failures"].as_object().filter(|kinds| !kinds.is_empty())?;
-    let bias = &value["velocity"]["failure_bias"];
-    let signed = |key: &str| {
-        let number = bias[key].as_f64()?;
+fn effect_of_failures(
+    velocity: &Velocity,
+    failures: &BTreeMap<FailureKind, u64>,
+) -> Option<String> {
+    if failures.is_empty() {
+        return None;
+    }
+    let signed = |moment| {
+        let number = velocity.failure_bias.get(moment)?;
         let sign = if number < 0.0 { "-" } else { "+" };
         Some(format!("{sign}{}", digits(number.abs(), 2)))
     };
-    let mean = glued(&format!("{} m/s", signed("mean")?));
-    let variation = signed("coefficient_of_variation")?;
+    let mean = glued(&format!("{} m/s", signed(Moment::Mean)?));
+    let variation = signed(Moment::CoefficientOfVariation)?;
     Some(format!(
         "Had the failed realizations succeeded, the mean would change by an estimated {mean} and \
          the coefficient of variation by {variation}."
@@ -224,33 +235,28 @@ fn effect_of_failures(value: &Value) -> Option<String> {
 }
 
 /// Whether the data can be of the model's law, if that was tested.
-fn kolmogorov(value: &Value) -> Option<String> {
-    let test = &value["data"]["kolmogorov"];
-    let (distance, p) = (test["distance"].as_f64()?, test["p_value"].as_f64()?);
-    let numbers = glued(&format!("D = {}, p = {}", digits(distance, 2), digits(p, 2)));
-    Some(format!(
+fn kolmogorov(data: &Data) -> Option<String> {
+    let test = data.kolmogorov.flatten()?;
+    let (distance, p) = (digits(test.distance, 2), digits(test.p_value, 2));
+    let numbers = glued(&format!("D = {distance}, p = {p}"));
+    Some(wrapped(&format!(
         "Kolmogorov–Smirnov test, data vs model: {numbers} (optimistic: the model was fitted to \
          these data)"
-    ))
-}
-
-/// Whether the cost is a likelihood's.
-pub(super) fn by_likelihood(value: &Value) -> bool {
-    value["objective"].as_str() == Some(Objective::Likelihood.name())
+    )))
 }
 
 /// The best point, with the digits that the data leave each parameter.
-fn parameters(value: &Value, point: &Point, specification: &JobSpecification) -> String {
-    let identified = &value["identified"];
-    let matched = identified["matched"] == true;
+fn parameters(found: &Identification, point: &Point, specification: &JobSpecification) -> String {
+    let identified = found.identified();
+    let matched = identified.is_some_and(|known| known.matched);
     let row = |parameter: Parameter| {
         let (scale, unit) = scale(parameter);
         let number = point.get(parameter) * scale;
-        let known = match parameter {
-            Parameter::Dispersion => &identified["dispersion"],
-            _ => &identified["parameters"][parameter.name()],
-        };
-        let error = known["standard_error"].as_f64().map(|error| error * scale);
+        let known = identified.and_then(|known| match parameter {
+            Parameter::Dispersion => Some(known.dispersion),
+            _ => *known.parameters.get(&parameter)?,
+        });
+        let error = known.and_then(|known| known.standard_error).map(|error| error * scale);
         let (shown, bounds, note) = match (specification.range(parameter), error) {
             (Range::Fixed(_), _) => (significant(number, 6), None, "fixed"),
             (Range::Free { lower, upper, .. }, Some(error)) => {

@@ -1,6 +1,23 @@
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::*;
+use crate::sample_result::put;
+
+/// The table of groups with these keys, and all others as where nothing is known.
+fn table(groups: &[Value]) -> String {
+    let complete = json!({
+        "cost": null,
+        "parameters": {},
+        "velocity": { "standard_error": {}, "failure_bias": {} },
+        "failures": {},
+    });
+    let group = |partial: &Value| -> Group {
+        let mut value = complete.clone();
+        put(&mut value, partial);
+        serde_json::from_value(value).unwrap()
+    };
+    super::table(&groups.iter().map(group).collect::<Vec<_>>())
+}
 
 fn quantity(value: f64, interval: [f64; 2]) -> Value {
     json!({ "value": value, "interval": interval })
@@ -18,18 +35,23 @@ fn known(name: &str, modulus: f64) -> Value {
             "interval": {
                 "mean": [3895.21, 3916.64],
                 "coefficient_of_variation": [0.02512, 0.02934],
+                "level": 0.95,
             },
             "count": 62,
         },
         "sensitivities": { "longitudinal_young_modulus": {}, "dispersion": {} },
         "identified": {
             "matched": true,
+            "level": 0.95,
+            "noise": { "data": null, "sampling": {} },
             "bulk_velocity": quantity(3974.19, [3958.24, 3990.2]),
             "dispersion": quantity(0.0961, [0.0882, 0.1046]),
             "parameters": {
                 "longitudinal_young_modulus": quantity(modulus, [modulus - 3e8, modulus + 3e8]),
                 "dispersion": quantity(0.0961, [0.0882, 0.1046]),
             },
+            "directions": [],
+            "free_directions": [],
         },
     })
 }
@@ -41,9 +63,13 @@ fn a_table_of_groups_shows_intervals_and_reasons() {
     let unknown = |value: f64| json!({ "value": value, "interval": null });
     let nothing = json!({
         "matched": false,
+        "level": 0.95,
+        "noise": { "data": null, "sampling": {} },
         "bulk_velocity": unknown(4256.31),
         "dispersion": unknown(0.3),
         "parameters": { "longitudinal_young_modulus": null, "dispersion": null },
+        "directions": [],
+        "free_directions": [],
     });
     outlier["identified"] = nothing.clone();
     let lonely = json!({
