@@ -27,12 +27,9 @@ pub enum Insane {
     /// A worker holds too much.
     #[error("worker {0} holds more than it may")]
     Credit(WorkerId),
-    /// The copies of a batch do not name each other.
-    #[error("batch {0} and its copies do not match")]
-    Twin(BatchId),
-    /// Not exactly those batches may be copied of which there is one and that are no suspects.
-    #[error("the list of batches that may be copied is wrong")]
-    Copyable,
+    /// The duplicates of a batch do not name each other, or differ in what they are for.
+    #[error("batch {0} and its duplicates do not match")]
+    Duplicates(BatchId),
     /// What waits for another worker that computes the same is with nobody, is not the newest of
     /// its copies, or is not waited for.
     #[error("batch {0} cannot be overdue")]
@@ -164,14 +161,14 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
     let judged = |dispute: &Dispute| {
         let judges = dispute.judges.iter().filter_map(|judge| state.batches.get(judge));
         let fits = |batch: &&Batch| {
-            batch.purpose == Purpose::Judge && batch.assignment.indices == dispute.indices
+            batch.purpose == Purpose::TieBreak && batch.assignment.indices == dispute.indices
         };
         judges.filter(fits).count() == dispute.judges.len()
     };
     let disputes = &evaluation.disputes;
     let judges: usize = disputes.iter().map(|dispute| dispute.judges.len()).sum();
     if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
-        || with(|purpose| *purpose == Purpose::Judge) != judges
+        || with(|purpose| *purpose == Purpose::TieBreak) != judges
         || !disputes.iter().all(judged)
     {
         return Err(Insane::Checks(job));
@@ -190,13 +187,12 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
 
 fn check_workers(state: &State) -> Result<(), Insane> {
     for (&id, worker) in &state.workers {
-        let exclusive = |batch: &BatchId| state.batches.get(batch).is_some_and(|b| b.exclusive);
         let held = worker.in_flight.len();
-        let alone = !worker.in_flight.iter().any(exclusive) || held == 1;
-        let ahead = |batch: &&BatchId| state.batches.get(batch).is_some_and(|b| b.ahead);
-        let ahead = worker.in_flight.iter().filter(ahead).count();
-        if held > BATCHES_IN_FLIGHT_MAX || !alone || ahead > 1 || worker.settled.len() > SETTLED_MAX
-        {
+        let count = |purpose| state.held_for(worker, purpose).count();
+        let alone = count(Purpose::Exclusive) == 0 || held == 1;
+        let speculative = count(Purpose::Speculative);
+        let remembered = worker.settled.len();
+        if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
             return Err(Insane::Credit(id));
         }
         for batch in &worker.in_flight {
@@ -209,14 +205,11 @@ fn check_workers(state: &State) -> Result<(), Insane> {
 }
 
 fn check_batches(state: &State) -> Result<(), Insane> {
-    let copyable = state.batches.iter().filter(|(_, batch)| batch.is_copyable());
-    let expected = copyable.map(|(id, _)| id);
-    if !state.copyable.iter().eq(expected) {
-        return Err(Insane::Copyable);
-    }
     let overdue = |id: &&BatchId| {
         let batch = state.batches.get(id);
-        batch.is_some_and(|batch| !batch.ahead && batch.twins.iter().all(|twin| twin < id))
+        batch.is_some_and(|batch| {
+            batch.purpose != Purpose::Speculative && batch.duplicates.iter().all(|it| it < id)
+        })
     };
     if let Some(id) = state.overdue.iter().find(|id| !overdue(id)) {
         return Err(Insane::Overdue(*id));
@@ -227,23 +220,22 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         if held != 1 {
             return Err(Insane::Holding(batch.worker, id));
         }
-        let matches = |twin: &BatchId| {
-            state.batches.get(twin).is_some_and(|twin| {
-                twin.twins.iter().filter(|of| **of == id).count() == 1
-                    && twin.twins.len() == batch.twins.len()
-                    && twin.assignment == batch.assignment
-                    && (twin.purpose, twin.exclusive) == (batch.purpose, batch.exclusive)
-                    && twin.worker != batch.worker
+        let matches = |other: &BatchId| {
+            state.batches.get(other).is_some_and(|other| {
+                other.duplicates.iter().filter(|of| **of == id).count() == 1
+                    && other.duplicates.len() == batch.duplicates.len()
+                    && (other.assignment, other.purpose) == (batch.assignment, batch.purpose)
+                    && other.worker != batch.worker
             })
         };
-        if !batch.twins.iter().all(matches) || batch.twins.len() >= COPIES_MAX {
-            return Err(Insane::Twin(id));
+        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= COPIES_MAX {
+            return Err(Insane::Duplicates(id));
         }
         let round = batch.assignment.round;
         let job = state.jobs.get(&batch.assignment.job);
         let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.round == round);
         let ahead = job.is_some_and(|job| job.ahead.evaluations.iter().any(|it| it.round == round));
-        if asked_for == ahead || batch.ahead != ahead {
+        if asked_for == ahead || (batch.purpose == Purpose::Speculative) != ahead {
             return Err(Insane::Stray(id));
         }
     }
@@ -263,7 +255,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()
-        .filter(|batch| is_of(batch, job, evaluation) && batch.purpose == Purpose::Fill)
+        .filter(|batch| is_of(batch, job, evaluation) && batch.purpose.fills())
         .map(|batch| (batch.assignment.indices.first, batch.assignment.indices.count))
         .collect();
     for (first, count) in queued.chain(quarantine).chain(out) {

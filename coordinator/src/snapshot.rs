@@ -7,7 +7,7 @@ use osteon_proto::timestamp;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
 use crate::ids::JobId;
-use crate::state::{EndedJob, Job, LostInARow, Stage, State};
+use crate::state::{EndedJob, Job, LostInARow, Purpose, Stage, State};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -160,12 +160,11 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
 
 /// The answer that a job waits for longest, in words.
 fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -> Option<String> {
-    let of_job = state
-        .batches
-        .iter()
-        .filter(|(_, batch)| batch.assignment.job == job.record.job && !batch.ahead);
+    let of_job = state.batches.iter().filter(|(_, batch)| {
+        batch.assignment.job == job.record.job && batch.purpose != Purpose::Speculative
+    });
     let (id, batch) = of_job.min_by_key(|(_, batch)| batch.sent)?;
-    let others = batch.twins.len();
+    let others = batch.duplicates.len();
     let instead = match others {
         0 if !state.overdue.contains(id) => String::new(),
         0 if job.pace.is_known() => {

@@ -79,8 +79,6 @@ pub struct State {
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
-    /// Batches that idle workers may have copies of, in the order they were sent.
-    pub(crate) copyable: BTreeSet<BatchId>,
     /// Batches that are overdue and wait for another worker that computes the same; of copies the
     /// newest.
     pub(crate) overdue: BTreeSet<BatchId>,
@@ -284,18 +282,30 @@ pub(crate) struct Assignment {
     pub(crate) indices: Indices,
 }
 
-/// What a batch is computed for.
+/// Why a batch is computed. Its duplicates have the same purpose: which batch was first decides
+/// nothing, so being a duplicate is a relation between batches and no purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// To fill slots.
+    /// It fills indices of the evaluation that the search asked for.
     Fill,
-    /// To be compared with the answer of another worker.
+    /// It fills an index over which workers crashed. Its worker holds nothing else meanwhile.
+    Exclusive,
+    /// It fills indices of a point that the search has not asked for.
+    Speculative,
+    /// Its answer is compared with the answer of another worker.
     Audit {
-        /// Workers that were lost over it.
+        /// How many workers were lost over it.
         lost: u32,
     },
-    /// To decide between answers that differ.
-    Judge,
+    /// Its answer decides between answers that differ.
+    TieBreak,
+}
+
+impl Purpose {
+    /// Whether the answer fills indices of an evaluation.
+    pub(crate) fn fills(self) -> bool {
+        matches!(self, Self::Fill | Self::Exclusive | Self::Speculative)
+    }
 }
 
 /// A batch that a worker holds.
@@ -310,14 +320,10 @@ pub(crate) struct Batch {
     pub(crate) begun: Duration,
     /// Computing time that its client was charged for it.
     pub(crate) charged: Duration,
-    /// The other batches with the same indices and purpose, when there are copies.
-    pub(crate) twins: Vec<BatchId>,
+    /// The other batches with the same indices and purpose, held by other workers.
+    pub(crate) duplicates: Vec<BatchId>,
     /// How many of them were sent before it because those before them were overdue.
     pub(crate) retries: u32,
-    /// A suspect: its worker holds nothing else, and it is not copied unless it is overdue.
-    pub(crate) exclusive: bool,
-    /// Of a point that the search has not asked for.
-    pub(crate) ahead: bool,
 }
 
 impl State {
@@ -344,7 +350,6 @@ impl State {
             probation: Probation::default(),
             no_worker_since: now,
             batches: BTreeMap::new(),
-            copyable: BTreeSet::new(),
             overdue: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
@@ -453,16 +458,26 @@ impl State {
         !self.draining && self.workers.values().any(answers)
     }
 
+    /// The batches that a worker holds for one purpose.
+    pub(crate) fn held_for<'a>(
+        &'a self,
+        worker: &'a Worker,
+        purpose: Purpose,
+    ) -> impl Iterator<Item = BatchId> + 'a {
+        let is_for =
+            move |id: &BatchId| self.batches.get(id).is_some_and(|it| it.purpose == purpose);
+        worker.in_flight.iter().copied().filter(is_for)
+    }
+
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
-        self.copyable.remove(&batch);
         self.overdue.remove(&batch);
         if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
             match settled.purpose {
-                Purpose::Fill => {}
+                Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
                 Purpose::Audit { .. } => evaluation.audits_out -= 1,
-                Purpose::Judge => {
+                Purpose::TieBreak => {
                     for dispute in &mut evaluation.disputes {
                         dispute.judges.retain(|judge| *judge != batch);
                     }
@@ -476,12 +491,9 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        for id in &settled.twins {
-            if let Some(twin) = self.batches.get_mut(id) {
-                twin.twins.retain(|other| *other != batch);
-                if twin.is_copyable() {
-                    self.copyable.insert(*id);
-                }
+        for duplicate in &settled.duplicates {
+            if let Some(duplicate) = self.batches.get_mut(duplicate) {
+                duplicate.duplicates.retain(|other| *other != batch);
             }
         }
         Some(settled)
@@ -541,9 +553,9 @@ impl Batch {
         state.workers.get(&self.worker)
     }
 
-    /// Whether an idle worker may have a copy of it before it is overdue.
-    pub(crate) fn is_copyable(&self) -> bool {
-        self.purpose == Purpose::Fill && self.twins.is_empty() && !self.exclusive && !self.ahead
+    /// Whether an idle worker may have a duplicate of it before it is overdue.
+    pub(crate) fn may_be_duplicated(&self) -> bool {
+        self.purpose == Purpose::Fill && self.duplicates.is_empty()
     }
 }
 

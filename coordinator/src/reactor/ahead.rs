@@ -19,7 +19,7 @@ use super::{Effects, batches, dispatch, jobs};
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::search::same_point;
-use crate::state::{Ahead, Assignment, BATCHES_IN_FLIGHT_MAX, Job, Stage, State, Worker};
+use crate::state::{Ahead, Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
 use crate::worker_name::WorkerName;
 
 pub(super) use self::idle::hand_out;
@@ -100,11 +100,10 @@ pub(super) fn make_way(
 
 /// Takes back what a worker does ahead.
 pub(super) fn give_back(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
-    let is_ahead = |id: &&BatchId| state.batches.get(id).is_some_and(|batch| batch.ahead);
     let Some(attached) = state.workers.get(&worker) else {
         return;
     };
-    let held: Vec<BatchId> = attached.in_flight.iter().filter(is_ahead).copied().collect();
+    let held: Vec<BatchId> = state.held_for(attached, Purpose::Speculative).collect();
     for batch in held {
         if let Some(assignment) = state.batches.get(&batch).map(|batch| batch.assignment)
             && let Some(evaluation) = state.attempt_mut(&assignment)
@@ -165,10 +164,7 @@ fn adopt_batches(state: &mut State, job: JobId, round: u64) {
     let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
     for id in held {
         if let Some(batch) = state.batches.get_mut(&id) {
-            batch.ahead = false;
-            if batch.is_copyable() {
-                state.copyable.insert(id);
-            }
+            batch.purpose = Purpose::Fill;
             dispatch::charge(state, id);
         }
     }

@@ -40,7 +40,7 @@ pub(super) fn answered(
     let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
         return;
     };
-    let (purpose, twins) = held.map(|held| (held.purpose, held.twins.clone())).unzip();
+    let (purpose, twins) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();
     let twins = twins.unwrap_or_default();
     let (found, expected) = (solved.len(), assignment.indices.count);
     if found as u64 != expected {
@@ -53,7 +53,7 @@ pub(super) fn answered(
         overdue::answered(state, worker, batch, now);
     }
     match purpose {
-        Some(Purpose::Fill) => {
+        Some(Purpose::Fill | Purpose::Exclusive | Purpose::Speculative) => {
             if let Some(held) = state.settle(batch) {
                 measure(state, &held, elapsed_s, now);
             }
@@ -66,7 +66,7 @@ pub(super) fn answered(
             take_back(state, twins, now, effects);
             checks::compare(state, &assignment, &solved, &name, now, effects);
         }
-        Some(Purpose::Judge) => {
+        Some(Purpose::TieBreak) => {
             take_back(state, twins, now, effects);
             checks::judged(state, batch, &assignment, solved, &name, now, effects);
         }
@@ -107,24 +107,24 @@ pub(super) fn revoke_all(state: &mut State, job: JobId, now: Duration, effects: 
 /// Hands the indices of a lost worker's batch back, unless a copy of it lives.
 pub(super) fn orphaned(state: &mut State, batch: BatchId, loss: &Loss) {
     let assignment = state.batches.get(&batch).map(|batch| (batch.purpose, batch.assignment));
-    if let Some((Purpose::Judge, assignment)) = assignment {
+    if let Some((Purpose::TieBreak, assignment)) = assignment {
         checks::judge_lost(state, &assignment, batch, loss);
     }
     let Some(settled) = state.settle(batch) else {
         return;
     };
-    if settled.purpose != Purpose::Fill {
+    if !settled.purpose.fills() {
         checks::orphaned(state, &settled, loss);
         return;
     }
-    let Batch { assignment, twins, exclusive, .. } = settled;
+    let Batch { assignment, purpose, duplicates, .. } = settled;
     let Some(evaluation) = state.attempt_mut(&assignment) else {
         return;
     };
     let indices = assignment.indices;
     evaluation.lost_over |= loss.cause != Cause::Announced;
-    if !twins.is_empty() {
-        if exclusive {
+    if !duplicates.is_empty() {
+        if purpose == Purpose::Exclusive {
             evaluation.blame(indices.first, loss);
         }
         return;
@@ -176,7 +176,9 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
         // Whatever a worker says, it has not computed for longer than it was waited for.
         job.pace.learn(count, threads, seconds.min(waited_s));
     }
-    if let Some(job) = state.jobs.get(&batch.assignment.job).filter(|_| !batch.ahead) {
+    if let Some(job) =
+        state.jobs.get(&batch.assignment.job).filter(|_| batch.purpose != Purpose::Speculative)
+    {
         state.shares.correct(&job.record.client, batch.charged, took);
     }
 }

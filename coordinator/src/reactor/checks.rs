@@ -109,7 +109,7 @@ fn hand_dispute(
     };
     let (round, indices) = (evaluation.round, evaluation.disputes[at].indices);
     let assignment = Assignment { job, round, indices };
-    let batch = dispatch::send(state, worker, assignment, Purpose::Judge, now, effects);
+    let batch = dispatch::send(state, worker, assignment, Purpose::TieBreak, now, effects);
     if let Some(evaluation) = state.evaluation_mut(job) {
         evaluation.disputes[at].judges.extend(batch);
     }
@@ -195,7 +195,7 @@ pub(super) fn orphaned(state: &mut State, batch: &Batch, loss: &Loss) {
     let Purpose::Audit { lost } = batch.purpose else {
         return;
     };
-    if !batch.twins.is_empty() {
+    if !batch.duplicates.is_empty() {
         return;
     }
     if let Some(evaluation) = state.attempt_mut(&batch.assignment)

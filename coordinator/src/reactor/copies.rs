@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Effects, dispatch, due};
 use crate::ids::{BatchId, WorkerId};
-use crate::state::{Batch, Purpose, State, Worker};
+use crate::state::{Batch, State, Worker};
 
 /// A batch that takes so many times as long as it should is copied before anything is done ahead.
 const LATE: u32 = 2;
@@ -34,49 +34,46 @@ fn copy(
     effects: &mut Effects,
 ) {
     let patience = state.config.batch_target / 2;
-    let old = |state: &State, id: &BatchId| {
-        state.batches.get(id).is_some_and(|batch| now.saturating_sub(batch.sent) >= patience)
-    };
-    if !state.copyable.first().is_some_and(|oldest| old(state, oldest)) {
+    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
+    if !copyable(state).next().is_some_and(|(_, oldest)| old(oldest)) {
         return;
     }
     let idle = |worker: &Worker| state.is_sound(worker) && idle(state, worker);
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {
-        let is_worth = |id: &&BatchId| {
-            old(state, id) && state.batches.get(id).is_some_and(|batch| worth(state, batch))
-        };
-        let Some(slowest) = state.copyable.iter().find(is_worth).copied() else {
+        let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch) && worth(state, batch);
+        let Some((slowest, _)) = copyable(state).find(is_worth) else {
             return;
         };
-        let Some(assignment) = state.batches.get(&slowest).map(|batch| batch.assignment) else {
-            return;
-        };
-        let copy = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
-        if let Some(copy) = copy {
-            join(state, slowest, copy);
-        }
+        send(state, slowest, worker, now, effects);
     }
 }
 
-/// Makes a batch that was just sent a copy of another, and of the copies of that.
-pub(super) fn join(state: &mut State, of: BatchId, copy: BatchId) {
-    let Some(original) = state.batches.get(&of) else {
-        return;
-    };
-    let mut twins = original.twins.clone();
-    twins.push(of);
-    for id in &twins {
-        if let Some(twin) = state.batches.get_mut(id) {
-            twin.twins.push(copy);
+/// The batches that may be duplicated before they are overdue, in the order they were sent.
+fn copyable(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
+    let batches = state.batches.iter().map(|(id, batch)| (*id, batch));
+    batches.filter(|(_, batch)| batch.may_be_duplicated())
+}
+
+/// Sends a worker a duplicate of a batch; its number, if its evaluation is under way.
+pub(super) fn send(
+    state: &mut State,
+    of: BatchId,
+    to: WorkerId,
+    now: Duration,
+    effects: &mut Effects,
+) -> Option<BatchId> {
+    let Batch { assignment, purpose, .. } = *state.batches.get(&of)?;
+    let copy = dispatch::send(state, to, assignment, purpose, now, effects)?;
+    let mut others = state.batches.get(&of)?.duplicates.clone();
+    others.push(of);
+    for id in &others {
+        state.overdue.remove(id);
+        if let Some(other) = state.batches.get_mut(id) {
+            other.duplicates.push(copy);
         }
     }
-    for id in twins.iter().chain([&copy]) {
-        state.copyable.remove(id);
-        state.overdue.remove(id);
-    }
-    if let Some(batch) = state.batches.get_mut(&copy) {
-        batch.twins = twins;
-    }
+    state.batches.get_mut(&copy)?.duplicates = others;
+    Some(copy)
 }

@@ -72,12 +72,12 @@ fn hand_one(
 /// The workers with credit, those that hold least first; of equal ones the first. Those on probation
 /// come last, and only if they hold nothing.
 pub(super) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
-    let exclusive = |held: &BatchId| state.batches.get(held).is_some_and(|batch| batch.exclusive);
+    let exclusive = |worker| state.held_for(worker, Purpose::Exclusive).next().is_some();
     let free = state
         .workers
         .iter()
         .filter(|(id, worker)| !worker.draining && !kept.contains(id))
-        .filter(|(_, worker)| !worker.in_flight.iter().any(exclusive))
+        .filter(|(_, worker)| !exclusive(worker))
         .map(|(id, worker)| {
             (!state.is_sound(worker), held(state, worker), worker.in_flight.len(), *id)
         });
@@ -90,8 +90,7 @@ pub(super) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<Work
 
 /// Batches that a worker holds, what is done ahead aside.
 pub(super) fn held(state: &State, worker: &Worker) -> usize {
-    let ahead = |held: &&BatchId| state.batches.get(held).is_some_and(|batch| batch.ahead);
-    worker.in_flight.len() - worker.in_flight.iter().filter(ahead).count()
+    worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
 }
 
 /// Gives a worker a batch of the job whose turn it is.
@@ -216,15 +215,10 @@ pub(super) fn send(
         sent: now,
         begun: now,
         charged: Duration::ZERO,
-        twins: Vec::new(),
+        duplicates: Vec::new(),
         retries: 0,
-        exclusive: false,
-        ahead: false,
     };
     state.batches.insert(id, batch);
-    if purpose == Purpose::Fill {
-        state.copyable.insert(id);
-    }
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }

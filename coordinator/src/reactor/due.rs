@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use crate::fairness;
 use crate::ids::JobId;
-use crate::state::{Batch, State};
+use crate::state::{Batch, Purpose, State};
 
 /// When the last batch of what each search waits for should be answered.
 pub(super) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
     let mut dues = BTreeMap::new();
-    for batch in state.batches.values().filter(|batch| !batch.ahead) {
+    let asked_for = state.batches.values().filter(|it| it.purpose != Purpose::Speculative);
+    for batch in asked_for {
         if let Some(answered) = answered(state, batch) {
             let due: &mut Duration = dues.entry(batch.assignment.job).or_default();
             *due = answered.max(*due);

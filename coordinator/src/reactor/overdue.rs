@@ -50,8 +50,9 @@ pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
     }
     let waits = |id: &BatchId| {
         state.batches.get(id).is_some_and(|batch| {
-            let newest = batch.twins.iter().all(|twin| twin < id);
-            newest && !batch.ahead && batch.twins.len() + 1 < COPIES_MAX
+            let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
+            let asked_for = batch.purpose != Purpose::Speculative;
+            newest && asked_for && batch.duplicates.len() + 1 < COPIES_MAX
         })
     };
     state.overdue = late.into_iter().filter(waits).collect();
@@ -119,7 +120,7 @@ fn give_up_audit(state: &mut State, id: BatchId, now: Duration, effects: &mut Ef
     if !audit || (batch.retries == 0 && other()) {
         return;
     }
-    let mut given_up = batch.twins.clone();
+    let mut given_up = batch.duplicates.clone();
     given_up.push(id);
     for id in given_up {
         missed(state, id, now);
@@ -142,10 +143,10 @@ pub(super) fn hand_out(
     let mut free = dispatch::free_workers(state, kept);
     let mut sent = 0;
     for id in Vec::from_iter(state.overdue.iter().copied()) {
-        let Some((job, alone)) = state.batches.get(&id).map(|it| (it.assignment.job, it.exclusive))
-        else {
+        let Some(batch) = state.batches.get(&id) else {
             continue;
         };
+        let (job, alone) = (batch.assignment.job, batch.purpose == Purpose::Exclusive);
         // Since time was looked at last it may have become known that the job is slow.
         if sent >= SENT_AT_ONCE_MAX
             || (free.is_empty() && !alone)
@@ -224,13 +225,13 @@ fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool 
     !worker.draining
         && worker.in_flight.is_empty()
         && !state.probation.rests(&worker.name, now)
-        && matches!(purpose, Some(Purpose::Fill | Purpose::Judge))
+        && matches!(purpose, Some(Purpose::Fill | Purpose::Exclusive | Purpose::TieBreak))
 }
 
 /// The names of the workers that hold a batch and its copies.
 fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
-    let twins = state.batches.get(&id).into_iter().flat_map(|batch| &batch.twins).copied();
-    let batches = twins.chain([id]).filter_map(|id| state.batches.get(&id));
+    let others = state.batches.get(&id).into_iter().flat_map(|batch| &batch.duplicates).copied();
+    let batches = others.chain([id]).filter_map(|id| state.batches.get(&id));
     batches.filter_map(|batch| Some(&state.workers.get(&batch.worker)?.name))
 }
 
@@ -249,11 +250,13 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     };
     let about = |it: &&Dispute| it.judges.contains(&id);
     let in_question = match batch.purpose {
-        Purpose::Fill => false,
+        Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
         Purpose::Audit { .. } => {
             evaluation.owner(batch.assignment.indices.first).is_none_or(|by| by == *name)
         }
-        Purpose::Judge => evaluation.disputes.iter().find(about).is_none_or(|it| it.involves(name)),
+        Purpose::TieBreak => {
+            evaluation.disputes.iter().find(about).is_none_or(|it| it.involves(name))
+        }
     };
     !in_question && holders(state, id).all(|holder| holder != name)
 }
@@ -269,25 +272,23 @@ fn send(state: &mut State, id: BatchId, to: WorkerId, now: Duration, effects: &m
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
-    let Batch { assignment, purpose, exclusive, retries, worker, .. } = *batch;
-    if exclusive {
+    let Batch { assignment, purpose, retries, worker, .. } = *batch;
+    if purpose == Purpose::Exclusive {
         ahead::give_back(state, to, now, effects);
     }
-    let Some(copy) = dispatch::send(state, to, assignment, purpose, now, effects) else {
+    let Some(copy) = copies::send(state, id, to, now, effects) else {
         return;
     };
     tracing::info!(job = %assignment.job, first = assignment.indices.first, overdue = %worker, %to,
         "a batch is overdue; another worker computes the same");
     if let Some(batch) = state.batches.get_mut(&copy) {
-        batch.exclusive = exclusive;
         batch.retries = retries + 1;
     }
-    copies::join(state, id, copy);
     if let Some(evaluation) = state.attempt_mut(&assignment) {
         match purpose {
-            Purpose::Fill => {}
+            Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
             Purpose::Audit { .. } => evaluation.audits_out += 1,
-            Purpose::Judge => {
+            Purpose::TieBreak => {
                 for dispute in &mut evaluation.disputes {
                     if dispute.judges.contains(&id) {
                         dispute.judges.push(copy);

@@ -95,11 +95,7 @@ fn send(
     evaluation.quarantine.retain(|waiting| *waiting != index);
     let indices = Indices { first: index, count: 1 };
     let assignment = Assignment { job, round: evaluation.round, indices };
-    let batch = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
-    if let Some((id, batch)) = batch.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
-        batch.exclusive = true;
-        state.copyable.remove(&id);
-    }
+    dispatch::send(state, worker, assignment, Purpose::Exclusive, now, effects);
 }
 
 /// A worker is back: nothing that it held is to blame for its absence.

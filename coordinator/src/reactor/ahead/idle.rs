@@ -14,7 +14,7 @@ use osteon_common::parameters::Point;
 use super::{realizations, realizations_held};
 use crate::evaluation::{Evaluation, Indices};
 use crate::fairness;
-use crate::ids::{BatchId, JobId, WorkerId};
+use crate::ids::{JobId, WorkerId};
 use crate::reactor::{Effects, dispatch, due};
 use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
 
@@ -141,11 +141,7 @@ fn send(
         return;
     };
     let assignment = Assignment { job: id, round, indices };
-    let batch = dispatch::send(state, worker, assignment, Purpose::Fill, now, effects);
-    if let Some((batch, sent)) = batch.and_then(|id| Some((id, state.batches.get_mut(&id)?))) {
-        sent.ahead = true;
-        state.copyable.remove(&batch);
-    }
+    dispatch::send(state, worker, assignment, Purpose::Speculative, now, effects);
 }
 
 /// Takes indices of a point, which is begun now if it was not; with the number of the attempt.
@@ -164,12 +160,11 @@ fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, I
 
 /// Threads of a worker that nobody has work for.
 fn spare(state: &State, worker: &Worker) -> u64 {
-    let taken = |held: &BatchId| {
-        state.batches.get(held).is_some_and(|batch| batch.ahead || batch.exclusive)
-    };
+    let holds = |purpose| state.held_for(worker, purpose).next().is_some();
     let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
     let failing = state.is_failing(worker.name.host());
-    if !state.is_sound(worker) || full || failing || worker.in_flight.iter().any(taken) {
+    let taken = holds(Purpose::Speculative) || holds(Purpose::Exclusive);
+    if !state.is_sound(worker) || full || failing || taken {
         return 0;
     }
     u64::from(worker.hello.threads).saturating_sub(realizations_held(state, worker))
