@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use osteon_common::outcome::{Solved, encode};
 
-use crate::evaluation::Indices;
 use crate::ids::BatchId;
+use crate::indices::Indices;
 use crate::losses::Losses;
 use crate::worker_name::WorkerName;
 

@@ -9,24 +9,9 @@ use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
 use crate::dispute::{self, Dispute, Vote};
+use crate::indices::Indices;
 use crate::losses::{Loss, Losses};
 use crate::worker_name::WorkerName;
-
-/// Consecutive indices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Indices {
-    /// The first.
-    pub first: u64,
-    /// How many, at least one.
-    pub count: u64,
-}
-
-impl Indices {
-    /// The index after the last.
-    pub fn end(self) -> u64 {
-        self.first + self.count
-    }
-}
 
 /// A batch that is to be computed a second time, by another worker.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,8 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Solved;
 
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
+use crate::effect::RecordKey;
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::store::EvaluationRecord;
 
@@ -175,17 +176,4 @@ pub struct Hello {
     pub process: u32,
     /// A number that the process drew at its start, 0 if it told none.
     pub instance: u64,
-}
-
-/// Names one record of a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RecordKey {
-    /// The job itself.
-    Job,
-    /// The evaluation with this number.
-    Evaluation(u64),
-    /// Its end.
-    End,
-    /// The expulsion with this number, of a worker that was found in it.
-    Expulsion(u64),
 }

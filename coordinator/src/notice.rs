@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use osteon_common::job::JobKind;
 
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 use crate::ids::{JobId, WorkerId};
 use crate::search::Ending;
 use crate::worker_name::WorkerName;

@@ -22,7 +22,7 @@ use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
-use crate::access_layer::Holder;
+use crate::access::Holder;
 use crate::backing_up;
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};

@@ -14,10 +14,11 @@ use osteon_proto::specification;
 use prost::Message as _;
 
 use crate::config::Config;
-use crate::evaluation::{Evaluation, Indices};
+use crate::evaluation::Evaluation;
 use crate::event::Hello;
 use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::indices::Indices;
 use crate::notice::Departure;
 use crate::pace::Pace;
 use crate::probation::Probation;
@@ -415,6 +416,11 @@ impl State {
     pub(crate) fn expulsion(&self, name: &WorkerName) -> Option<&ExpulsionRecord> {
         let found = self.expelled.iter().find(|expelled| expelled.record.worker == *name);
         found.map(|expelled| &expelled.record)
+    }
+
+    /// Whether the ban of a worker is not durable yet.
+    pub(crate) fn ban_pending(&self) -> bool {
+        self.expelled.iter().any(|expelled| expelled.store_at.is_some())
     }
 
     /// Whether the workers of a host are lost over whatever they hold.

@@ -11,8 +11,9 @@ use osteon_common::version;
 
 use super::*;
 use crate::config::Config;
-use crate::effect::{Answer, Record};
-use crate::event::{Hello, RecordKey, Request};
+use crate::effect::{Answer, Effect, Record, RecordKey};
+
+use crate::event::{Hello, Request};
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::sanity::sanity_check;
 

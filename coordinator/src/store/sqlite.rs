@@ -448,7 +448,9 @@ impl Store for &SqliteStore {
     }
 
     fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
-        backup::copy(self, between)
+        let mut store = *self;
+        let mut lend = || between(&mut store as &mut dyn Store);
+        backup::copy(&self.connection, &self.path, &mut lend)
     }
 }
 

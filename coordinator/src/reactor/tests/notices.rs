@@ -1,7 +1,7 @@
 //! What is told to the log: one notice for each thing that an operator asks about.
 
 use super::*;
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 use crate::notice::{Departure, Notice};
 
 impl Rig {

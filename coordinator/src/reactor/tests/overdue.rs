@@ -2,7 +2,7 @@
 
 use super::checks::{ONE_BIT, wrong};
 use super::*;
-use crate::evaluation::Indices;
+use crate::indices::Indices;
 use crate::state::{Purpose, Stage};
 use crate::worker_name::WorkerName;
 

@@ -1,7 +1,7 @@
 //! Workers: admitted, refused, silent, leaving.
 
 use super::*;
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 
 #[test]
 fn every_attachment_has_a_new_lease() {

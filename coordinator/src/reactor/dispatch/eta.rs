@@ -8,7 +8,7 @@ use crate::ids::JobId;
 use crate::state::{Batch, Purpose, State};
 
 /// When the last batch of what each search waits for should be answered.
-pub(super) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
+pub(crate) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
     let mut dues = BTreeMap::new();
     let asked_for = state.batches.values().filter(|it| it.purpose != Purpose::Speculative);
     for batch in asked_for {
@@ -35,7 +35,7 @@ fn answered(state: &State, batch: &Batch) -> Option<Duration> {
 }
 
 /// Time that a batch should take, as far as that is known.
-pub(super) fn expected(state: &State, batch: &Batch) -> Duration {
+pub(crate) fn expected(state: &State, batch: &Batch) -> Duration {
     let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
     let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
     rate.map_or(Duration::ZERO, |rate| {

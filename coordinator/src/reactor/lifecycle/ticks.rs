@@ -2,33 +2,21 @@
 
 use std::time::Duration;
 
-use super::{Effects, checks, expulsion, jobs, overdue, prune, suspects, workers};
-use crate::effect::{CloseReason, Effect};
+use super::{jobs, records, workers};
+use crate::close_reason::CloseReason;
+use crate::effect::Effect;
 use crate::ids::{JobId, WorkerId};
+use crate::reactor::dispatch::poison;
+use crate::reactor::turn::Turn;
 use crate::snapshot;
 use crate::state::{State, Worker, sequence};
 
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
-pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
-    excuse(state, now);
-    expire(state, now, effects);
-    beat(state, now, effects);
-    overdue::tick(state, now, effects);
-    checks::give_up(state, now, effects);
-    if !state.draining {
-        suspects::tick(state, now, effects);
-        store_again(state, now, effects);
-        expulsion::store_again(state, now, effects);
-        prune::tick(state, now, effects);
-    }
-    publish(state, now, effects);
-}
-
 /// Takes time in which this process did not run out of all that silence is measured by: what came
 /// meanwhile is not read yet.
-fn excuse(state: &mut State, now: Duration) {
+pub(crate) fn excuse(state: &mut State, now: Duration) {
     let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
     if gap <= state.config.heartbeat {
         return;
@@ -55,14 +43,15 @@ fn excuse(state: &mut State, now: Duration) {
     }
 }
 
-fn expire(state: &mut State, now: Duration, effects: &mut Effects) {
-    let expired: Vec<(WorkerId, CloseReason)> = state
+pub(crate) fn expire(turn: &mut Turn) {
+    let expired: Vec<(WorkerId, CloseReason)> = turn
+        .state
         .workers
         .iter()
-        .filter_map(|(id, worker)| Some((*id, overdue(state, worker, now)?)))
+        .filter_map(|(id, worker)| Some((*id, overdue(turn.state, worker, turn.now)?)))
         .collect();
     for (worker, reason) in expired {
-        workers::close(state, worker, reason, now, effects);
+        workers::close(turn, worker, reason);
     }
 }
 
@@ -78,40 +67,51 @@ fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason>
     (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
 }
 
-fn beat(state: &mut State, now: Duration, effects: &mut Effects) {
-    for (&id, worker) in &mut state.workers {
-        if now.saturating_sub(worker.beat) >= state.config.heartbeat {
-            worker.beat = now;
-            effects.push(Effect::Heartbeat { worker: id });
+pub(crate) fn send_heartbeats(turn: &mut Turn) {
+    for (&id, worker) in &mut turn.state.workers {
+        if turn.now.saturating_sub(worker.beat) >= turn.state.config.heartbeat {
+            worker.beat = turn.now;
+            turn.effects.push(Effect::Heartbeat { worker: id });
         }
     }
 }
 
-fn store_again(state: &mut State, now: Duration, effects: &mut Effects) {
-    for job in state.jobs.values_mut() {
+/// Fails the jobs of realizations over which so many workers crashed that no more are risked.
+pub(crate) fn fail_poisoned(turn: &mut Turn) {
+    poison::forget_old_losses(turn.state, turn.now);
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        if let Some(failure) = poison::failure(turn.state, job, turn.now) {
+            jobs::fail(turn, job, &failure);
+        }
+    }
+}
+
+pub(crate) fn store_again(turn: &mut Turn) {
+    for job in turn.state.jobs.values_mut() {
         let Some(trouble) = &mut job.trouble else {
             continue;
         };
-        if now >= trouble.retry_at && !trouble.on_its_way {
+        if turn.now >= trouble.retry_at && !trouble.on_its_way {
             trouble.on_its_way = true;
-            jobs::store_again(job, effects);
+            records::store_again(job, &mut turn.effects);
         }
     }
 }
 
-fn publish(state: &mut State, now: Duration, effects: &mut Effects) {
-    if now.saturating_sub(state.published) >= PUBLISH_EVERY {
-        state.published = now;
-        state.changed.extend(&state.active);
-        state.changed.extend(&state.waiting);
+pub(crate) fn publish(turn: &mut Turn) {
+    if turn.now.saturating_sub(turn.state.published) >= PUBLISH_EVERY {
+        turn.state.published = turn.now;
+        turn.state.changed.extend(&turn.state.active);
+        turn.state.changed.extend(&turn.state.waiting);
     }
-    let changed: Vec<JobId> = std::mem::take(&mut state.changed).into_iter().collect();
+    let changed: Vec<JobId> = std::mem::take(&mut turn.state.changed).into_iter().collect();
     for job in changed {
-        if let Some(job) = state.jobs.get_mut(&job) {
-            job.sequence = sequence(job.sequence, now);
+        if let Some(job) = turn.state.jobs.get_mut(&job) {
+            job.sequence = sequence(job.sequence, turn.now);
         }
-        if let Some(snapshot) = snapshot::of(state, job, now) {
-            effects.push(Effect::Publish { job, snapshot });
+        if let Some(snapshot) = snapshot::of(turn.state, job, turn.now) {
+            turn.effects.push(Effect::Publish { job, snapshot });
         }
     }
 }

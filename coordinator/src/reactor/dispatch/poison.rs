@@ -15,11 +15,13 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
-use super::{Effects, ahead, dispatch, jobs};
-use crate::evaluation::{Evaluation, Indices};
+use super::{batches, schedule};
+use crate::evaluation::Evaluation;
 use crate::failure::Failure;
 use crate::ids::{JobId, WorkerId};
+use crate::indices::Indices;
 use crate::losses::Losses;
+use crate::reactor::turn::Turn;
 use crate::state::{Assignment, Purpose, Stage, State, Worker};
 use crate::worker_name::WorkerName;
 
@@ -29,26 +31,22 @@ const MEMORY: Duration = Duration::from_secs(600);
 /// How little may be expected of a worker, the least last: whether its host's workers are lost over
 /// whatever they hold, whether it does not answer what it holds (which costs time, and fails no
 /// job), whether one was lost over this, whether it has not answered anything yet.
-pub(super) type Standing = (bool, bool, bool, bool);
+pub(crate) type Standing = (bool, bool, bool, bool);
 
 /// Hands out suspects, each alone to a worker that holds nothing. Returns those who must not be
 /// refilled, so that they hold nothing soon.
-pub(super) fn hand_out(
-    state: &mut State,
-    now: Duration,
-    effects: &mut Effects,
-) -> BTreeSet<WorkerId> {
+pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
-    let active: Vec<JobId> = state.active.iter().copied().collect();
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
-        while let Some((index, worker)) = next(state, job, now) {
-            let holds = |worker: &Worker| dispatch::held(state, worker) > 0;
-            if state.workers.get(&worker).is_none_or(holds) {
+        while let Some((index, worker)) = next(turn.state, job, turn.now) {
+            let holds = |worker: &Worker| schedule::held(turn.state, worker) > 0;
+            if turn.state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
             }
-            ahead::give_back(state, worker, now, effects);
-            send(state, job, index, worker, now, effects);
+            batches::preempt(turn, worker);
+            send(turn, job, index, worker);
         }
     }
     kept
@@ -69,37 +67,30 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// answered nothing yet shows first that it answers something else, if there is something else.
 fn taker(state: &State, losses: &Losses, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
-        let held = if losses.is_empty() { dispatch::held(state, worker) } else { 0 };
+        let held = if losses.is_empty() { schedule::held(state, worker) } else { 0 };
         (standing(state, worker, losses), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);
     let (id, worker) = takers.min_by_key(rank)?;
     let recent = losses.last().is_some_and(|last| now.saturating_sub(last) < state.config.expiry);
     let harmless = worker.proven
-        || (dispatch::next_job(state).is_none()
+        || (schedule::next_job(state).is_none()
             && !(recent && state.is_failing(worker.name.host())));
     harmless.then_some(*id)
 }
 
-fn send(
-    state: &mut State,
-    job: JobId,
-    index: u64,
-    worker: WorkerId,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let Some(evaluation) = state.evaluation_mut(job) else {
+fn send(turn: &mut Turn, job: JobId, index: u64, worker: WorkerId) {
+    let Some(evaluation) = turn.state.evaluation_mut(job) else {
         return;
     };
     evaluation.quarantine.retain(|waiting| *waiting != index);
     let indices = Indices { first: index, count: 1 };
     let assignment = Assignment { job, round: evaluation.round, indices };
-    dispatch::send(state, worker, assignment, Purpose::Exclusive, now, effects);
+    batches::send(turn, worker, assignment, Purpose::Exclusive);
 }
 
 /// A worker is back: nothing that it held is to blame for its absence.
-pub(super) fn forgive(state: &mut State, name: &WorkerName) {
+pub(crate) fn forgive(state: &mut State, name: &WorkerName) {
     if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
         lost.workers.retain(|lost| lost != name);
     }
@@ -108,19 +99,13 @@ pub(super) fn forgive(state: &mut State, name: &WorkerName) {
     }
 }
 
-/// Fails the jobs of suspects over which enough workers were lost that have stayed away, and
-/// forgets hosts of which nobody was lost for long.
-pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
+/// Forgets the losses of hosts that have lost nobody for long.
+pub(crate) fn forget_old_losses(state: &mut State, now: Duration) {
     state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
-    let active: Vec<JobId> = state.active.iter().copied().collect();
-    for job in active {
-        if let Some(failure) = lethal(state, job, now) {
-            jobs::fail(state, job, &failure, now, effects);
-        }
-    }
 }
 
-fn lethal(state: &State, job: JobId, now: Duration) -> Option<Failure> {
+/// Why a job fails over a realization: enough workers were lost over it, and have stayed away.
+pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let evaluation = computing(state, job)?;
     let over = |index: &u64| Some((*index, evaluation.suspects.get(index)?));
     let waiting = evaluation.quarantine.iter().filter_map(over);
@@ -142,7 +127,7 @@ fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> Str
 
 /// Whether enough workers were lost over something that those in `of` may have, and have stayed
 /// away for so long that they will not come back.
-pub(super) fn hopeless(
+pub(crate) fn hopeless(
     state: &State,
     losses: &Losses,
     of: impl Fn(&WorkerName) -> bool,
@@ -152,7 +137,7 @@ pub(super) fn hopeless(
     losses.last().is_some_and(long) && enough(state, losses, of)
 }
 
-pub(super) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
+pub(crate) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
     let untried = |worker: &Worker| {
         let (failing, silent, lost, _) = standing(state, worker, losses);
         let stayed = losses.first().is_some_and(|first| worker.attached < first);
@@ -162,7 +147,7 @@ pub(super) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) ->
 }
 
 /// How little may be expected of a worker at something over which these were lost.
-pub(super) fn standing(state: &State, worker: &Worker, losses: &Losses) -> Standing {
+pub(crate) fn standing(state: &State, worker: &Worker, losses: &Losses) -> Standing {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);
     (state.is_failing(host), silent, losses.are_of(host), !worker.proven)

@@ -12,13 +12,14 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::suspects::{self, Standing};
-use super::{Effects, ahead, batches, copies, dispatch};
+use super::poison::{self, Standing};
+use super::{batches, duplicates, schedule};
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::losses::Losses;
+use crate::reactor::turn::Turn;
 use crate::state::{Assignment, Batch, Purpose, State, Worker};
 use crate::worker_name::WorkerName;
 
@@ -41,23 +42,23 @@ const MISSED_MAX: u32 = 3;
 const SILENT_MAX: Duration = Duration::from_secs(60);
 
 /// Looks for batches that are overdue.
-pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
-    state.probation.forget(now);
-    let late = state.batches.keys().filter(|id| is_overdue(state, **id, now));
+pub(crate) fn tick(turn: &mut Turn) {
+    turn.state.probation.forget(turn.now);
+    let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
     let late: Vec<BatchId> = late.copied().collect();
     for id in &late {
-        accuse(state, *id, now);
+        accuse(turn.state, *id, turn.now);
     }
     let waits = |id: &BatchId| {
-        state.batches.get(id).is_some_and(|batch| {
+        turn.state.batches.get(id).is_some_and(|batch| {
             let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
             let asked_for = batch.purpose != Purpose::Speculative;
             newest && asked_for && batch.duplicates.len() + 1 < COPIES_MAX
         })
     };
-    state.overdue = late.into_iter().filter(waits).collect();
-    for id in Vec::from_iter(state.overdue.iter().copied()) {
-        give_up_audit(state, id, now, effects);
+    turn.state.overdue = late.into_iter().filter(waits).collect();
+    for id in Vec::from_iter(turn.state.overdue.iter().copied()) {
+        give_up_audit(turn, id);
     }
 }
 
@@ -74,7 +75,7 @@ fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
 
 /// Whether the answer to a batch may be hoped for: it is not overdue, or its worker is not known for
 /// not answering.
-pub(super) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
+pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
     let worker = state.batches.get(&id).and_then(|batch| state.workers.get(&batch.worker));
     worker.is_some_and(|worker| !state.probation.has(&worker.name) || !is_overdue(state, id, now))
 }
@@ -111,59 +112,57 @@ fn accuse(state: &mut State, id: BatchId, now: Duration) {
 
 /// Takes back an audit that two workers did not answer in time, or one where nobody else is there for
 /// it who holds nothing overdue: an answer that nobody checks is believed.
-fn give_up_audit(state: &mut State, id: BatchId, now: Duration, effects: &mut Effects) {
-    let Some(batch) = state.batches.get(&id) else {
+fn give_up_audit(turn: &mut Turn, id: BatchId) {
+    let Some(batch) = turn.state.batches.get(&id) else {
         return;
     };
     let audit = matches!(batch.purpose, Purpose::Audit { .. });
-    let other = || state.workers.values().any(|worker| is_fit(state, id, worker, now));
+    let other =
+        || turn.state.workers.values().any(|worker| is_fit(turn.state, id, worker, turn.now));
     if !audit || (batch.retries == 0 && other()) {
         return;
     }
     let mut given_up = batch.duplicates.clone();
     given_up.push(id);
     for id in given_up {
-        missed(state, id, now);
-        batches::revoke(state, id, now, effects);
+        missed(turn.state, id, turn.now);
+        batches::revoke(turn, id);
     }
 }
 
 /// Has other workers compute what is overdue, before anything else is handed out. Adds those to
 /// `kept` that must not be refilled, so that they hold nothing soon.
-pub(super) fn hand_out(
-    state: &mut State,
-    kept: &mut BTreeSet<WorkerId>,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    if state.overdue.is_empty() {
+pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
+    if turn.state.overdue.is_empty() {
         return;
     }
-    let busy = dispatch::work_waits(state);
-    let mut free = dispatch::free_workers(state, kept);
+    let busy = schedule::work_waits(turn.state);
+    let mut free = schedule::free_workers(turn.state, kept);
     let mut sent = 0;
-    for id in Vec::from_iter(state.overdue.iter().copied()) {
-        let Some(batch) = state.batches.get(&id) else {
+    for id in Vec::from_iter(turn.state.overdue.iter().copied()) {
+        let Some(batch) = turn.state.batches.get(&id) else {
             continue;
         };
         let (job, alone) = (batch.assignment.job, batch.purpose == Purpose::Exclusive);
         // Since time was looked at last it may have become known that the job is slow.
         if sent >= SENT_AT_ONCE_MAX
             || (free.is_empty() && !alone)
-            || !is_overdue(state, id, now)
-            || (busy && has_scout(state, job, now))
+            || !is_overdue(turn.state, id, turn.now)
+            || (busy && has_scout(turn.state, job, turn.now))
         {
             continue;
         }
-        let Some(taker) =
-            (if alone { taker_alone(state, id, now) } else { taker(state, id, &free, now) })
-        else {
+        let Some(taker) = (if alone {
+            taker_alone(turn.state, id, turn.now)
+        } else {
+            taker(turn.state, id, &free, turn.now)
+        }) else {
             continue;
         };
-        if alone && holds_anything(state, taker) {
+        if alone && holds_anything(turn.state, taker) {
             kept.insert(taker);
         } else {
-            send(state, id, taker, now, effects);
+            send(turn, id, taker);
             free.retain(|free| *free != taker);
             sent += 1;
         }
@@ -177,7 +176,7 @@ fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
 }
 
 fn holds_anything(state: &State, worker: WorkerId) -> bool {
-    state.workers.get(&worker).is_none_or(|worker| dispatch::held(state, worker) > 0)
+    state.workers.get(&worker).is_none_or(|worker| schedule::held(state, worker) > 0)
 }
 
 /// The one of these workers that is to have a copy of a batch.
@@ -186,7 +185,7 @@ fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option
         let doubtful = worker.missed.count > 0 || !worker.proven;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
-        (on_probation, doubtful, of_holder, dispatch::held(state, worker), *taker)
+        (on_probation, doubtful, of_holder, schedule::held(state, worker), *taker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
@@ -199,12 +198,12 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let losses = attempt(state, batch)?.suspects.get(&batch.assignment.indices.first);
     let nobody = Losses::default();
     let losses = losses.unwrap_or(&nobody);
-    if suspects::enough(state, losses, |_| true) {
+    if poison::enough(state, losses, |_| true) {
         return None;
     }
     let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Standing, bool, usize, WorkerId) {
-        let standing = suspects::standing(state, worker, losses);
-        (standing, is_of_holder(state, id, worker), dispatch::held(state, worker), **taker)
+        let standing = poison::standing(state, worker, losses);
+        (standing, is_of_holder(state, id, worker), schedule::held(state, worker), **taker)
     };
     let fit =
         |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
@@ -268,23 +267,23 @@ fn attempt<'a>(state: &'a State, batch: &Batch) -> Option<&'a Evaluation> {
 }
 
 /// Sends a worker a copy of an overdue batch.
-fn send(state: &mut State, id: BatchId, to: WorkerId, now: Duration, effects: &mut Effects) {
-    let Some(batch) = state.batches.get(&id) else {
+fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
+    let Some(batch) = turn.state.batches.get(&id) else {
         return;
     };
     let Batch { assignment, purpose, retries, worker, .. } = *batch;
     if purpose == Purpose::Exclusive {
-        ahead::give_back(state, to, now, effects);
+        batches::preempt(turn, to);
     }
-    let Some(copy) = copies::send(state, id, to, now, effects) else {
+    let Some(copy) = duplicates::send(turn, id, to) else {
         return;
     };
     tracing::info!(job = %assignment.job, first = assignment.indices.first, overdue = %worker, %to,
         "a batch is overdue; another worker computes the same");
-    if let Some(batch) = state.batches.get_mut(&copy) {
+    if let Some(batch) = turn.state.batches.get_mut(&copy) {
         batch.retries = retries + 1;
     }
-    if let Some(evaluation) = state.attempt_mut(&assignment) {
+    if let Some(evaluation) = turn.state.attempt_mut(&assignment) {
         match purpose {
             Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
             Purpose::Audit { .. } => evaluation.audits_out += 1,
@@ -297,14 +296,14 @@ fn send(state: &mut State, id: BatchId, to: WorkerId, now: Duration, effects: &m
             }
         }
     }
-    if let Some(job) = state.jobs.get_mut(&assignment.job) {
+    if let Some(job) = turn.state.jobs.get_mut(&assignment.job) {
         job.scout = Some(copy);
     }
 }
 
 /// A batch is taken back from its worker because another has answered it, or because nobody waits
 /// for it any longer: that counts, if the worker should have answered it long ago.
-pub(super) fn missed(state: &mut State, id: BatchId, now: Duration) {
+pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
@@ -331,7 +330,7 @@ pub(super) fn missed(state: &mut State, id: BatchId, now: Duration) {
 
 /// Puts a worker on probation that does not answer what it was sent at `sent`, or notes one more
 /// reason for it.
-pub(super) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
+pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
     if state.probation.miss(name, sent, now) {
         tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
             holds; until it does it gets one realization at a time");
@@ -339,7 +338,7 @@ pub(super) fn begin_probation(state: &mut State, name: &WorkerName, sent: Durati
 }
 
 /// A worker has answered a batch that it holds.
-pub(super) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
+pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
     let Some(worker) = state.workers.get_mut(&worker) else {
         return;
     };

@@ -6,59 +6,55 @@ use std::time::Duration;
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
-use super::{Effects, ahead, batches, overdue, suspects};
-use crate::effect::{CloseReason, Effect, Refusal};
+use crate::close_reason::CloseReason;
+use crate::effect::{Effect, Refusal};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
 use crate::losses::{Cause, Loss};
 use crate::notice::{Departure, Notice};
 use crate::rate::Rate;
-use crate::state::{DEPARTED_MAX, Departed, Missed, State, Worker};
+use crate::reactor::dispatch::{batches, departures, overdue, poison};
+use crate::reactor::turn::Turn;
+use crate::state::{Missed, State, Worker};
 use crate::worker_name::WorkerName;
 
-pub(super) fn hello(
-    state: &mut State,
-    worker: WorkerId,
-    hello: Hello,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    if state.workers.contains_key(&worker) {
-        close(state, worker, CloseReason::SecondHello, now, effects);
+pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
+    if turn.state.workers.contains_key(&worker) {
+        close(turn, worker, CloseReason::SecondHello);
         return;
     }
-    if let Err(reason) = admit(state, &hello) {
+    if let Err(reason) = admit(turn.state, &hello) {
         // A name that is too long is not repeated as a whole.
         let host: String = hello.host.chars().take(NAME_BYTES_MAX).collect();
         let name = WorkerName::new(&host, hello.process, hello.instance);
         let refused = Notice::WorkerRefused { worker, name, reason: reason.clone() };
-        effects.extend([Effect::Close { worker, reason }, Effect::Note(refused)]);
+        turn.effects.extend([Effect::Close { worker, reason }, Effect::Note(refused)]);
         return;
     }
-    let lease = LeaseId(state.next_lease);
-    state.next_lease += 1;
+    let lease = LeaseId(turn.state.next_lease);
+    turn.state.next_lease += 1;
     let name = name(&hello);
-    suspects::forgive(state, &name);
-    state.probation.attach(&name, now);
-    effects.push(Effect::Welcome { worker, lease });
-    effects.push(Effect::Note(Notice::WorkerAttached {
+    poison::forgive(turn.state, &name);
+    turn.state.probation.attach(&name, turn.now);
+    turn.effects.push(Effect::Welcome { worker, lease });
+    turn.effects.push(Effect::Note(Notice::WorkerAttached {
         worker,
         name: name.clone(),
         threads: hello.threads,
         version: hello.version.clone(),
     }));
-    state.workers.insert(
+    turn.state.workers.insert(
         worker,
         Worker {
             lease,
             name,
             hello,
-            attached: now,
-            heard: now,
-            answered: now,
+            attached: turn.now,
+            heard: turn.now,
+            answered: turn.now,
             proven: false,
             missed: Missed::default(),
-            beat: now,
+            beat: turn.now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
             rate: Rate::default(),
@@ -68,104 +64,65 @@ pub(super) fn hello(
     );
 }
 
-pub(super) fn heard(state: &mut State, worker: WorkerId, now: Duration) {
+pub(crate) fn heard(state: &mut State, worker: WorkerId, now: Duration) {
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.heard = now;
     }
 }
 
-pub(super) fn drains(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
-    heard(state, worker, now);
-    if let Some(attached) = state.workers.get_mut(&worker) {
+pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
+    heard(turn.state, worker, turn.now);
+    if let Some(attached) = turn.state.workers.get_mut(&worker) {
         attached.draining = true;
     }
-    ahead::give_back(state, worker, now, effects);
-    dismiss_if_drained(state, worker, now, effects);
+    batches::preempt(turn, worker);
+    departures::dismiss_if_drained(turn, worker);
 }
 
 /// Sends a worker away: it gets nothing new, and leaves when it has answered what it holds.
 ///
 /// # Errors
 /// When no such worker is attached.
-pub(super) fn send_away(
-    state: &mut State,
-    worker: WorkerId,
-    now: Duration,
-    effects: &mut Effects,
-) -> Result<(), Refusal> {
-    let attached = state.workers.get_mut(&worker).ok_or(Refusal::NoWorker { worker })?;
+pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
+    let attached = turn.state.workers.get_mut(&worker).ok_or(Refusal::NoWorker { worker })?;
     if !attached.draining {
         attached.draining = true;
-        effects.push(Effect::Drain { worker });
-        ahead::give_back(state, worker, now, effects);
+        turn.effects.push(Effect::Drain { worker });
+        batches::preempt(turn, worker);
     }
     Ok(())
 }
 
-/// Closes the stream of a worker that wanted to leave and holds nothing any more.
-pub(super) fn dismiss_if_drained(
-    state: &mut State,
-    worker: WorkerId,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let drained = |worker: &Worker| worker.draining && worker.in_flight.is_empty();
-    if state.workers.get(&worker).is_some_and(drained) {
-        close(state, worker, CloseReason::Drained, now, effects);
-    }
-}
-
 /// Closes a worker's stream; what it held goes to others.
-pub(super) fn close(
-    state: &mut State,
-    worker: WorkerId,
-    reason: CloseReason,
-    now: Duration,
-    effects: &mut Effects,
-) {
+pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
     if matches!(reason, CloseReason::Unanswering { .. })
-        && let Some(name) = state.workers.get(&worker).map(|worker| worker.name.clone())
+        && let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone())
     {
-        overdue::begin_probation(state, &name, now, now);
+        overdue::begin_probation(turn.state, &name, turn.now, turn.now);
     }
-    effects.push(Effect::Close { worker, reason: reason.clone() });
-    lost(state, worker, Departure::Closed(reason), now, effects);
+    turn.effects.push(Effect::Close { worker, reason: reason.clone() });
+    lost(turn, worker, Departure::Closed(reason));
 }
 
 /// The stream of a worker ended; what it held goes to others.
-pub(super) fn stream_ended(
-    state: &mut State,
-    worker: WorkerId,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    lost(state, worker, Departure::StreamEnded, now, effects);
+pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
+    lost(turn, worker, Departure::StreamEnded);
 }
 
 /// Forgets a worker; what it held goes to others. Later events of it mean nothing.
-fn lost(state: &mut State, worker: WorkerId, why: Departure, now: Duration, effects: &mut Effects) {
-    let Some(gone) = state.workers.remove(&worker) else {
+fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
+    let cause = cause(&why);
+    let Some(gone) = departures::depart(turn, worker, why) else {
         return;
     };
-    if state.workers.is_empty() {
-        state.no_worker_since = now;
-    }
-    let batches = gone.in_flight.len();
-    let cause = if gone.draining { Cause::Announced } else { cause(&why) };
-    let name = gone.name.clone();
-    let departed = Departed { worker, name: name.clone(), at: now, batches, why: why.clone() };
-    state.departed.push_back(departed);
-    if state.departed.len() > DEPARTED_MAX {
-        state.departed.pop_front();
-    }
-    effects.push(Effect::Note(Notice::WorkerDetached { worker, name, batches, why }));
+    let cause = if gone.draining { Cause::Announced } else { cause };
     if cause != Cause::Announced && !gone.in_flight.is_empty() {
-        state.count_loss(&gone.name, now);
+        turn.state.count_loss(&gone.name, turn.now);
     }
     let alone = gone.in_flight.len() == 1;
-    let loss = Loss { worker: gone.name, cause, at: now, alone, proven: gone.proven };
+    let loss = Loss { worker: gone.name, cause, at: turn.now, alone, proven: gone.proven };
     for batch in gone.in_flight {
-        batches::orphaned(state, batch, &loss);
+        batches::give_back_orphan(turn.state, batch, &loss);
     }
 }
 
@@ -192,15 +149,15 @@ fn cause(why: &Departure) -> Cause {
 }
 
 /// Begins the end: no new batch, every stream closed; records on their way are waited for.
-pub(super) fn drain_all(state: &mut State, now: Duration, effects: &mut Effects) {
-    state.draining = true;
-    let workers: Vec<WorkerId> = state.workers.keys().copied().collect();
+pub(crate) fn drain_all(turn: &mut Turn) {
+    turn.state.draining = true;
+    let workers: Vec<WorkerId> = turn.state.workers.keys().copied().collect();
     for worker in workers {
         // A worker that is sent away is not to blame for what it held.
-        if let Some(attached) = state.workers.get_mut(&worker) {
+        if let Some(attached) = turn.state.workers.get_mut(&worker) {
             attached.draining = true;
         }
-        close(state, worker, CloseReason::Draining, now, effects);
+        close(turn, worker, CloseReason::Draining);
     }
 }
 

@@ -11,34 +11,36 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_common::parameters::Point;
 
-use super::{realizations, realizations_held};
-use crate::evaluation::{Evaluation, Indices};
+use super::speculation::realizations;
+use super::{batches, eta, sizing};
+use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{JobId, WorkerId};
-use crate::reactor::{Effects, dispatch, due};
+use crate::indices::Indices;
+use crate::reactor::turn::Turn;
 use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
 
 /// When the last batch of what each search waits for should be answered.
 type Dues = BTreeMap<JobId, Duration>;
 
 /// Hands out what may be done ahead to the workers with idle threads.
-pub(in crate::reactor) fn hand_out(state: &mut State, now: Duration, effects: &mut Effects) {
-    if next(state).is_none() {
+pub(crate) fn hand_out(turn: &mut Turn) {
+    if next(turn.state).is_none() {
         return;
     }
-    let idle = state.workers.iter().map(|(id, worker)| (*id, spare(state, worker)));
+    let idle = turn.state.workers.iter().map(|(id, worker)| (*id, spare(turn.state, worker)));
     let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, threads)| *threads > 0).collect();
     let mut threads: u64 = idle.iter().map(|(_, threads)| threads).sum();
-    let dues = due::dues(state);
-    let mut wanted = next(state);
+    let dues = eta::dues(turn.state);
+    let mut wanted = next(turn.state);
     for (worker, spare) in idle {
         let Some((job, point)) = wanted else {
             return;
         };
-        if !waits(state, job, &point, worker, threads, &dues, now) {
-            send(state, job, point, worker, now, effects);
+        if !waits(turn.state, job, &point, worker, threads, &dues, turn.now) {
+            send(turn, job, point, worker);
             threads -= spare;
-            wanted = next(state);
+            wanted = next(turn.state);
         }
     }
 }
@@ -121,27 +123,21 @@ fn has_next(job: &Job) -> bool {
 }
 
 /// Gives the idle threads of a worker a batch of a point.
-fn send(
-    state: &mut State,
-    id: JobId,
-    point: Point,
-    worker: WorkerId,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
+    let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
+    else {
         return;
     };
-    let (queued, spare) = (queued(job, &point), spare(state, attached));
-    let size = match realizations_held(state, attached) {
-        0 => dispatch::batch_size(state, attached, id, queued).max(spare.min(queued)),
+    let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
+    let size = match batches::realizations_held(turn.state, attached) {
+        0 => sizing::batch_size(turn.state, attached, id, queued).max(spare.min(queued)),
         _ => spare,
     };
-    let Some((round, indices)) = take(state, id, point, size) else {
+    let Some((round, indices)) = take(turn.state, id, point, size) else {
         return;
     };
     let assignment = Assignment { job: id, round, indices };
-    dispatch::send(state, worker, assignment, Purpose::Speculative, now, effects);
+    batches::send(turn, worker, assignment, Purpose::Speculative);
 }
 
 /// Takes indices of a point, which is begun now if it was not; with the number of the attempt.
@@ -167,5 +163,5 @@ fn spare(state: &State, worker: &Worker) -> u64 {
     if !state.is_sound(worker) || full || failing || taken {
         return 0;
     }
-    u64::from(worker.hello.threads).saturating_sub(realizations_held(state, worker))
+    u64::from(worker.hello.threads).saturating_sub(batches::realizations_held(state, worker))
 }

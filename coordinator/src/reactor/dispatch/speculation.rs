@@ -9,22 +9,18 @@
 //! charged for it.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 
-use super::{Effects, batches, dispatch, jobs};
+use super::batches;
 use crate::evaluation::Evaluation;
-use crate::ids::{BatchId, JobId, WorkerId};
+use crate::ids::{BatchId, JobId};
+use crate::reactor::turn::Turn;
 use crate::search::same_point;
-use crate::state::{Ahead, Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
+use crate::state::{Ahead, Assignment, Job, Purpose, Stage, State};
 use crate::worker_name::WorkerName;
-
-pub(super) use self::idle::hand_out;
-
-mod idle;
 
 /// Points that are known for each job, at most.
 pub(crate) const LIKELY_MAX: usize = 8;
@@ -32,15 +28,9 @@ pub(crate) const LIKELY_MAX: usize = 8;
 const REALIZATIONS_MAX: u64 = 20_000;
 
 /// Begins the evaluation of the point that a job's search asks for, with what is known of it.
-pub(super) fn begin(
-    state: &mut State,
-    id: JobId,
-    point: Point,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let round = state.round();
-    let Some(job) = state.jobs.get_mut(&id) else {
+pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
+    let round = turn.state.round();
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     let number = job.search.evaluations();
@@ -49,8 +39,8 @@ pub(super) fn begin(
         Some(mut known) => {
             known.number = number;
             // Nobody could decide them before.
-            known.disputes.iter_mut().for_each(|dispute| dispute.since = now);
-            job.rate.add(known.filled(), now);
+            known.disputes.iter_mut().for_each(|dispute| dispute.since = turn.now);
+            job.rate.add(known.filled(), turn.now);
             known
         }
         None => {
@@ -61,90 +51,44 @@ pub(super) fn begin(
     let likely = if speculates(job) { job.search.likely(LIKELY_MAX) } else { Vec::new() };
     let round = evaluation.round;
     job.stage = Stage::Computing(evaluation);
-    adopt_batches(state, id, round);
-    keep(state, id, likely, now, effects);
-    jobs::store_if_complete(state, id, now, effects);
+    adopt_batches(turn.state, id, round);
+    keep(turn, id, likely);
 }
 
 /// The outcomes of a job's evaluation are there, and on their way to the store: where its search
 /// will go is known, though it is not told yet.
-pub(super) fn prepare(
-    state: &mut State,
-    id: JobId,
-    outcomes: &Arc<[Outcome]>,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    if let Some(job) = state.jobs.get_mut(&id).filter(|job| speculates(job)) {
+pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Arc<[Outcome]>) {
+    if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(job)) {
         let likely = job.search.likely_after(outcomes, LIKELY_MAX);
-        keep(state, id, likely, now, effects);
-    }
-}
-
-/// Takes back what a worker does ahead, if it has no room for `count` realizations besides.
-pub(super) fn make_way(
-    state: &mut State,
-    worker: WorkerId,
-    count: u64,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let Some(attached) = state.workers.get(&worker) else {
-        return;
-    };
-    let full = attached.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
-    if full || realizations_held(state, attached) + count > attached.hello.threads.into() {
-        give_back(state, worker, now, effects);
-    }
-}
-
-/// Takes back what a worker does ahead.
-pub(super) fn give_back(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) {
-    let Some(attached) = state.workers.get(&worker) else {
-        return;
-    };
-    let held: Vec<BatchId> = state.held_for(attached, Purpose::Speculative).collect();
-    for batch in held {
-        if let Some(assignment) = state.batches.get(&batch).map(|batch| batch.assignment)
-            && let Some(evaluation) = state.attempt_mut(&assignment)
-        {
-            evaluation.put_back(assignment.indices);
-        }
-        batches::revoke(state, batch, now, effects);
+        keep(turn, id, likely);
     }
 }
 
 /// Drops all that a job is ahead with.
-pub(super) fn drop_all(state: &mut State, id: JobId, now: Duration, effects: &mut Effects) {
-    keep(state, id, Vec::new(), now, effects);
+pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
+    keep(turn, id, Vec::new());
 }
 
 /// Drops what an expelled worker has done ahead.
-pub(super) fn forget(
-    state: &mut State,
-    id: JobId,
-    name: &WorkerName,
-    now: Duration,
-    effects: &mut Effects,
-) {
+pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     let involves = |evaluation: &Evaluation| {
         evaluation.workers.contains(name)
             || evaluation.disputes.iter().any(|dispute| dispute.involves(name))
     };
-    retain(state, id, |evaluation| !involves(evaluation), now, effects);
+    retain(turn, id, |evaluation| !involves(evaluation));
 }
 
 /// Drops what is furthest ahead, until the bound on realizations in memory is kept.
-pub(super) fn keep_bound(state: &mut State, now: Duration, effects: &mut Effects) {
-    while realizations(state) > state.config.active_realizations_max {
+pub(crate) fn keep_bound(turn: &mut Turn) {
+    while realizations(turn.state) > turn.state.config.active_realizations_max {
         let ahead = |id: &JobId| {
-            let evaluations = &state.jobs.get(id)?.ahead.evaluations;
+            let evaluations = &turn.state.jobs.get(id)?.ahead.evaluations;
             evaluations.last().map(|last| (evaluations.len(), *id, last.round))
         };
-        let Some((_, job, round)) = state.active.iter().filter_map(ahead).max() else {
+        let Some((_, job, round)) = turn.state.active.iter().filter_map(ahead).max() else {
             return;
         };
-        retain(state, job, |evaluation| evaluation.round != round, now, effects);
+        retain(turn, job, |evaluation| evaluation.round != round);
     }
 }
 
@@ -165,29 +109,23 @@ fn adopt_batches(state: &mut State, job: JobId, round: u64) {
     for id in held {
         if let Some(batch) = state.batches.get_mut(&id) {
             batch.purpose = Purpose::Fill;
-            dispatch::charge(state, id);
+            batches::charge(state, id);
         }
     }
 }
 
 /// Makes `likely` the points that a job may be ahead with, and drops all others.
-fn keep(state: &mut State, id: JobId, likely: Vec<Point>, now: Duration, effects: &mut Effects) {
+fn keep(turn: &mut Turn, id: JobId, likely: Vec<Point>) {
     let stays = |evaluation: &Evaluation| likely.iter().any(|at| same_point(at, &evaluation.point));
-    retain(state, id, stays, now, effects);
-    if let Some(job) = state.jobs.get_mut(&id) {
+    retain(turn, id, stays);
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
         job.ahead.likely = likely;
     }
 }
 
 /// Drops what does not meet `stays` of what a job is ahead with.
-fn retain(
-    state: &mut State,
-    id: JobId,
-    stays: impl Fn(&Evaluation) -> bool,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let Some(job) = state.jobs.get_mut(&id) else {
+fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&Evaluation) -> bool) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     let goes = |evaluation: &Evaluation| !stays(evaluation);
@@ -198,21 +136,15 @@ fn retain(
     }
     let of_gone =
         |assignment: &Assignment| assignment.job == id && gone.contains(&assignment.round);
-    let held = state.batches.iter().filter(|(_, batch)| of_gone(&batch.assignment));
+    let held = turn.state.batches.iter().filter(|(_, batch)| of_gone(&batch.assignment));
     let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
     for batch in held {
-        batches::revoke(state, batch, now, effects);
+        batches::revoke(turn, batch);
     }
 }
 
-/// Realizations of all batches that a worker holds.
-fn realizations_held(state: &State, worker: &Worker) -> u64 {
-    let held = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
-    held.map(|batch| batch.assignment.indices.count).sum()
-}
-
 /// Realizations of the evaluations of all active jobs, those ahead included.
-fn realizations(state: &State) -> u64 {
+pub(crate) fn realizations(state: &State) -> u64 {
     let of_job = |id: &JobId| {
         let job = state.jobs.get(id)?;
         let each = job.record.specification.monte_carlo.realizations;
@@ -223,11 +155,12 @@ fn realizations(state: &State) -> u64 {
 
 impl Ahead {
     /// What is computed of a point.
-    fn at(&self, point: &Point) -> Option<&Evaluation> {
+    pub(crate) fn at(&self, point: &Point) -> Option<&Evaluation> {
         self.evaluations.iter().find(|begun| same_point(&begun.point, point))
     }
 
-    fn at_mut(&mut self, point: &Point) -> Option<&mut Evaluation> {
+    /// As [`Ahead::at`].
+    pub(crate) fn at_mut(&mut self, point: &Point) -> Option<&mut Evaluation> {
         self.evaluations.iter_mut().find(|begun| same_point(&begun.point, point))
     }
 }

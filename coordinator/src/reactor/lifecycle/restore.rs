@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use osteon_common::version;
 
-use super::{Effects, jobs};
+use super::jobs;
 use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
+use crate::reactor::turn::Turn;
 use crate::state::{EndedJob, Expelled, Job, RequestName, Stage, State, sequence};
 use crate::store::{ExpulsionRecord, JobRecord, Store, StoreError};
 
@@ -93,7 +94,6 @@ impl State {
     /// A coordinator that goes on with what was `restored`, as of `now`.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let mut effects = Effects::new();
         let Restored { ended, unfinished, expelled, last_forgotten } = restored;
         state.next_job = last_forgotten.map_or(1, |job| job.0 + 1);
         let durable = |record| Expelled { record, store_at: None, refused: false };
@@ -110,7 +110,9 @@ impl State {
             state.waiting.push_back(id);
             state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
         }
-        jobs::begin_waiting(&mut state, now, &mut effects);
+        let mut turn = Turn::new(&mut state, now);
+        jobs::begin_waiting(&mut turn);
+        let effects = turn.effects;
         (state, effects)
     }
 
