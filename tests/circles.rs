@@ -33,14 +33,36 @@ struct Module {
 #[test]
 fn no_files_of_a_crate_form_a_circle() {
     for (directory, closed) in DIRECTORIES {
-        let mut sources = BTreeMap::new();
-        read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(directory), "", &mut sources);
+        let mut sources = sources(directory);
         sources.retain(|file, _| !closed.contains(&file.split(['/', '.']).next().unwrap()));
         assert!(sources.len() > 3, "only {} files were found in {directory}", sources.len());
-        if let Some(circle) = circle(&sources) {
+        if let Some(circle) = circle(arrows(&sources)) {
             panic!("{directory} has a circle: {}", circle.join(" -> "));
         }
     }
+}
+
+#[test]
+fn layers_of_the_reactor_call_downwards_only() {
+    let layers = ["reactor/dispatch", "reactor/lifecycle", "reactor/integrity"];
+    let layer = |file: &str| layers.iter().position(|layer| file.starts_with(layer));
+    let mut count = 0;
+    for (from, targets) in arrows(&sources("coordinator/src")) {
+        for to in targets {
+            if let Some((from_layer, to_layer)) = layer(&from).zip(layer(&to)) {
+                count += 1;
+                assert!(from_layer >= to_layer, "{from} calls {to} in a layer above");
+            }
+        }
+    }
+    assert!(count > 20, "only {count} calls were found");
+}
+
+/// The files of a crate, by their paths below a directory.
+fn sources(directory: &str) -> BTreeMap<String, String> {
+    let mut sources = BTreeMap::new();
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(directory), "", &mut sources);
+    sources
 }
 
 /// Reads the files below a folder, by their paths.
@@ -56,34 +78,36 @@ fn read(folder: &Path, prefix: &str, sources: &mut BTreeMap<String, String>) {
     }
 }
 
-/// Files that form a circle, the first once more at the end; `None` if there is none.
-fn circle(sources: &BTreeMap<String, String>) -> Option<Vec<String>> {
+/// The files that each file refers to.
+fn arrows(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
     let modules = modules(sources);
-    let mut arrows: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for module in modules.values() {
+    let targets = |module: &Module| {
         let targets = module.named.iter().filter_map(|path| target(&modules, path, SIGNPOSTS_MAX));
-        let others = targets.filter(|file| *file != module.file);
-        arrows.entry(&module.file).or_default().extend(others);
-    }
-    // What leads nowhere is in no circle, again and again.
+        targets.filter(|file| *file != module.file).map(str::to_owned).collect()
+    };
+    modules.values().map(|module| (module.file.clone(), targets(module))).collect()
+}
+
+/// Files that form a circle, the first once more at the end; `None` if there is none.
+fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
+    // What leads nowhere is in no circle, and then what leads only there.
     loop {
-        let left: BTreeSet<&str> = arrows.keys().copied().collect();
-        let count = left.len();
+        let left: BTreeSet<String> = arrows.keys().cloned().collect();
         arrows.retain(|_, to| {
             to.retain(|file| left.contains(file));
             !to.is_empty()
         });
-        if arrows.len() == count {
+        if arrows.len() == left.len() {
             break;
         }
     }
     // Each of the rest leads to another of the rest: following them comes back.
-    let mut way: Vec<&str> = arrows.keys().take(1).copied().collect();
-    while let Some(next) = way.last().and_then(|last| arrows[last].first().copied()) {
-        let seen = way.iter().position(|file| *file == next);
-        way.push(next);
+    let mut way: Vec<String> = arrows.keys().take(1).cloned().collect();
+    while let Some(next) = way.last().and_then(|last| arrows[last].first()) {
+        let seen = way.iter().position(|file| file == next);
+        way.push(next.clone());
         if let Some(at) = seen {
-            return Some(way[at..].iter().map(|file| (*file).to_owned()).collect());
+            return Some(way.split_off(at));
         }
     }
     None
@@ -325,7 +349,7 @@ fn quoted(text: &str) -> Option<usize> {
 /// The circle that these files form.
 fn check(files: &[(&str, &str)], expected: &[&str]) {
     let sources = files.iter().map(|(file, text)| ((*file).to_owned(), (*text).to_owned()));
-    let found = circle(&sources.collect()).unwrap_or_default();
+    let found = circle(arrows(&sources.collect())).unwrap_or_default();
     assert_eq!(found, expected, "{files:?}");
 }
 
