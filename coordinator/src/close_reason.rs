@@ -27,16 +27,16 @@ pub enum CloseReason {
         "this worker is expelled: it {reason}; check its machine, and start it again when it is \
          repaired"
     )]
-    Expelled {
+    Banned {
         /// What was found.
         reason: String,
     },
-    /// An impossible number of threads.
-    #[error("this worker announces {threads} threads; 1 to {max} are allowed")]
-    Threads {
+    /// An impossible number of slots.
+    #[error("this worker announces {slots} threads; 1 to {max} are allowed")]
+    Slots {
         /// What it announced.
-        threads: u32,
-        /// Most threads allowed.
+        slots: u32,
+        /// Most slots allowed.
         max: u32,
     },
     /// A name of its introduction is too long.

@@ -11,7 +11,7 @@ use crate::close_reason::CloseReason;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::notice::Notice;
 use crate::search::Summary;
-use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
 
 /// Something to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,8 +118,8 @@ pub enum Record {
         /// What its path came to.
         summary: Arc<Summary>,
     },
-    /// A worker is expelled.
-    Expulsion(ExpulsionRecord),
+    /// A worker is banned.
+    Ban(BanRecord),
 }
 
 impl Record {
@@ -129,7 +129,7 @@ impl Record {
             Self::Job(record) => (record.job, RecordKey::Job),
             Self::Evaluation { record, .. } => (record.job, RecordKey::Evaluation(record.number)),
             Self::End { end, .. } => (end.job, RecordKey::End),
-            Self::Expulsion(record) => (record.job, RecordKey::Expulsion(record.number)),
+            Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
         }
     }
 }
@@ -143,8 +143,8 @@ pub enum RecordKey {
     Evaluation(u64),
     /// Its end.
     End,
-    /// The expulsion with this number, of a worker that was found in it.
-    Expulsion(u64),
+    /// The ban with this number, of a worker that was found in it.
+    Ban(u64),
 }
 
 /// Answer to a request.
@@ -165,8 +165,8 @@ pub enum Answer {
     Ended(EndRecord),
     /// These ended jobs are forgotten.
     Pruned(Vec<JobId>),
-    /// The expelled workers, with the time since then.
-    Expelled(Vec<(ExpulsionRecord, Duration)>),
+    /// The banned workers, with the time since then.
+    Banned(Vec<(BanRecord, Duration)>),
     /// The attached workers, and those that went last.
     Workers(ListWorkersResponse),
     /// How a worker stands.

@@ -145,7 +145,7 @@ pub enum Request {
     /// Ended jobs forgotten.
     Prune(Retention),
     /// The workers that were found to compute wrongly.
-    Expelled,
+    Banned,
     /// The attached workers, and those that went last.
     Workers,
     /// A worker sent away when it has answered what it holds.
@@ -168,8 +168,8 @@ pub struct Hello {
     pub version: String,
     /// Fingerprint of its numerics.
     pub fingerprint: String,
-    /// Threads it computes on.
-    pub threads: u32,
+    /// Slots it computes on.
+    pub slots: u32,
     /// Host name, for people.
     pub host: String,
     /// Process id, for people.

@@ -20,8 +20,8 @@ pub enum Notice {
         worker: WorkerId,
         /// Who it is.
         name: WorkerName,
-        /// Threads it computes on.
-        threads: u32,
+        /// Slots it computes on.
+        slots: u32,
         /// Version of its program.
         version: String,
     },
@@ -112,8 +112,8 @@ impl Notice {
     /// another line.
     pub(crate) fn write(&self) {
         match self {
-            Self::WorkerAttached { worker, name, threads, version } => tracing::info!(
-                %worker, host = name.host(), process = name.process(), threads,
+            Self::WorkerAttached { worker, name, slots, version } => tracing::info!(
+                %worker, host = name.host(), process = name.process(), threads = slots,
                 version = version.as_str(), "worker attached"
             ),
             Self::WorkerRefused { worker, name, reason } => tracing::warn!(

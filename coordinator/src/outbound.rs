@@ -85,12 +85,12 @@ pub(crate) fn heartbeat() -> AttachResponse {
 pub(crate) fn status(reason: &CloseReason) -> Status {
     let code = match reason {
         CloseReason::FingerprintDiffers { .. } => Code::FailedPrecondition,
-        CloseReason::Threads { .. }
+        CloseReason::Slots { .. }
         | CloseReason::NameTooLong { .. }
         | CloseReason::Malformed(_)
         | CloseReason::WrongCount { .. }
         | CloseReason::SecondHello => Code::InvalidArgument,
-        CloseReason::Expelled { .. } => Code::PermissionDenied,
+        CloseReason::Banned { .. } => Code::PermissionDenied,
         CloseReason::TooManyWorkers { .. } => {
             return resource_exhausted(reason.to_string(), RETRY);
         }

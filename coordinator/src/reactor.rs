@@ -25,8 +25,8 @@ mod integrity;
 mod lifecycle;
 mod turn;
 
-pub(crate) use dispatch::overdue::COPIES_MAX;
-pub(crate) use dispatch::speculation::LIKELY_MAX;
+pub(crate) use dispatch::overdue::DUPLICATES_MAX;
+pub(crate) use dispatch::speculation::CANDIDATES_MAX;
 pub use lifecycle::restore::Restored;
 
 #[cfg(test)]
@@ -55,13 +55,13 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Answered { worker, batch, solved, elapsed_s } => {
             answers::answered(turn, worker, batch, solved, elapsed_s);
         }
-        Event::Heartbeat { worker } => workers::heard(turn.state, worker, turn.now),
+        Event::Heartbeat { worker } => workers::seen(turn.state, worker, turn.now),
         Event::WorkerDrains { worker } => workers::drains(turn, worker),
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
         Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
-        Event::Stored { key: RecordKey::Expulsion(number), .. } => bans::stored(turn, number),
+        Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
         Event::Stored { job, key } => records::stored(turn, job, key),
-        Event::StoreFailed { key: RecordKey::Expulsion(number), error, .. } => {
+        Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
             bans::store_failed(turn, number, error);
         }
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
@@ -73,7 +73,7 @@ fn apply(turn: &mut Turn, event: Event) {
 
 /// What the passing of time brings.
 fn tick(turn: &mut Turn) {
-    ticks::excuse(turn.state, turn.now);
+    ticks::compensate_gap(turn.state, turn.now);
     ticks::expire(turn);
     ticks::send_heartbeats(turn);
     dispatch::overdue::tick(turn);

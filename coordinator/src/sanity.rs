@@ -8,10 +8,10 @@ use thiserror::Error;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::reactor::{COPIES_MAX, LIKELY_MAX};
+use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
 use crate::state::{
-    Ahead, BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Job, Purpose, RequestName, SETTLED_MAX, Stage,
-    State,
+    BATCHES_IN_FLIGHT_MAX, Banned, Batch, Job, Purpose, RequestName, SETTLED_MAX, Speculation,
+    Stage, State,
 };
 use crate::worker_name::WorkerName;
 
@@ -47,7 +47,7 @@ pub enum Insane {
         /// In how many places it is.
         places: u32,
     },
-    /// The count of filled slots is wrong.
+    /// The count of filled results is wrong.
     #[error("job {0} miscounts its filled slots")]
     Filled(JobId),
     /// A request id does not lead to the job that has it.
@@ -59,12 +59,12 @@ pub enum Insane {
     /// The checks of an evaluation and the batches for them do not match.
     #[error("job {0} miscounts what is being checked")]
     Checks(JobId),
-    /// An answer of an expelled worker counts, or it is attached.
+    /// An answer of a banned worker counts, or it is attached.
     #[error("worker {0} is expelled, and still counts")]
-    Expelled(WorkerName),
+    Banned(WorkerName),
     /// What is computed ahead is none of the points that a search may ask for.
     #[error("job {0} is ahead with what its search does not ask for")]
-    Ahead(JobId),
+    Speculation(JobId),
     /// A number that is handed out next is not above all in use.
     #[error("a number is about to be given twice")]
     Numbers,
@@ -98,7 +98,7 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         let active = state.active.contains(&id);
         let fits = match &job.stage {
             Stage::Waiting => waiting == 1 && !active,
-            Stage::Rereading { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
+            Stage::Replaying { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
                 waiting == 0 && active
             }
             Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
@@ -134,52 +134,53 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
 
 /// What is ahead is of points that may be asked for, once each, while an evaluation is under way.
 fn check_ahead(job: &Job) -> Result<(), Insane> {
-    let Ahead { likely, evaluations } = &job.ahead;
+    let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
-    let known = |of: &Evaluation| likely.iter().any(|at| bits(at) == bits(&of.point));
+    let known = |of: &Evaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
     let fits = evaluations.iter().all(known)
         && points.len() == job.evaluations().count()
-        && likely.len() <= LIKELY_MAX
-        && (under_way || likely.is_empty())
+        && candidates.len() <= CANDIDATES_MAX
+        && (under_way || candidates.is_empty())
         && evaluations.iter().all(|ahead| ahead.audits_out == 0);
-    if fits { Ok(()) } else { Err(Insane::Ahead(job.record.job)) }
+    if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
 }
 
 /// Whether a batch is of this evaluation.
 fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
-    batch.assignment.job == job && batch.assignment.round == evaluation.round
+    batch.assignment.job == job && batch.assignment.attempt == evaluation.attempt
 }
 
-/// Audits and judges are with workers, and nobody who is expelled has a say.
+/// Audits and judges are with workers, and nobody who is banned has a say.
 fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
     };
     let judged = |dispute: &Dispute| {
-        let judges = dispute.judges.iter().filter_map(|judge| state.batches.get(judge));
+        let tie_breakers =
+            dispute.tie_breakers.iter().filter_map(|tie_breaker| state.batches.get(tie_breaker));
         let fits = |batch: &&Batch| {
             batch.purpose == Purpose::TieBreak && batch.assignment.indices == dispute.indices
         };
-        judges.filter(fits).count() == dispute.judges.len()
+        tie_breakers.filter(fits).count() == dispute.tie_breakers.len()
     };
     let disputes = &evaluation.disputes;
-    let judges: usize = disputes.iter().map(|dispute| dispute.judges.len()).sum();
+    let tie_breakers: usize = disputes.iter().map(|dispute| dispute.tie_breakers.len()).sum();
     if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
-        || with(|purpose| *purpose == Purpose::TieBreak) != judges
+        || with(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
         || !disputes.iter().all(judged)
     {
         return Err(Insane::Checks(job));
     }
-    for Expelled { record, .. } in &state.expelled {
+    for Banned { record, .. } in &state.banned {
         let name = &record.worker;
         let attached = state.workers.values().any(|worker| worker.name == *name);
         let disputes = disputes.iter().any(|dispute| dispute.involves(name));
         let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
         if attached || disputes || told || evaluation.workers.contains(name) {
-            return Err(Insane::Expelled(name.clone()));
+            return Err(Insane::Banned(name.clone()));
         }
     }
     Ok(())
@@ -228,13 +229,14 @@ fn check_batches(state: &State) -> Result<(), Insane> {
                     && other.worker != batch.worker
             })
         };
-        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= COPIES_MAX {
+        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= DUPLICATES_MAX {
             return Err(Insane::Duplicates(id));
         }
-        let round = batch.assignment.round;
+        let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.round == round);
-        let ahead = job.is_some_and(|job| job.ahead.evaluations.iter().any(|it| it.round == round));
+        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.attempt == attempt);
+        let ahead = job
+            .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == ahead || (batch.purpose == Purpose::Speculative) != ahead {
             return Err(Insane::Stray(id));
         }
@@ -245,7 +247,7 @@ fn check_batches(state: &State) -> Result<(), Insane> {
 /// Every index is in exactly one place.
 fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let mut places: Vec<u32> =
-        evaluation.slots.iter().map(|slot| u32::from(slot.is_some())).collect();
+        evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
     if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
         return Err(Insane::Filled(job));
     }

@@ -114,7 +114,7 @@ async fn forward(
 
 fn introduce(hello: WorkerHello) -> Hello {
     let WorkerHello { version, fingerprint, threads, host, process, instance } = hello;
-    Hello { version, fingerprint, threads, host, process, instance }
+    Hello { version, fingerprint, slots: threads, host, process, instance }
 }
 
 fn event(worker: WorkerId, message: AttachRequest) -> Event {

@@ -39,7 +39,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
     match &job.stage {
         Stage::Accepting => return None,
         Stage::Waiting => snapshot.set_state(JobState::Waiting),
-        Stage::Rereading { .. } => snapshot.set_state(JobState::Running),
+        Stage::Replaying { .. } => snapshot.set_state(JobState::Running),
         Stage::Computing(evaluation) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
@@ -106,7 +106,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(trouble) = &job.trouble {
         let does = match job.stage {
-            Stage::Rereading { .. } => "give",
+            Stage::Replaying { .. } => "give",
             _ => "take",
         };
         return format!(
@@ -130,7 +130,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
             state.waiting.len(),
             since(job.progressed)
         ),
-        Stage::Rereading { .. } => format!(
+        Stage::Replaying { .. } => format!(
             "its stored evaluations, {} of {} are read again",
             job.search.evaluations(),
             job.stored
@@ -141,9 +141,10 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::Computing(evaluation) if !evaluation.disputes.is_empty() => {
             let begun = evaluation.disputes.iter().map(|dispute| dispute.since).min();
             let what = "a third worker, which decides between two whose answers differ";
-            let judges = evaluation.disputes.iter().flat_map(|dispute| &dispute.judges);
-            let asked =
-                judges.filter_map(|judge| state.batches.get(judge)?.worker_in(state)).next();
+            let tie_breakers = evaluation.disputes.iter().flat_map(|dispute| &dispute.tie_breakers);
+            let asked = tie_breakers
+                .filter_map(|tie_breaker| state.batches.get(tie_breaker)?.worker_in(state))
+                .next();
             let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
             format!("{what} {}{asked}", since(begun.unwrap_or(now)))
         }

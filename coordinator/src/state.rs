@@ -24,7 +24,7 @@ use crate::pace::Pace;
 use crate::probation::Probation;
 use crate::rate::Rate;
 use crate::search::Search;
-use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
 use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
@@ -71,7 +71,7 @@ pub struct State {
     /// Workers that went last, the newest at the end, at most [`DEPARTED_MAX`].
     pub(crate) departed: VecDeque<Departed>,
     /// Workers that compute wrongly, in the order in which they were found.
-    pub(crate) expelled: Vec<Expelled>,
+    pub(crate) banned: Vec<Banned>,
     /// How many workers of a host were lost in a row with what they held, none answering anything
     /// in between.
     pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
@@ -86,7 +86,7 @@ pub struct State {
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
-    pub(crate) next_round: u64,
+    pub(crate) next_attempt: u64,
     pub(crate) draining: bool,
 }
 
@@ -99,16 +99,16 @@ pub(crate) struct Job {
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// What is computed before the search asks for it.
-    pub(crate) ahead: Ahead,
+    pub(crate) speculation: Speculation,
     /// How many evaluations the store has of it; those that the search was not told are read
     /// before it goes on.
     pub(crate) stored: u64,
     /// Everybody whose answers are in evaluations that the search was told.
     pub(crate) workers: BTreeSet<WorkerName>,
     /// What it was told is to be read again, when what is being stored is stored.
-    pub(crate) rewind: bool,
+    pub(crate) restart_pending: bool,
     /// An evaluation was damaged in the store, and computed again.
-    pub(crate) mended: bool,
+    pub(crate) recomputed: bool,
     /// A client wants it ended as soon as what is being stored is stored.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
@@ -129,9 +129,9 @@ pub(crate) struct Job {
 
 /// Points that a search may ask for next. Nothing of them is stored or shown.
 #[derive(Debug, Default)]
-pub(crate) struct Ahead {
+pub(crate) struct Speculation {
     /// The points, the likeliest first.
-    pub(crate) likely: Vec<Point>,
+    pub(crate) candidates: Vec<Point>,
     /// The evaluations that are begun of them, in the order of their beginning.
     pub(crate) evaluations: Vec<Evaluation>,
 }
@@ -144,7 +144,7 @@ pub(crate) enum Stage {
     /// It waits for its turn.
     Waiting,
     /// A stored evaluation is being read for its search.
-    Rereading {
+    Replaying {
         /// The store was asked for it.
         asked: bool,
     },
@@ -195,8 +195,8 @@ pub(crate) struct EndedJob {
 
 /// A worker that computes wrongly: refused for the life of the coordinator.
 #[derive(Debug)]
-pub(crate) struct Expelled {
-    pub(crate) record: ExpulsionRecord,
+pub(crate) struct Banned {
+    pub(crate) record: BanRecord,
     /// When its record is written again; `None` once it is durable. Until then no job reads its
     /// stored evaluations: after a crash nobody would know which of them are wrong.
     pub(crate) store_at: Option<Duration>,
@@ -244,15 +244,15 @@ pub(crate) struct Worker {
     /// Since when it is there.
     pub(crate) attached: Duration,
     /// When its last message came.
-    pub(crate) heard: Duration,
+    pub(crate) last_seen: Duration,
     /// When its last answer came, or it attached.
     pub(crate) answered: Duration,
     /// It has answered something in this stay.
-    pub(crate) proven: bool,
+    pub(crate) has_answered: bool,
     /// Batches that others answered in its place, since its last answer to one that it held.
     pub(crate) missed: Missed,
     /// When the last sign of life was given to it.
-    pub(crate) beat: Duration,
+    pub(crate) heartbeat_sent: Duration,
     /// Batches it holds, in the order they were sent.
     pub(crate) in_flight: Vec<BatchId>,
     /// Batches it answered or was told to forget, newest last.
@@ -279,7 +279,7 @@ pub(crate) struct Missed {
 pub(crate) struct Assignment {
     pub(crate) job: JobId,
     /// Attempt at an evaluation.
-    pub(crate) round: u64,
+    pub(crate) attempt: u64,
     pub(crate) indices: Indices,
 }
 
@@ -346,7 +346,7 @@ impl State {
             pruned: None,
             workers: BTreeMap::new(),
             departed: VecDeque::new(),
-            expelled: Vec::new(),
+            banned: Vec::new(),
             lost_in_a_row: BTreeMap::new(),
             probation: Probation::default(),
             no_worker_since: now,
@@ -355,7 +355,7 @@ impl State {
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
-            next_round: 1,
+            next_attempt: 1,
             draining: false,
         }
     }
@@ -372,16 +372,16 @@ impl State {
 
     /// Records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
-        let on_its_way = |expelled: &&Expelled| expelled.store_at.is_some() && !expelled.refused;
-        let expelled = self.expelled.iter().filter(on_its_way).count();
+        let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
+        let banned = self.banned.iter().filter(on_its_way).count();
         let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
-        jobs.count() + expelled
+        jobs.count() + banned
     }
 
     /// The work of an assignment, while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
         let job = self.jobs.get(&assignment.job)?;
-        let evaluation = job.evaluations().find(|it| it.round == assignment.round)?;
+        let evaluation = job.evaluations().find(|it| it.attempt == assignment.attempt)?;
         let specification = &job.record.specification;
         Some(Work {
             setup: specification.setup,
@@ -401,26 +401,26 @@ impl State {
     }
 
     /// The evaluation that a batch is about, while this attempt at it is under way.
-    pub(crate) fn attempt_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
+    pub(crate) fn evaluation_of_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
         let job = self.jobs.get_mut(&assignment.job)?;
-        job.evaluations_mut().find(|found| found.round == assignment.round)
+        job.evaluations_mut().find(|found| found.attempt == assignment.attempt)
     }
 
     /// A number for the next attempt at an evaluation.
-    pub(crate) fn round(&mut self) -> u64 {
-        self.next_round += 1;
-        self.next_round - 1
+    pub(crate) fn new_attempt(&mut self) -> u64 {
+        self.next_attempt += 1;
+        self.next_attempt - 1
     }
 
-    /// The expulsion of a worker, if it was expelled.
-    pub(crate) fn expulsion(&self, name: &WorkerName) -> Option<&ExpulsionRecord> {
-        let found = self.expelled.iter().find(|expelled| expelled.record.worker == *name);
-        found.map(|expelled| &expelled.record)
+    /// The ban of a worker, if it was banned.
+    pub(crate) fn ban(&self, name: &WorkerName) -> Option<&BanRecord> {
+        let found = self.banned.iter().find(|banned| banned.record.worker == *name);
+        found.map(|banned| &banned.record)
     }
 
     /// Whether the ban of a worker is not durable yet.
     pub(crate) fn ban_pending(&self) -> bool {
-        self.expelled.iter().any(|expelled| expelled.store_at.is_some())
+        self.banned.iter().any(|banned| banned.store_at.is_some())
     }
 
     /// Whether the workers of a host are lost over whatever they hold.
@@ -429,9 +429,9 @@ impl State {
     }
 
     /// A worker of a host has answered.
-    pub(crate) fn prove(&mut self, worker: WorkerId) {
+    pub(crate) fn note_answer(&mut self, worker: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&worker) {
-            worker.proven = true;
+            worker.has_answered = true;
             self.lost_in_a_row.remove(worker.name.host());
         }
     }
@@ -479,13 +479,13 @@ impl State {
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
         self.overdue.remove(&batch);
-        if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
+        if let Some(evaluation) = self.evaluation_of_mut(&settled.assignment) {
             match settled.purpose {
                 Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
                 Purpose::Audit { .. } => evaluation.audits_out -= 1,
                 Purpose::TieBreak => {
                     for dispute in &mut evaluation.disputes {
-                        dispute.judges.retain(|judge| *judge != batch);
+                        dispute.tie_breakers.retain(|tie_breaker| *tie_breaker != batch);
                     }
                 }
             }
@@ -512,13 +512,13 @@ impl Job {
         Self {
             identity: identity(&record.specification),
             search: Search::new(record.specification.clone()),
-            ahead: Ahead::default(),
+            speculation: Speculation::default(),
             record,
             stage,
             stored,
             workers: BTreeSet::new(),
-            rewind: false,
-            mended: false,
+            restart_pending: false,
+            recomputed: false,
             cancelled: false,
             rate: Rate::default(),
             pace: Pace::default(),
@@ -540,7 +540,7 @@ impl Job {
 
     /// All evaluations under way, that which the search asked for first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
-        self.evaluation().into_iter().chain(&self.ahead.evaluations)
+        self.evaluation().into_iter().chain(&self.speculation.evaluations)
     }
 
     /// As [`Job::evaluations`].
@@ -549,7 +549,7 @@ impl Job {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
         };
-        asked_for.into_iter().chain(&mut self.ahead.evaluations)
+        asked_for.into_iter().chain(&mut self.speculation.evaluations)
     }
 }
 

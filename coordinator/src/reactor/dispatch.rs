@@ -1,14 +1,17 @@
 //! Who computes what next.
 //!
 //! Workers are served in the order of how little they hold, clients in the order of how little
-//! computing time they have had, jobs of one client by priority and in turn, batch by batch. A batch
-//! is sized from the worker's measured rate to the target time, and to at most a quarter of the
-//! worker's share of what remains of the evaluation, so that all workers end together; but while
-//! its share allows, no batch is smaller than the worker's threads, be it longer than the target
-//! or more than the quarter. What is overdue goes to another worker before anything else (`overdue.rs`).
-//! A worker that has nothing to do gets a copy of a batch that is late, then what may be done ahead
-//! (`ahead.rs`), then a copy of the batch that is out longest. Whom a realization waits for that is to
-//! be computed alone is not refilled. A worker on probation gets one realization at a time.
+//! computing time they have had, and jobs of one client by priority and in turn, batch by batch.
+//! `sizing.rs` decides how large a batch is. The order of service is:
+//!
+//! 1. quarantined realizations, each alone on a worker (`poison.rs`). A worker that is reserved for
+//!    one gets no new work;
+//! 2. duplicates of overdue batches (`overdue.rs`);
+//! 3. audits and tie-breaks (`audits.rs`), then the queues of the evaluations under way;
+//! 4. where workers are idle: duplicates of late batches, speculative batches (`idle.rs`), and
+//!    duplicates of the batches that are out longest (`duplicates.rs`).
+//!
+//! A worker on probation gets one realization at a time.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +31,7 @@ mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
 
-/// Hands out batches while there is credit and work, then copies.
+/// Hands out batches while workers may take more and work waits, then duplicates.
 pub(crate) fn hand_out(turn: &mut Turn) {
     if turn.state.draining {
         return;
@@ -43,8 +46,8 @@ pub(crate) fn hand_out(turn: &mut Turn) {
     duplicates::of_slow_ones(turn);
 }
 
-/// Gives the first worker that may have something what it may have; whether there is one. Those
-/// in `kept` are not refilled.
+/// Gives the first worker that may have something what it may have, and says whether there is one.
+/// The workers in `kept` get nothing.
 fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let mut free = schedule::free_workers(turn.state, kept);
     let first = free.first().and_then(|first| turn.state.workers.get(first));
@@ -78,12 +81,12 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(evaluation) = turn.state.evaluation_mut(job) else {
         return false;
     };
-    let round = evaluation.round;
+    let attempt = evaluation.attempt;
     let Some(indices) = evaluation.take(size) else {
         return false;
     };
     turn.state.last_served = Some(job);
-    let assignment = Assignment { job, round, indices };
+    let assignment = Assignment { job, attempt, indices };
     let batch = batches::send(turn, worker, assignment, Purpose::Fill);
     if let Some(batch) = batch {
         batches::charge(turn.state, batch);

@@ -15,7 +15,7 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
     let on_probation = turn.state.probation.has(&name);
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
-        if let Some(at) = to_judge(turn.state, job, worker) {
+        if let Some(at) = dispute_for(turn.state, job, worker) {
             return hand_dispute(turn, job, at, worker);
         }
         if on_probation {
@@ -24,12 +24,12 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
         let Some(evaluation) = turn.state.evaluation_mut(job) else {
             continue;
         };
-        let round = evaluation.round;
+        let attempt = evaluation.attempt;
         let of_others = |audit: &Audit| audit.by != name;
         let at = evaluation.audits.iter().position(of_others);
         if let Some(audit) = at.and_then(|at| evaluation.audits.remove(at)) {
             evaluation.audits_out += 1;
-            let assignment = Assignment { job, round, indices: audit.indices };
+            let assignment = Assignment { job, attempt, indices: audit.indices };
             let purpose = Purpose::Audit { lost: audit.lost };
             batches::send(turn, worker, assignment, purpose);
             return true;
@@ -40,16 +40,16 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
 
 /// The first dispute of a job that this worker is to decide: of those that may, nobody can be
 /// expected to do better.
-fn to_judge(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
+fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
     let Stage::Computing(evaluation) = &state.jobs.get(&job)?.stage else {
         return None;
     };
     let worker = state.workers.get(&worker)?;
     let is_for = |dispute: &Dispute| {
-        let standing = |worker: &Worker| poison::standing(state, worker, &dispute.lost);
+        let reputation = |worker: &Worker| poison::reputation(state, worker, &dispute.crashes);
         let may = |worker: &&Worker| !worker.draining && !dispute.involves(&worker.name);
-        let best = state.workers.values().filter(may).map(standing).min();
-        dispute.judges.is_empty() && may(&worker) && best == Some(standing(worker))
+        let best = state.workers.values().filter(may).map(reputation).min();
+        dispute.tie_breakers.is_empty() && may(&worker) && best == Some(reputation(worker))
     };
     evaluation.disputes.iter().position(is_for)
 }
@@ -59,11 +59,11 @@ fn hand_dispute(turn: &mut Turn, job: JobId, at: usize, worker: WorkerId) -> boo
     let Some(evaluation) = turn.state.evaluation_mut(job) else {
         return false;
     };
-    let (round, indices) = (evaluation.round, evaluation.disputes[at].indices);
-    let assignment = Assignment { job, round, indices };
+    let (attempt, indices) = (evaluation.attempt, evaluation.disputes[at].indices);
+    let assignment = Assignment { job, attempt, indices };
     let batch = batches::send(turn, worker, assignment, Purpose::TieBreak);
     if let Some(evaluation) = turn.state.evaluation_mut(job) {
-        evaluation.disputes[at].judges.extend(batch);
+        evaluation.disputes[at].tie_breakers.extend(batch);
     }
     batch.is_some()
 }

@@ -3,18 +3,18 @@
 use std::time::Duration;
 
 use super::departures;
+use crate::crashes::{Cause, LostWorker};
 use crate::effect::Effect;
 use crate::evaluation::Audit;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::losses::{Cause, Loss};
 use crate::reactor::turn::Turn;
-use crate::state::{Ahead, Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Purpose, State, Worker};
+use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Purpose, Speculation, State, Worker};
 
 /// Workers that may be lost over one audit before it is given up.
 const LOST_MAX: u32 = 3;
 
-/// Sends a batch to a worker; its number, if its evaluation is under way.
+/// Sends a batch to a worker and returns its number, if its evaluation is under way.
 pub(crate) fn send(
     turn: &mut Turn,
     worker: WorkerId,
@@ -57,7 +57,7 @@ pub(crate) fn charge(state: &mut State, id: BatchId) {
     };
     let count = batch.assignment.indices.count as f64;
     let seconds = worker.rates.get(&batch.assignment.job).map_or(target, |rate| count / rate);
-    batch.charged = fairness::thread_time(seconds, worker.hello.threads);
+    batch.charged = fairness::slot_time(seconds, worker.hello.slots);
     state.shares.charge(&job.record.client, batch.charged);
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn revoke(turn: &mut Turn, batch: BatchId) {
     }
 }
 
-/// Takes back every batch of a job, and drops what it is ahead with.
+/// Takes back every batch of a job, and drops its speculative evaluations.
 pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     let of_job = turn.state.batches.iter().filter(|(_, batch)| batch.assignment.job == job);
     let batches: Vec<BatchId> = of_job.map(|(id, _)| *id).collect();
@@ -77,12 +77,12 @@ pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
         revoke(turn, batch);
     }
     if let Some(job) = turn.state.jobs.get_mut(&job) {
-        job.ahead = Ahead::default();
+        job.speculation = Speculation::default();
     }
 }
 
-/// Hands the indices of a lost worker's batch back, unless a copy of it lives.
-pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &Loss) {
+/// Hands the indices of a lost worker's batch back, unless a duplicate of it lives.
+pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWorker) {
     let assignment = state.batches.get(&batch).map(|batch| (batch.purpose, batch.assignment));
     if let Some((Purpose::TieBreak, assignment)) = assignment {
         tie_breaker_lost(state, &assignment, batch, loss);
@@ -95,36 +95,37 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &Loss) {
         return;
     }
     let Batch { assignment, purpose, duplicates, .. } = settled;
-    let Some(evaluation) = state.attempt_mut(&assignment) else {
+    let Some(evaluation) = state.evaluation_of_mut(&assignment) else {
         return;
     };
     let indices = assignment.indices;
     evaluation.lost_over |= loss.cause != Cause::Announced;
     if !duplicates.is_empty() {
         if purpose == Purpose::Exclusive {
-            evaluation.blame(indices.first, loss);
+            evaluation.count_crash(indices.first, loss);
         }
         return;
     }
     if indices.count > 1 || loss.cause == Cause::Announced {
         evaluation.put_back_in_halves(indices);
     } else {
-        evaluation.suspect(indices.first, loss);
+        evaluation.quarantine(indices.first, loss);
     }
 }
 
-/// Takes back what a worker does ahead, if it has no room for `count` realizations besides.
+/// Takes back the speculative batches of a worker that has no room for `count` realizations beside
+/// them.
 pub(crate) fn preempt_if_full(turn: &mut Turn, worker: WorkerId, count: u64) {
     let Some(attached) = turn.state.workers.get(&worker) else {
         return;
     };
     let full = attached.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
-    if full || realizations_held(turn.state, attached) + count > attached.hello.threads.into() {
+    if full || realizations_held(turn.state, attached) + count > attached.hello.slots.into() {
         preempt(turn, worker);
     }
 }
 
-/// Takes back what a worker does ahead.
+/// Takes back the speculative batches of a worker.
 pub(crate) fn preempt(turn: &mut Turn, worker: WorkerId) {
     let Some(attached) = turn.state.workers.get(&worker) else {
         return;
@@ -132,7 +133,7 @@ pub(crate) fn preempt(turn: &mut Turn, worker: WorkerId) {
     let held: Vec<BatchId> = turn.state.held_for(attached, Purpose::Speculative).collect();
     for batch in held {
         if let Some(assignment) = turn.state.batches.get(&batch).map(|batch| batch.assignment)
-            && let Some(evaluation) = turn.state.attempt_mut(&assignment)
+            && let Some(evaluation) = turn.state.evaluation_of_mut(&assignment)
         {
             evaluation.put_back(assignment.indices);
         }
@@ -140,15 +141,15 @@ pub(crate) fn preempt(turn: &mut Turn, worker: WorkerId) {
     }
 }
 
-/// Realizations of all batches that a worker holds.
+/// Counts the realizations of all batches that a worker holds.
 pub(crate) fn realizations_held(state: &State, worker: &Worker) -> u64 {
     let held = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
     held.map(|batch| batch.assignment.indices.count).sum()
 }
 
-/// A worker that had something to check is lost: another does it, up to a point.
-fn give_back_audit(state: &mut State, batch: &Batch, loss: &Loss) {
-    let blame = u32::from(loss.cause != Cause::Announced);
+/// Queues the audit of a lost worker again, until too many workers were lost over it.
+fn give_back_audit(state: &mut State, batch: &Batch, loss: &LostWorker) {
+    let crashed = u32::from(loss.cause != Cause::Announced);
     let Assignment { indices, .. } = batch.assignment;
     let Purpose::Audit { lost } = batch.purpose else {
         return;
@@ -156,19 +157,20 @@ fn give_back_audit(state: &mut State, batch: &Batch, loss: &Loss) {
     if !batch.duplicates.is_empty() {
         return;
     }
-    if let Some(evaluation) = state.attempt_mut(&batch.assignment)
-        && lost + blame < LOST_MAX
+    if let Some(evaluation) = state.evaluation_of_mut(&batch.assignment)
+        && lost + crashed < LOST_MAX
         && let Some(by) = evaluation.owner(indices.first)
     {
-        evaluation.audits.push_front(Audit { indices, by, lost: lost + blame });
+        evaluation.audits.push_front(Audit { indices, by, lost: lost + crashed });
     }
 }
 
-/// A worker that was to decide is lost.
-fn tie_breaker_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &Loss) {
-    if let Some(evaluation) = state.attempt_mut(assignment)
-        && let Some(dispute) = evaluation.disputes.iter_mut().find(|it| it.judges.contains(&batch))
+/// Notes that a worker was lost which was to decide a dispute.
+fn tie_breaker_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &LostWorker) {
+    if let Some(evaluation) = state.evaluation_of_mut(assignment)
+        && let Some(dispute) =
+            evaluation.disputes.iter_mut().find(|it| it.tie_breakers.contains(&batch))
     {
-        dispute.lost.add(loss);
+        dispute.crashes.add(loss);
     }
 }

@@ -17,7 +17,8 @@ pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
     }
 }
 
-/// Forgets a worker: later events of it mean nothing. What it held is still with nobody else.
+/// Removes a worker from the state and returns it: later events of it mean nothing. The caller gives
+/// back the batches that it held.
 pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<Worker> {
     let gone = turn.state.workers.remove(&worker)?;
     if turn.state.workers.is_empty() {

@@ -1,15 +1,16 @@
-//! Copies of slow batches for workers that have nothing to do: the first answer wins.
+//! Duplicates of slow batches for workers that have nothing to do: the first answer wins.
 
 use super::{batches, eta, schedule};
 use crate::ids::{BatchId, WorkerId};
 use crate::reactor::turn::Turn;
 use crate::state::{Batch, State, Worker};
 
-/// A batch that takes so many times as long as it should is copied before anything is done ahead.
+/// A batch that takes so many times as long as it should is duplicated before anything is computed
+/// speculatively.
 const LATE: u32 = 2;
 
-/// Gives each worker that nobody else has work for a duplicate of a batch that is late, and that
-/// which is out longest first.
+/// Gives each worker that nobody else has work for a duplicate of a late batch, beginning with the
+/// batch that is out longest.
 pub(crate) fn of_late_ones(turn: &mut Turn) {
     let now = turn.now;
     let idle = |state: &State, worker: &Worker| schedule::held(state, worker) == 0;
@@ -56,18 +57,18 @@ fn open(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
     batches.filter(|(_, batch)| batch.may_be_duplicated())
 }
 
-/// Sends a worker a duplicate of a batch; its number, if its evaluation is under way.
+/// Sends a worker a duplicate of a batch and returns its number, if its evaluation is under way.
 pub(crate) fn send(turn: &mut Turn, of: BatchId, to: WorkerId) -> Option<BatchId> {
     let Batch { assignment, purpose, .. } = *turn.state.batches.get(&of)?;
-    let copy = batches::send(turn, to, assignment, purpose)?;
+    let duplicate = batches::send(turn, to, assignment, purpose)?;
     let mut others = turn.state.batches.get(&of)?.duplicates.clone();
     others.push(of);
     for id in &others {
         turn.state.overdue.remove(id);
         if let Some(other) = turn.state.batches.get_mut(id) {
-            other.duplicates.push(copy);
+            other.duplicates.push(duplicate);
         }
     }
-    turn.state.batches.get_mut(&copy)?.duplicates = others;
-    Some(copy)
+    turn.state.batches.get_mut(&duplicate)?.duplicates = others;
+    Some(duplicate)
 }

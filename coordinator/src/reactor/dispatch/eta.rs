@@ -1,4 +1,4 @@
-//! When batches should be answered, by the rates of their workers.
+//! When batches should be answered (their ETA), by the rates of their workers.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -7,24 +7,24 @@ use crate::fairness;
 use crate::ids::JobId;
 use crate::state::{Batch, Purpose, State};
 
-/// When the last batch of what each search waits for should be answered.
-pub(crate) fn dues(state: &State) -> BTreeMap<JobId, Duration> {
-    let mut dues = BTreeMap::new();
+/// Returns when the last batch of what each search waits for should be answered.
+pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {
+    let mut etas = BTreeMap::new();
     let asked_for = state.batches.values().filter(|it| it.purpose != Purpose::Speculative);
     for batch in asked_for {
-        if let Some(answered) = answered(state, batch) {
-            let due: &mut Duration = dues.entry(batch.assignment.job).or_default();
-            *due = answered.max(*due);
+        if let Some(answered) = of_batch(state, batch) {
+            let eta: &mut Duration = etas.entry(batch.assignment.job).or_default();
+            *eta = answered.max(*eta);
         }
     }
-    dues
+    etas
 }
 
-/// When a batch should be answered.
-fn answered(state: &State, batch: &Batch) -> Option<Duration> {
+/// Returns when a batch should be answered.
+fn of_batch(state: &State, batch: &Batch) -> Option<Duration> {
     let worker = state.workers.get(&batch.worker)?;
-    // Two of more than half a worker's threads are computed one after the other.
-    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.threads.into();
+    // Two of more than half a worker's slots are computed one after the other.
+    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.slots.into();
     if !large(batch) {
         return Some(batch.sent + expected(state, batch));
     }
@@ -34,11 +34,11 @@ fn answered(state: &State, batch: &Batch) -> Option<Duration> {
     Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
 }
 
-/// Time that a batch should take, as far as that is known.
+/// Returns the time that a batch should take, or zero if nothing is known of it.
 pub(crate) fn expected(state: &State, batch: &Batch) -> Duration {
     let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
     let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
     rate.map_or(Duration::ZERO, |rate| {
-        fairness::thread_time(batch.assignment.indices.count as f64 / rate, 1)
+        fairness::slot_time(batch.assignment.indices.count as f64 / rate, 1)
     })
 }

@@ -4,21 +4,21 @@
 //! A worker may give signs of life and never answer. So what is overdue is given to another worker
 //! too, and the first answer counts; if that one is overdue in its turn, to one more. Each waits
 //! twice as long as the one before, so that realizations that are slow everywhere are computed a
-//! few times at most. Where other work waits, a job has one such copy out at a time: its answer
+//! few times at most. Where other work waits, a job has one such duplicate out at a time: its answer
 //! shows how long the others should take.
 //!
-//! Who misses batches in a row is on probation until it answers one (`probation.rs`).
+//! A worker that misses batches in a row is on probation until it answers one (`probation.rs`).
 
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::poison::{self, Standing};
+use super::poison::{self, Reputation};
 use super::{batches, duplicates, schedule};
+use crate::crashes::Crashes;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::losses::Losses;
 use crate::reactor::turn::Turn;
 use crate::state::{Assignment, Batch, Purpose, State, Worker};
 use crate::worker_name::WorkerName;
@@ -29,10 +29,10 @@ const OVERDUE_MIN: Duration = Duration::from_secs(3);
 /// Nor before it has taken so many times as long as it should: a machine may have other things to
 /// do, and one point may take some times as long as another.
 const OVERDUE_FACTOR: u32 = 4;
-/// Batches with the same indices at a time. The last of so many would be sent after six minutes at the
+/// How many batches may have the same indices at a time. The last of so many would be sent after six minutes at the
 /// soonest.
-pub(crate) const COPIES_MAX: usize = 8;
-/// Copies that are sent on one event; the others follow on the next.
+pub(crate) const DUPLICATES_MAX: usize = 8;
+/// Duplicates that are sent on one event; the others follow on the next.
 const SENT_AT_ONCE_MAX: usize = 64;
 /// So many batches in a row that others answered, over [`OVERDUE_MIN`] at least, put a worker on
 /// probation. It holds two at a time, so one moment of standing still is not enough.
@@ -53,7 +53,7 @@ pub(crate) fn tick(turn: &mut Turn) {
         turn.state.batches.get(id).is_some_and(|batch| {
             let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
             let asked_for = batch.purpose != Purpose::Speculative;
-            newest && asked_for && batch.duplicates.len() + 1 < COPIES_MAX
+            newest && asked_for && batch.duplicates.len() + 1 < DUPLICATES_MAX
         })
     };
     turn.state.overdue = late.into_iter().filter(waits).collect();
@@ -86,9 +86,9 @@ fn expected(state: &State, id: BatchId) -> Option<Duration> {
     let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
     let alone = |id: &BatchId| {
         let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
-        let pace = state.jobs.get(&job)?.pace.expected(indices.count, worker.hello.threads);
+        let pace = state.jobs.get(&job)?.pace.expected(indices.count, worker.hello.slots);
         let rate = worker.rates.get(&job);
-        pace.max(rate.map(|rate| fairness::thread_time(indices.count as f64 / rate, 1)))
+        pace.max(rate.map(|rate| fairness::slot_time(indices.count as f64 / rate, 1)))
     };
     let before = worker.in_flight.iter().filter(|held| **held < id);
     let before: Duration = before.filter_map(alone).sum();
@@ -169,7 +169,7 @@ pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
     }
 }
 
-/// Whether a job has a copy of an overdue batch out that is not overdue itself.
+/// Whether a job has a duplicate of an overdue batch out that is not overdue itself.
 fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
     let scout = state.jobs.get(&job).and_then(|job| job.scout);
     scout.is_some_and(|scout| state.batches.contains_key(&scout) && !is_overdue(state, scout, now))
@@ -179,10 +179,10 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
     state.workers.get(&worker).is_none_or(|worker| schedule::held(state, worker) > 0)
 }
 
-/// The one of these workers that is to have a copy of a batch.
+/// Chooses the one of these workers that is to have a duplicate of a batch.
 fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
     let rank = |(worker, taker): &(&Worker, WorkerId)| {
-        let doubtful = worker.missed.count > 0 || !worker.proven;
+        let doubtful = worker.missed.count > 0 || !worker.has_answered;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
         (on_probation, doubtful, of_holder, schedule::held(state, worker), *taker)
@@ -192,18 +192,18 @@ fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option
     fit.min_by_key(rank).map(|(_, taker)| taker)
 }
 
-/// The worker that is to have a copy of a suspect, be it busy or not.
+/// Chooses the worker that is to have a duplicate of an exclusive batch, be it busy or not.
 fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let batch = state.batches.get(&id)?;
-    let losses = attempt(state, batch)?.suspects.get(&batch.assignment.indices.first);
-    let nobody = Losses::default();
-    let losses = losses.unwrap_or(&nobody);
-    if poison::enough(state, losses, |_| true) {
+    let crashes = evaluation_of(state, batch)?.crashes.get(&batch.assignment.indices.first);
+    let nobody = Crashes::default();
+    let crashes = crashes.unwrap_or(&nobody);
+    if poison::crash_limit_reached(state, crashes, |_| true) {
         return None;
     }
-    let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Standing, bool, usize, WorkerId) {
-        let standing = poison::standing(state, worker, losses);
-        (standing, is_of_holder(state, id, worker), schedule::held(state, worker), **taker)
+    let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
+        let reputation = poison::reputation(state, worker, crashes);
+        (reputation, is_of_holder(state, id, worker), schedule::held(state, worker), **taker)
     };
     let fit =
         |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
@@ -211,14 +211,14 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     fit.min_by_key(rank).map(|(taker, _)| *taker)
 }
 
-/// Whether a worker is to have a copy of a batch: it may, and leaves nothing unanswered itself.
+/// Whether a worker is to have a duplicate of a batch: it may, and leaves nothing unanswered itself.
 fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
     let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
     let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
     trusted && may_have(state, id, &worker.name) && !late()
 }
 
-/// Whether a worker on probation is tried with a copy of a batch. An audit is not worth it.
+/// Whether a worker on probation is tried with a duplicate of a batch. An audit is not worth it.
 fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
     let purpose = state.batches.get(&id).map(|batch| batch.purpose);
     !worker.draining
@@ -227,7 +227,7 @@ fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool 
         && matches!(purpose, Some(Purpose::Fill | Purpose::Exclusive | Purpose::TieBreak))
 }
 
-/// The names of the workers that hold a batch and its copies.
+/// The names of the workers that hold a batch and its duplicates.
 fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
     let others = state.batches.get(&id).into_iter().flat_map(|batch| &batch.duplicates).copied();
     let batches = others.chain([id]).filter_map(|id| state.batches.get(&id));
@@ -238,16 +238,16 @@ fn is_of_holder(state: &State, id: BatchId, worker: &Worker) -> bool {
     holders(state, id).any(|holder| holder.host() == worker.name.host())
 }
 
-/// Whether a worker may have a copy of a batch: who holds one may not, nor who is to be checked by
+/// Whether a worker may have a duplicate of a batch: who holds one may not, nor who is to be checked by
 /// it, nor who has already said what is to be decided.
 fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(batch) = state.batches.get(&id) else {
         return false;
     };
-    let Some(evaluation) = attempt(state, batch) else {
+    let Some(evaluation) = evaluation_of(state, batch) else {
         return false;
     };
-    let about = |it: &&Dispute| it.judges.contains(&id);
+    let about = |it: &&Dispute| it.tie_breakers.contains(&id);
     let in_question = match batch.purpose {
         Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
         Purpose::Audit { .. } => {
@@ -261,12 +261,12 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
 }
 
 /// The evaluation that a batch is about, while this attempt at it is under way.
-fn attempt<'a>(state: &'a State, batch: &Batch) -> Option<&'a Evaluation> {
+fn evaluation_of<'a>(state: &'a State, batch: &Batch) -> Option<&'a Evaluation> {
     let job = state.jobs.get(&batch.assignment.job)?;
-    job.evaluations().find(|found| found.round == batch.assignment.round)
+    job.evaluations().find(|found| found.attempt == batch.assignment.attempt)
 }
 
-/// Sends a worker a copy of an overdue batch.
+/// Sends a worker a duplicate of an overdue batch.
 fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
     let Some(batch) = turn.state.batches.get(&id) else {
         return;
@@ -275,29 +275,29 @@ fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
     if purpose == Purpose::Exclusive {
         batches::preempt(turn, to);
     }
-    let Some(copy) = duplicates::send(turn, id, to) else {
+    let Some(duplicate) = duplicates::send(turn, id, to) else {
         return;
     };
     tracing::info!(job = %assignment.job, first = assignment.indices.first, overdue = %worker, %to,
         "a batch is overdue; another worker computes the same");
-    if let Some(batch) = turn.state.batches.get_mut(&copy) {
+    if let Some(batch) = turn.state.batches.get_mut(&duplicate) {
         batch.retries = retries + 1;
     }
-    if let Some(evaluation) = turn.state.attempt_mut(&assignment) {
+    if let Some(evaluation) = turn.state.evaluation_of_mut(&assignment) {
         match purpose {
             Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
             Purpose::Audit { .. } => evaluation.audits_out += 1,
             Purpose::TieBreak => {
                 for dispute in &mut evaluation.disputes {
-                    if dispute.judges.contains(&id) {
-                        dispute.judges.push(copy);
+                    if dispute.tie_breakers.contains(&id) {
+                        dispute.tie_breakers.push(duplicate);
                     }
                 }
             }
         }
     }
     if let Some(job) = turn.state.jobs.get_mut(&assignment.job) {
-        job.scout = Some(copy);
+        job.scout = Some(duplicate);
     }
 }
 

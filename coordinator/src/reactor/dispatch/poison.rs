@@ -16,24 +16,24 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
 use super::{batches, schedule};
+use crate::crashes::Crashes;
 use crate::evaluation::Evaluation;
 use crate::failure::Failure;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
-use crate::losses::Losses;
 use crate::reactor::turn::Turn;
 use crate::state::{Assignment, Purpose, Stage, State, Worker};
 use crate::worker_name::WorkerName;
 
-/// How long the losses of a host are remembered when no more come.
+/// How long the crashes of a host are remembered when no more come.
 const MEMORY: Duration = Duration::from_secs(600);
 
 /// How little may be expected of a worker, the least last: whether its host's workers are lost over
 /// whatever they hold, whether it does not answer what it holds (which costs time, and fails no
 /// job), whether one was lost over this, whether it has not answered anything yet.
-pub(crate) type Standing = (bool, bool, bool, bool);
+pub(crate) type Reputation = (bool, bool, bool, bool);
 
-/// Hands out suspects, each alone to a worker that holds nothing. Returns those who must not be
+/// Hands out crashes, each alone to a worker that holds nothing. Returns those who must not be
 /// refilled, so that they hold nothing soon.
 pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
@@ -55,25 +55,27 @@ pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
 /// The next suspect of a job that may be handed out, and the worker that is to have it.
 fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = computing(state, job)?;
-    let losses = |index: &u64| evaluation.suspects.get(index);
-    let open = |index: &&u64| losses(index).is_none_or(|losses| !enough(state, losses, |_| true));
+    let crashes = |index: &u64| evaluation.crashes.get(index);
+    let open = |index: &&u64| {
+        crashes(index).is_none_or(|crashes| !crash_limit_reached(state, crashes, |_| true))
+    };
     let index = evaluation.quarantine.iter().find(open)?;
-    let nobody = Losses::default();
-    let losses = losses(index).unwrap_or(&nobody);
-    Some((*index, taker(state, losses, now)?))
+    let nobody = Crashes::default();
+    let crashes = crashes(index).unwrap_or(&nobody);
+    Some((*index, taker(state, crashes, now)?))
 }
 
 /// The worker that is to have a suspect over which these were lost, if there is one: who has
 /// answered nothing yet shows first that it answers something else, if there is something else.
-fn taker(state: &State, losses: &Losses, now: Duration) -> Option<WorkerId> {
+fn taker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
-        let held = if losses.is_empty() { schedule::held(state, worker) } else { 0 };
-        (standing(state, worker, losses), held, **id)
+        let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
+        (reputation(state, worker, crashes), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);
     let (id, worker) = takers.min_by_key(rank)?;
-    let recent = losses.last().is_some_and(|last| now.saturating_sub(last) < state.config.expiry);
-    let harmless = worker.proven
+    let recent = crashes.last().is_some_and(|last| now.saturating_sub(last) < state.config.expiry);
+    let harmless = worker.has_answered
         || (schedule::next_job(state).is_none()
             && !(recent && state.is_failing(worker.name.host())));
     harmless.then_some(*id)
@@ -85,36 +87,36 @@ fn send(turn: &mut Turn, job: JobId, index: u64, worker: WorkerId) {
     };
     evaluation.quarantine.retain(|waiting| *waiting != index);
     let indices = Indices { first: index, count: 1 };
-    let assignment = Assignment { job, round: evaluation.round, indices };
+    let assignment = Assignment { job, attempt: evaluation.attempt, indices };
     batches::send(turn, worker, assignment, Purpose::Exclusive);
 }
 
 /// A worker is back: nothing that it held is to blame for its absence.
-pub(crate) fn forgive(state: &mut State, name: &WorkerName) {
+pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
     if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
         lost.workers.retain(|lost| lost != name);
     }
     for job in state.jobs.values_mut() {
-        job.evaluations_mut().for_each(|evaluation| evaluation.forgive(name));
+        job.evaluations_mut().for_each(|evaluation| evaluation.forget_crashes(name));
     }
 }
 
-/// Forgets the losses of hosts that have lost nobody for long.
-pub(crate) fn forget_old_losses(state: &mut State, now: Duration) {
+/// Forgets the crashes of hosts that have lost nobody for long.
+pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
     state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
 }
 
 /// Why a job fails over a realization: enough workers were lost over it, and have stayed away.
 pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let evaluation = computing(state, job)?;
-    let over = |index: &u64| Some((*index, evaluation.suspects.get(index)?));
+    let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
     let waiting = evaluation.quarantine.iter().filter_map(over);
-    let hopeless = |(_, losses): &(u64, &Losses)| hopeless(state, losses, |_| true, now);
-    let (index, losses) = waiting.into_iter().find(hopeless)?;
-    let hosts = losses.hosts().into_iter().collect::<Vec<_>>().join(", ");
+    let is_poison = |(_, crashes): &(u64, &Crashes)| is_poison(state, crashes, |_| true, now);
+    let (index, crashes) = waiting.into_iter().find(is_poison)?;
+    let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
     let specification = &state.jobs.get(&job)?.record.specification;
     let case = case_file(specification, &evaluation.point, index);
-    Some(Failure::LethalRealization { index, workers: losses.count(), hosts, case })
+    Some(Failure::LethalRealization { index, workers: crashes.count(), hosts, case })
 }
 
 /// A realization as a complete case file. What is no elasticity is never solved, and kills nobody.
@@ -127,30 +129,34 @@ fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> Str
 
 /// Whether enough workers were lost over something that those in `of` may have, and have stayed
 /// away for so long that they will not come back.
-pub(crate) fn hopeless(
+pub(crate) fn is_poison(
     state: &State,
-    losses: &Losses,
+    crashes: &Crashes,
     of: impl Fn(&WorkerName) -> bool,
     now: Duration,
 ) -> bool {
     let long = |last| now.saturating_sub(last) >= state.config.expiry;
-    losses.last().is_some_and(long) && enough(state, losses, of)
+    crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
 }
 
-pub(crate) fn enough(state: &State, losses: &Losses, of: impl Fn(&WorkerName) -> bool) -> bool {
+pub(crate) fn crash_limit_reached(
+    state: &State,
+    crashes: &Crashes,
+    of: impl Fn(&WorkerName) -> bool,
+) -> bool {
     let untried = |worker: &Worker| {
-        let (failing, silent, lost, _) = standing(state, worker, losses);
-        let stayed = losses.first().is_some_and(|first| worker.attached < first);
+        let (failing, silent, lost, _) = reputation(state, worker, crashes);
+        let stayed = crashes.first().is_some_and(|first| worker.attached < first);
         !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
     };
-    losses.are_enough(|| state.workers.values().any(untried))
+    crashes.reach_limit(|| state.workers.values().any(untried))
 }
 
 /// How little may be expected of a worker at something over which these were lost.
-pub(crate) fn standing(state: &State, worker: &Worker, losses: &Losses) -> Standing {
+pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> Reputation {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);
-    (state.is_failing(host), silent, losses.are_of(host), !worker.proven)
+    (state.is_failing(host), silent, crashes.are_of(host), !worker.has_answered)
 }
 
 fn computing(state: &State, job: JobId) -> Option<&Evaluation> {

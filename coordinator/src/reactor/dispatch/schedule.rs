@@ -7,13 +7,13 @@ use crate::ids::{JobId, WorkerId};
 use crate::state::{BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
 use crate::store::JobRecord;
 
-/// Whether there is anything to hand out but suspects.
+/// Whether anything is to be handed out besides quarantined realizations.
 pub(crate) fn work_waits(state: &State) -> bool {
     next_job(state).is_some() || checks_wait(state)
 }
 
-/// The workers with credit, those that hold least first; of equal ones the first. Those on probation
-/// come last, and only if they hold nothing.
+/// Lists the workers that may take more, those that hold least first; of equal ones the first. Those
+/// on probation come last, and only if they hold nothing.
 pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
     let exclusive = |worker| state.held_for(worker, Purpose::Exclusive).next().is_some();
     let free = state
@@ -31,12 +31,12 @@ pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<Work
     free.map(|(.., worker)| worker).collect()
 }
 
-/// Batches that a worker holds, what is done ahead aside.
+/// Counts the batches that a worker holds, without speculative ones.
 pub(crate) fn held(state: &State, worker: &Worker) -> usize {
     worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
 }
 
-/// Of the active jobs with work: of the client that has had least computing time those with the
+/// Chooses the job that is served next. Of the active jobs with work it takes: of the client that has had least computing time those with the
 /// highest priority, and of these the first after the one that was served last, in a circle.
 pub(crate) fn next_job(state: &State) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
@@ -60,7 +60,7 @@ pub(crate) fn checks_wait(state: &State) -> bool {
     state.active.iter().any(|id| match state.jobs.get(id).map(|job| &job.stage) {
         Some(Stage::Computing(evaluation)) => {
             !evaluation.audits.is_empty()
-                || evaluation.disputes.iter().any(|dispute| dispute.judges.is_empty())
+                || evaluation.disputes.iter().any(|dispute| dispute.tie_breakers.is_empty())
         }
         _ => false,
     })

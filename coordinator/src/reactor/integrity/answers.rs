@@ -19,7 +19,7 @@ const RATE_WEIGHT: f64 = 0.5;
 /// A shorter computing time than this is not believed, s.
 const ELAPSED_MIN_S: f64 = 1e-6;
 
-/// Takes a worker's answer. Of a batch that was settled before (a copy was faster, or the answer
+/// Takes a worker's answer. Of a batch that was settled before (a duplicate was faster, or the answer
 /// came twice) it is only compared with what is known; of an unknown batch it means nothing.
 pub(crate) fn answered(
     turn: &mut Turn,
@@ -31,7 +31,7 @@ pub(crate) fn answered(
     let Some(attached) = turn.state.workers.get_mut(&worker) else {
         return;
     };
-    attached.heard = turn.now;
+    attached.last_seen = turn.now;
     attached.answered = turn.now;
     attached.rate.add(solved.len() as u64, turn.now);
     let name = attached.name.clone();
@@ -48,7 +48,7 @@ pub(crate) fn answered(
         workers::close(turn, worker, reason);
         return;
     }
-    turn.state.prove(worker);
+    turn.state.note_answer(worker);
     if purpose.is_some() {
         overdue::answered(turn.state, worker, batch, turn.now);
     }
@@ -68,7 +68,7 @@ pub(crate) fn answered(
         }
         Some(Purpose::TieBreak) => {
             take_back(turn, twins);
-            checks::judged(turn, batch, &assignment, solved, &name);
+            checks::tie_broken(turn, batch, &assignment, solved, &name);
         }
         None => checks::compare(turn, &assignment, &solved, &name),
     }
@@ -76,11 +76,11 @@ pub(crate) fn answered(
     departures::dismiss_if_drained(turn, worker);
 }
 
-/// Takes back the copies of a batch that is answered.
-fn take_back(turn: &mut Turn, copies: Vec<BatchId>) {
-    for copy in copies {
-        overdue::missed(turn.state, copy, turn.now);
-        batches::revoke(turn, copy);
+/// Takes back the duplicates of a batch that is answered.
+fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
+    for duplicate in duplicates {
+        overdue::missed(turn.state, duplicate, turn.now);
+        batches::revoke(turn, duplicate);
     }
 }
 
@@ -91,14 +91,14 @@ fn fill(
     by: &WorkerName,
     now: Duration,
 ) {
-    let Some(evaluation) = state.attempt_mut(assignment) else {
+    let Some(evaluation) = state.evaluation_of_mut(assignment) else {
         return;
     };
     let before = evaluation.filled();
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
     let asked_for =
-        |job: &&mut Job| job.evaluation().is_some_and(|it| it.round == assignment.round);
+        |job: &&mut Job| job.evaluation().is_some_and(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.progressed = now;
@@ -118,11 +118,11 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     *known += RATE_WEIGHT * (rate - *known);
     let count = batch.assignment.indices.count;
     let seconds = count as f64 / rate;
-    let threads = worker.hello.threads;
-    let took = fairness::thread_time(seconds, threads);
+    let slots = worker.hello.slots;
+    let took = fairness::slot_time(seconds, slots);
     if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
         // Whatever a worker says, it has not computed for longer than it was waited for.
-        job.pace.learn(count, threads, seconds.min(waited_s));
+        job.pace.learn(count, slots, seconds.min(waited_s));
     }
     if let Some(job) =
         state.jobs.get(&batch.assignment.job).filter(|_| batch.purpose != Purpose::Speculative)

@@ -24,7 +24,7 @@ pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName)
         return;
     }
     let Assignment { job, indices, .. } = *assignment;
-    if let Some(evaluation) = state.attempt_mut(assignment)
+    if let Some(evaluation) = state.evaluation_of_mut(assignment)
         && audit::is_chosen(&key, job, evaluation.number, indices.first, fraction)
     {
         evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
@@ -38,7 +38,7 @@ pub(crate) fn compare(
     solved: &[Solved],
     by: &WorkerName,
 ) {
-    let Some(evaluation) = turn.state.attempt_mut(assignment) else {
+    let Some(evaluation) = turn.state.evaluation_of_mut(assignment) else {
         return;
     };
     let Some((indices, votes)) = evaluation.compare(assignment.indices, solved, by) else {
@@ -52,7 +52,7 @@ pub(crate) fn compare(
             format!("realization {} as {} and as {}", it.index, shown(earlier), shown(later))
         });
         let reason = format!("answered {what}");
-        bans::expel(turn, by, assignment.job, reason);
+        bans::ban(turn, by, assignment.job, reason);
         return;
     }
     let known = |dispute: &Dispute| dispute.involves(&earlier.by) && dispute.involves(&later.by);
@@ -64,18 +64,18 @@ pub(crate) fn compare(
 }
 
 /// Takes the answer of a worker that was to decide.
-pub(crate) fn judged(
+pub(crate) fn tie_broken(
     turn: &mut Turn,
     batch: BatchId,
     assignment: &Assignment,
     solved: Vec<Solved>,
     by: &WorkerName,
 ) {
-    let of_batch = |dispute: &Dispute| dispute.judges.contains(&batch);
+    let of_batch = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
     let found = |it: &mut Evaluation| it.disputes.iter().position(of_batch);
-    let at = turn.state.attempt_mut(assignment).and_then(found);
+    let at = turn.state.evaluation_of_mut(assignment).and_then(found);
     turn.state.settle(batch);
-    let Some((at, evaluation)) = at.zip(turn.state.attempt_mut(assignment)) else {
+    let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
         return;
     };
     let dispute = &mut evaluation.disputes[at];
@@ -85,7 +85,7 @@ pub(crate) fn judged(
     }
 }
 
-/// Expels those who were not believed.
+/// Bans those who were not believed.
 fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
     let Verdict { believed: [one, other], liars } = verdict;
     for Contradiction { index, answers: [(_, right), (liar, wrong)] } in liars {
@@ -95,7 +95,7 @@ fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
             shown(wrong),
             shown(right)
         );
-        bans::expel(turn, &liar, job, reason);
+        bans::ban(turn, &liar, job, reason);
     }
 }
 
@@ -139,9 +139,9 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
         let nobody = !state.answers_batches(|name| !dispute.involves(name));
         let others = |name: &WorkerName| !dispute.involves(name);
-        let lethal = poison::hopeless(state, &dispute.lost, others, now);
-        let waited_for = |judge| overdue::is_waited_for(state, judge, now);
-        !dispute.judges.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
+        let lethal = poison::is_poison(state, &dispute.crashes, others, now);
+        let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
+        !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.contradiction()?);

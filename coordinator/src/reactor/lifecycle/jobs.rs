@@ -63,11 +63,11 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
         }
         Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
         // The store does not give what it would leave besides.
-        Stage::Rereading { .. } if job.trouble.is_some() => {
+        Stage::Replaying { .. } if job.trouble.is_some() => {
             finish(turn, id, cancelled());
         }
         Stage::Accepting
-        | Stage::Rereading { .. }
+        | Stage::Replaying { .. }
         | Stage::Storing { .. }
         | Stage::Finishing(_) => {}
     }
@@ -170,7 +170,7 @@ pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
         return;
     };
     job.trouble = None;
-    job.rewind = false;
+    job.restart_pending = false;
     job.workers.clear();
     job.search = Search::new(job.record.specification.clone());
     job.stage = Stage::Waiting;
@@ -199,11 +199,11 @@ pub(crate) fn cancelled() -> Ending {
     Ending { status: Status::Cancelled, failure: None, reason: None }
 }
 
-/// Asks for the next stored evaluation of a job, unless an expulsion is not durable yet.
+/// Asks for the next stored evaluation of a job, unless a ban is not durable yet.
 pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
     let may = !turn.state.ban_pending();
     if let Some(job) = turn.state.jobs.get_mut(&id) {
-        job.stage = Stage::Rereading { asked: may };
+        job.stage = Stage::Replaying { asked: may };
         if may {
             turn.effects.push(Effect::Read { job: id, number: job.search.evaluations() });
         }
@@ -214,7 +214,7 @@ pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
 pub(crate) fn restart(turn: &mut Turn, id: JobId) {
     batches::revoke_all(turn, id);
     if let Some(job) = turn.state.jobs.get_mut(&id) {
-        job.rewind = false;
+        job.restart_pending = false;
         job.workers.clear();
         job.search = Search::new(job.record.specification.clone());
         advance(turn, id);

@@ -38,7 +38,7 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             job.workers.append(&mut record.workers);
             job.trouble = None;
             job.search.tell(outcomes, estimated_error);
-            if job.rewind {
+            if job.restart_pending {
                 jobs::restart(turn, id);
             } else {
                 jobs::advance(turn, id);
@@ -75,7 +75,7 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
     let since = job.trouble.as_ref().map_or(turn.now, |trouble| trouble.since);
     job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
     turn.state.changed.insert(id);
-    if job.rewind && matches!(job.stage, Stage::Finishing(_)) {
+    if job.restart_pending && matches!(job.stage, Stage::Finishing(_)) {
         jobs::reopen(turn, id);
     }
     despair_if_late(turn, since, error);
@@ -100,12 +100,12 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
             let summary = Arc::new(job.search.summary());
             Effect::Store(Record::End { end: end.clone(), summary })
         }
-        Stage::Rereading { asked: true } => {
+        Stage::Replaying { asked: true } => {
             Effect::Read { job: job.record.job, number: job.search.evaluations() }
         }
         Stage::Accepting
         | Stage::Waiting
-        | Stage::Rereading { asked: false }
+        | Stage::Replaying { asked: false }
         | Stage::Computing(_) => return,
     });
 }
@@ -155,7 +155,7 @@ impl Job {
             Stage::Accepting => Some(RecordKey::Job),
             Stage::Storing { record, .. } => Some(RecordKey::Evaluation(record.number)),
             Stage::Finishing(_) => Some(RecordKey::End),
-            Stage::Waiting | Stage::Rereading { .. } | Stage::Computing(_) => None,
+            Stage::Waiting | Stage::Replaying { .. } | Stage::Computing(_) => None,
         }
     }
 }

@@ -1,5 +1,5 @@
 //! Stored evaluations of a job, read one by one and told to its search: after a restart, and when
-//! a worker is expelled whose answers are in them. An evaluation with answers of an expelled
+//! a worker is banned whose answers are in them. An evaluation with answers of a banned
 //! worker is computed again; if it changes, those after it in the store belong to another path.
 
 use super::{jobs, records};
@@ -13,13 +13,13 @@ use crate::search::Step;
 use crate::state::{Stage, Trouble};
 use crate::store::EvaluationRecord;
 
-/// An expulsion is durable: whoever waited for it reads on.
+/// A ban is durable: whoever waited for it reads on.
 pub(crate) fn read_on(turn: &mut Turn) {
     if turn.state.ban_pending() {
         return;
     }
     for (&id, job) in &mut turn.state.jobs {
-        if let Stage::Rereading { asked: asked @ false } = &mut job.stage {
+        if let Stage::Replaying { asked: asked @ false } = &mut job.stage {
             *asked = true;
             turn.effects.push(Effect::Read { job: id, number: job.search.evaluations() });
         }
@@ -37,25 +37,25 @@ pub(crate) fn read(
         return;
     };
     // Anything else is an answer to a question that was asked twice.
-    let wanted = matches!(job.stage, Stage::Rereading { asked: true });
+    let wanted = matches!(job.stage, Stage::Replaying { asked: true });
     if !wanted || job.search.evaluations() != number {
         return;
     }
     match found {
         Ok(Some(record)) => {
             job.trouble = None;
-            told(turn, id, record);
+            replay(turn, id, record);
         }
         Ok(None) => jobs::fail(turn, id, &Failure::Missing { number }),
         Err(Unread::Refused { error }) => read_failed(turn, id, error),
-        Err(Unread::Damaged) => mend(turn, id),
+        Err(Unread::Damaged) => recompute(turn, id),
     }
 }
 
 /// Has an evaluation computed again whose record is damaged. A point's outcomes are the same each
 /// time, so what is stored after it is on the same path, or is found not to be.
-fn mend(turn: &mut Turn, id: JobId) {
-    let round = turn.state.round();
+fn recompute(turn: &mut Turn, id: JobId) {
+    let attempt = turn.state.new_attempt();
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
@@ -70,10 +70,10 @@ fn mend(turn: &mut Turn, id: JobId) {
         Step::Evaluate(point) => {
             let realizations = job.record.specification.monte_carlo.realizations;
             let number = job.search.evaluations();
-            let mut evaluation = Evaluation::new(number, round, point, realizations);
+            let mut evaluation = Evaluation::new(number, attempt, point, realizations);
             evaluation.before = Before::Damaged;
             job.stage = Stage::Computing(evaluation);
-            job.mended = true;
+            job.recomputed = true;
         }
         Step::Done(ending) => jobs::finish(turn, id, ending),
     }
@@ -97,16 +97,16 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
 }
 
 /// Tells a search what the store has, or has it computed again.
-fn told(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
-    let doubtful = record.workers.iter().any(|worker| turn.state.expulsion(worker).is_some());
-    let round = turn.state.round();
+fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
+    let doubtful = record.workers.iter().any(|worker| turn.state.ban(worker).is_some());
+    let attempt = turn.state.new_attempt();
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     turn.state.changed.insert(id);
     job.progressed = turn.now;
     let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
-    if job.mended && job.search.expects(point).is_err() {
+    if job.recomputed && job.search.expects(point).is_err() {
         // What was damaged had been computed wrongly, and this comes of it.
         job.stored = number;
         jobs::advance(turn, id);
@@ -114,7 +114,7 @@ fn told(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
         let realizations = job.record.specification.monte_carlo.realizations;
         match job.search.expects(point) {
             Ok(()) => {
-                let mut evaluation = Evaluation::new(number, round, point, realizations);
+                let mut evaluation = Evaluation::new(number, attempt, point, realizations);
                 evaluation.before = Before::Stored(outcomes);
                 job.stage = Stage::Computing(evaluation);
             }

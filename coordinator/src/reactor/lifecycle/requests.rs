@@ -18,7 +18,7 @@ use crate::state::{Job, RequestName, Stage, State, identity};
 use crate::store::JobRecord;
 use crate::worker_list;
 
-/// Most expelled workers that are shown.
+/// Most banned workers that are shown.
 const EXPELLED_SHOWN_MAX: usize = 1000;
 
 pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
@@ -34,7 +34,7 @@ pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
         Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
         Request::Cancel(job) => cancel(turn, token, job),
         Request::Fetch(job) => Some(fetch(turn.state, job)),
-        Request::Expelled => Some(expelled(turn.state, turn.now)),
+        Request::Banned => Some(banned(turn.state, turn.now)),
         Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
         Request::DrainWorker(worker) => Some(drain(turn, worker)),
         Request::Prune(retention) => {
@@ -196,12 +196,12 @@ fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
     }
 }
 
-fn expelled(state: &State, now: Duration) -> Answer {
-    let newest = state.expelled.len().saturating_sub(EXPELLED_SHOWN_MAX);
+fn banned(state: &State, now: Duration) -> Answer {
+    let newest = state.banned.len().saturating_sub(EXPELLED_SHOWN_MAX);
     let shown = state
-        .expelled
+        .banned
         .iter()
         .skip(newest)
-        .map(|expelled| (expelled.record.clone(), now.saturating_sub(expelled.record.at)));
-    Answer::Expelled(shown.collect())
+        .map(|banned| (banned.record.clone(), now.saturating_sub(banned.record.at)));
+    Answer::Banned(shown.collect())
 }

@@ -10,8 +10,8 @@ use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
 use crate::reactor::turn::Turn;
-use crate::state::{EndedJob, Expelled, Job, RequestName, Stage, State, sequence};
-use crate::store::{ExpulsionRecord, JobRecord, Store, StoreError};
+use crate::state::{Banned, EndedJob, Job, RequestName, Stage, State, sequence};
+use crate::store::{BanRecord, JobRecord, Store, StoreError};
 
 /// What a store holds, its evaluations aside.
 #[derive(Debug, Default)]
@@ -19,7 +19,7 @@ pub struct Restored {
     ended: Vec<(JobId, EndedJob)>,
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
-    expelled: Vec<ExpulsionRecord>,
+    banned: Vec<BanRecord>,
     last_forgotten: Option<JobId>,
 }
 
@@ -27,7 +27,7 @@ impl Restored {
     /// Reads a store. Blocks.
     ///
     /// A job that has not ended and whose evaluations were computed with other numerics than this
-    /// program's begins again: results of two numerics never mix. Workers stay expelled while
+    /// program's begins again: results of two numerics never mix. Workers stay banned while
     /// their answers may be in the evaluations of an unfinished job.
     ///
     /// # Errors
@@ -44,9 +44,9 @@ impl Restored {
             keep_numerics(store, record, evaluations)?;
         }
         if restored.unfinished.is_empty() {
-            store.forget_expulsions()?;
+            store.forget_bans()?;
         }
-        restored.expelled = store.expulsions()?;
+        restored.banned = store.bans()?;
         restored.last_forgotten = store.last_forgotten()?;
         Ok(restored)
     }
@@ -84,9 +84,9 @@ impl Restored {
         self.ended.len()
     }
 
-    /// How many workers are expelled.
-    pub fn expelled(&self) -> usize {
-        self.expelled.len()
+    /// How many workers are banned.
+    pub fn banned(&self) -> usize {
+        self.banned.len()
     }
 }
 
@@ -94,10 +94,10 @@ impl State {
     /// A coordinator that goes on with what was `restored`, as of `now`.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let Restored { ended, unfinished, expelled, last_forgotten } = restored;
+        let Restored { ended, unfinished, banned, last_forgotten } = restored;
         state.next_job = last_forgotten.map_or(1, |job| job.0 + 1);
-        let durable = |record| Expelled { record, store_at: None, refused: false };
-        state.expelled = expelled.into_iter().map(durable).collect();
+        let durable = |record| Banned { record, store_at: None, refused: false };
+        state.banned = banned.into_iter().map(durable).collect();
         for (id, mut job) in ended {
             // Snapshots were published while the end was on its way to the store.
             job.sequence = sequence(job.sequence, now);

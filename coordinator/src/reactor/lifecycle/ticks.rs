@@ -16,7 +16,7 @@ const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
 /// Takes time in which this process did not run out of all that silence is measured by: what came
 /// meanwhile is not read yet.
-pub(crate) fn excuse(state: &mut State, now: Duration) {
+pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
     if gap <= state.config.heartbeat {
         return;
@@ -24,7 +24,7 @@ pub(crate) fn excuse(state: &mut State, now: Duration) {
     tracing::warn!(?gap, "the coordinator stood still; nobody is blamed for it");
     let excused = |since: &mut Duration| *since = (*since + gap).min(now);
     for worker in state.workers.values_mut() {
-        excused(&mut worker.heard);
+        excused(&mut worker.last_seen);
         excused(&mut worker.answered);
         excused(&mut worker.missed.since);
     }
@@ -34,10 +34,10 @@ pub(crate) fn excuse(state: &mut State, now: Duration) {
     }
     for job in state.jobs.values_mut() {
         for evaluation in job.evaluations_mut() {
-            evaluation.suspects.values_mut().for_each(|losses| losses.excuse(excused));
+            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
             for dispute in &mut evaluation.disputes {
                 excused(&mut dispute.since);
-                dispute.lost.excuse(excused);
+                dispute.crashes.shift(excused);
             }
         }
     }
@@ -57,7 +57,7 @@ pub(crate) fn expire(turn: &mut Turn) {
 
 /// Why the lease of a worker has ended, if it has.
 fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
-    let silent = now.saturating_sub(worker.heard);
+    let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
         return Some(CloseReason::Expired { silent });
     }
@@ -69,8 +69,8 @@ fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason>
 
 pub(crate) fn send_heartbeats(turn: &mut Turn) {
     for (&id, worker) in &mut turn.state.workers {
-        if turn.now.saturating_sub(worker.beat) >= turn.state.config.heartbeat {
-            worker.beat = turn.now;
+        if turn.now.saturating_sub(worker.heartbeat_sent) >= turn.state.config.heartbeat {
+            worker.heartbeat_sent = turn.now;
             turn.effects.push(Effect::Heartbeat { worker: id });
         }
     }
@@ -78,7 +78,7 @@ pub(crate) fn send_heartbeats(turn: &mut Turn) {
 
 /// Fails the jobs of realizations over which so many workers crashed that no more are risked.
 pub(crate) fn fail_poisoned(turn: &mut Turn) {
-    poison::forget_old_losses(turn.state, turn.now);
+    poison::forget_old_crashes(turn.state, turn.now);
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
         if let Some(failure) = poison::failure(turn.state, job, turn.now) {

@@ -7,10 +7,10 @@ use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
 use crate::close_reason::CloseReason;
+use crate::crashes::{Cause, LostWorker};
 use crate::effect::{Effect, Refusal};
 use crate::event::Hello;
 use crate::ids::{LeaseId, WorkerId};
-use crate::losses::{Cause, Loss};
 use crate::notice::{Departure, Notice};
 use crate::rate::Rate;
 use crate::reactor::dispatch::{batches, departures, overdue, poison};
@@ -34,13 +34,13 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     let lease = LeaseId(turn.state.next_lease);
     turn.state.next_lease += 1;
     let name = name(&hello);
-    poison::forgive(turn.state, &name);
+    poison::forget_crashes(turn.state, &name);
     turn.state.probation.attach(&name, turn.now);
     turn.effects.push(Effect::Welcome { worker, lease });
     turn.effects.push(Effect::Note(Notice::WorkerAttached {
         worker,
         name: name.clone(),
-        threads: hello.threads,
+        slots: hello.slots,
         version: hello.version.clone(),
     }));
     turn.state.workers.insert(
@@ -50,11 +50,11 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             name,
             hello,
             attached: turn.now,
-            heard: turn.now,
+            last_seen: turn.now,
             answered: turn.now,
-            proven: false,
+            has_answered: false,
             missed: Missed::default(),
-            beat: turn.now,
+            heartbeat_sent: turn.now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
             rate: Rate::default(),
@@ -64,14 +64,14 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     );
 }
 
-pub(crate) fn heard(state: &mut State, worker: WorkerId, now: Duration) {
+pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {
     if let Some(worker) = state.workers.get_mut(&worker) {
-        worker.heard = now;
+        worker.last_seen = now;
     }
 }
 
 pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
-    heard(turn.state, worker, turn.now);
+    seen(turn.state, worker, turn.now);
     if let Some(attached) = turn.state.workers.get_mut(&worker) {
         attached.draining = true;
     }
@@ -120,7 +120,13 @@ fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
         turn.state.count_loss(&gone.name, turn.now);
     }
     let alone = gone.in_flight.len() == 1;
-    let loss = Loss { worker: gone.name, cause, at: turn.now, alone, proven: gone.proven };
+    let loss = LostWorker {
+        worker: gone.name,
+        cause,
+        at: turn.now,
+        alone,
+        has_answered: gone.has_answered,
+    };
     for batch in gone.in_flight {
         batches::give_back_orphan(turn.state, batch, &loss);
     }
@@ -132,7 +138,7 @@ fn cause(why: &Departure) -> Cause {
         return Cause::StreamBroke;
     };
     match reason {
-        CloseReason::Drained | CloseReason::Draining | CloseReason::Expelled { .. } => {
+        CloseReason::Drained | CloseReason::Draining | CloseReason::Banned { .. } => {
             Cause::Announced
         }
         CloseReason::Expired { .. } => Cause::Silence,
@@ -142,7 +148,7 @@ fn cause(why: &Departure) -> Cause {
         | CloseReason::WrongCount { .. }
         | CloseReason::SecondHello
         | CloseReason::FingerprintDiffers { .. }
-        | CloseReason::Threads { .. }
+        | CloseReason::Slots { .. }
         | CloseReason::NameTooLong { .. }
         | CloseReason::TooManyWorkers { .. } => Cause::Misbehaviour,
     }
@@ -166,7 +172,7 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     let longest =
         [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
     let bytes = longest.unwrap_or(0);
-    let expulsion = state.expulsion(&name(hello));
+    let ban = state.ban(&name(hello));
     if state.draining {
         Err(CloseReason::Draining)
     } else if bytes > NAME_BYTES_MAX {
@@ -174,10 +180,10 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     } else if hello.fingerprint != coordinator {
         let worker = hello.fingerprint.clone();
         Err(CloseReason::FingerprintDiffers { worker, coordinator })
-    } else if let Some(expulsion) = expulsion {
-        Err(CloseReason::Expelled { reason: expulsion.reason.clone() })
-    } else if hello.threads == 0 || hello.threads > WORKER_THREADS_MAX {
-        Err(CloseReason::Threads { threads: hello.threads, max: WORKER_THREADS_MAX })
+    } else if let Some(ban) = ban {
+        Err(CloseReason::Banned { reason: ban.reason.clone() })
+    } else if hello.slots == 0 || hello.slots > WORKER_THREADS_MAX {
+        Err(CloseReason::Slots { slots: hello.slots, max: WORKER_THREADS_MAX })
     } else if state.workers.len() >= WORKERS_MAX {
         Err(CloseReason::TooManyWorkers { limit: WORKERS_MAX })
     } else {

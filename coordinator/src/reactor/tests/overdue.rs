@@ -201,7 +201,7 @@ fn a_death_over_a_copy_of_a_suspect_counts() {
     rig.live(OVERDUE);
     rig.check(end_of_stream(3), &[]);
     let evaluation = rig.state.jobs[&JobId(1)].evaluation().unwrap();
-    assert!(evaluation.suspects[&0].are_of("host 3"), "{:?}", evaluation.suspects);
+    assert!(evaluation.crashes[&0].are_of("host 3"), "{:?}", evaluation.crashes);
     assert!(evaluation.quarantine.is_empty());
 }
 

@@ -129,12 +129,12 @@ fn memory_is_for_what_is_asked_for() {
     rig.state.config.active_realizations_max = 5;
     rig.accept(search(2));
     rig.event(hello(1, 4));
-    assert_eq!(rig.state.jobs[&JobId(1)].ahead.evaluations.len(), 1);
+    assert_eq!(rig.state.jobs[&JobId(1)].speculation.evaluations.len(), 1);
     // Another job begins, and there is no room for both.
     rig.event(submit(1, "", propagation(2)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+2"];
     rig.check(stored(2, RecordKey::Job), &expected);
-    assert!(rig.state.jobs[&JobId(1)].ahead.evaluations.is_empty());
+    assert!(rig.state.jobs[&JobId(1)].speculation.evaluations.is_empty());
 }
 
 #[test]
