@@ -56,7 +56,7 @@ pub struct Evaluation {
     /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
     /// they held nothing else; those that wait are in `quarantine`.
     pub(crate) crashes: BTreeMap<u64, Crashes>,
-    /// Suspects to hand out, each alone to a worker that holds nothing else.
+    /// Quarantined indices that wait to be handed out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
     /// Everybody whose answers fill results.
     pub(crate) workers: Vec<WorkerName>,
@@ -100,7 +100,7 @@ impl Evaluation {
         self.filled
     }
 
-    /// Realizations that nobody computes, the suspects aside.
+    /// Realizations that nobody computes, quarantined ones aside.
     pub fn queued(&self) -> u64 {
         self.queue.iter().map(|indices| indices.count).sum()
     }

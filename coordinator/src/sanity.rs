@@ -26,7 +26,7 @@ pub enum Insane {
     Holding(WorkerId, BatchId),
     /// A worker holds too much.
     #[error("worker {0} holds more than it may")]
-    Credit(WorkerId),
+    TooMuch(WorkerId),
     /// The duplicates of a batch do not name each other, or differ in what they are for.
     #[error("batch {0} and its duplicates do not match")]
     Duplicates(BatchId),
@@ -62,7 +62,7 @@ pub enum Insane {
     /// An answer of a banned worker counts, or it is attached.
     #[error("worker {0} is expelled, and still counts")]
     Banned(WorkerName),
-    /// What is computed ahead is none of the points that a search may ask for.
+    /// A speculative evaluation is of none of the points that a search may ask for.
     #[error("job {0} is ahead with what its search does not ask for")]
     Speculation(JobId),
     /// A number that is handed out next is not above all in use.
@@ -132,7 +132,7 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
     }
 }
 
-/// What is ahead is of points that may be asked for, once each, while an evaluation is under way.
+/// Speculative evaluations are of candidates, of each at most one, while an evaluation is under way.
 fn check_ahead(job: &Job) -> Result<(), Insane> {
     let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
@@ -143,7 +143,7 @@ fn check_ahead(job: &Job) -> Result<(), Insane> {
         && points.len() == job.evaluations().count()
         && candidates.len() <= CANDIDATES_MAX
         && (under_way || candidates.is_empty())
-        && evaluations.iter().all(|ahead| ahead.audits_out == 0);
+        && evaluations.iter().all(|it| it.audits_out == 0);
     if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
 }
 
@@ -194,7 +194,7 @@ fn check_workers(state: &State) -> Result<(), Insane> {
         let speculative = count(Purpose::Speculative);
         let remembered = worker.settled.len();
         if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
-            return Err(Insane::Credit(id));
+            return Err(Insane::TooMuch(id));
         }
         for batch in &worker.in_flight {
             if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
@@ -235,9 +235,9 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
         let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.attempt == attempt);
-        let ahead = job
+        let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
-        if asked_for == ahead || (batch.purpose == Purpose::Speculative) != ahead {
+        if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {
             return Err(Insane::Stray(id));
         }
     }

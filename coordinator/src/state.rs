@@ -80,7 +80,7 @@ pub struct State {
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
-    /// Batches that are overdue and wait for another worker that computes the same; of copies the
+    /// Batches that are overdue and wait for another worker that computes the same; of duplicates the
     /// newest.
     pub(crate) overdue: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
@@ -98,14 +98,14 @@ pub(crate) struct Job {
     pub(crate) identity: Identity,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
-    /// What is computed before the search asks for it.
+    /// Speculative evaluations of points that its search may ask for next.
     pub(crate) speculation: Speculation,
     /// How many evaluations the store has of it; those that the search was not told are read
     /// before it goes on.
     pub(crate) stored: u64,
     /// Everybody whose answers are in evaluations that the search was told.
     pub(crate) workers: BTreeSet<WorkerName>,
-    /// What it was told is to be read again, when what is being stored is stored.
+    /// Its search is to be restarted, when what is being stored is stored.
     pub(crate) restart_pending: bool,
     /// An evaluation was damaged in the store, and computed again.
     pub(crate) recomputed: bool,
@@ -114,7 +114,7 @@ pub(crate) struct Job {
     pub(crate) rate: Rate,
     /// How long its realizations take.
     pub(crate) pace: Pace,
-    /// The newest copy of an overdue batch of it.
+    /// The newest duplicate of an overdue batch of it.
     pub(crate) scout: Option<BatchId>,
     /// Sequence number of its last snapshot that was published.
     pub(crate) sequence: u64,

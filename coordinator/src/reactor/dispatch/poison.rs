@@ -1,10 +1,10 @@
-//! Realizations that were alone in a batch of a lost worker: who gets them, and when they fail
-//! their job.
+//! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
+//! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
 //! A bad node that has just come back is the one with nothing to do, so being idle is no
-//! recommendation: suspects go to whom most may be expected of, and wait for it. One over which
-//! somebody was lost goes to the worker that has been there longest among these, so that a node that
-//! comes and goes never has it while another is there.
+//! recommendation: a quarantined realization goes to the worker with the best reputation, and waits
+//! for it. One over which a worker was lost goes to the worker that has been there longest among
+//! these, so that a node that comes and goes never has it while another is there.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -33,8 +33,8 @@ const MEMORY: Duration = Duration::from_secs(600);
 /// job), whether one was lost over this, whether it has not answered anything yet.
 pub(crate) type Reputation = (bool, bool, bool, bool);
 
-/// Hands out crashes, each alone to a worker that holds nothing. Returns those who must not be
-/// refilled, so that they hold nothing soon.
+/// Hands out quarantined realizations, each alone to a worker that holds nothing. Returns the workers
+/// that are reserved: they get nothing else, so that they hold nothing soon.
 pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
@@ -52,7 +52,7 @@ pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     kept
 }
 
-/// The next suspect of a job that may be handed out, and the worker that is to have it.
+/// Chooses the next quarantined realization of a job that may be handed out, and its worker.
 fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = computing(state, job)?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
@@ -65,7 +65,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     Some((*index, taker(state, crashes, now)?))
 }
 
-/// The worker that is to have a suspect over which these were lost, if there is one: who has
+/// Chooses the worker of a realization over which these crashed, if there is one: a worker that has
 /// answered nothing yet shows first that it answers something else, if there is something else.
 fn taker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
@@ -91,7 +91,7 @@ fn send(turn: &mut Turn, job: JobId, index: u64, worker: WorkerId) {
     batches::send(turn, worker, assignment, Purpose::Exclusive);
 }
 
-/// A worker is back: nothing that it held is to blame for its absence.
+/// Forgets the crashes of a worker that is back: nothing that it held is to blame for its absence.
 pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
     if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
         lost.workers.retain(|lost| lost != name);
@@ -106,7 +106,7 @@ pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
     state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
 }
 
-/// Why a job fails over a realization: enough workers were lost over it, and have stayed away.
+/// Returns the failure of a job with a poison realization, if it has one.
 pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let evaluation = computing(state, job)?;
     let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
@@ -127,8 +127,8 @@ fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> Str
     case.map_or_else(String::new, |case| case_file::to_toml(&case))
 }
 
-/// Whether enough workers were lost over something that those in `of` may have, and have stayed
-/// away for so long that they will not come back.
+/// Whether something that those in `of` may have is poison: the crash limit is reached, and the lost
+/// workers have stayed away for so long that they will not come back.
 pub(crate) fn is_poison(
     state: &State,
     crashes: &Crashes,
@@ -139,6 +139,7 @@ pub(crate) fn is_poison(
     crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
 }
 
+/// Whether no worker in `of` is to be risked any more for something over which these crashed.
 pub(crate) fn crash_limit_reached(
     state: &State,
     crashes: &Crashes,
@@ -152,7 +153,7 @@ pub(crate) fn crash_limit_reached(
     crashes.reach_limit(|| state.workers.values().any(untried))
 }
 
-/// How little may be expected of a worker at something over which these were lost.
+/// Returns how little may be expected of a worker at something over which these crashed.
 pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> Reputation {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);

@@ -1,4 +1,4 @@
-//! Answers to batches, and batches whose worker is lost.
+//! Answers to batches: they fill an evaluation, are compared, or decide a dispute.
 
 use std::time::Duration;
 
@@ -40,8 +40,8 @@ pub(crate) fn answered(
     let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
         return;
     };
-    let (purpose, twins) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();
-    let twins = twins.unwrap_or_default();
+    let (purpose, duplicates) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();
+    let duplicates = duplicates.unwrap_or_default();
     let (found, expected) = (solved.len(), assignment.indices.count);
     if found as u64 != expected {
         let reason = CloseReason::WrongCount { batch, found, expected };
@@ -57,17 +57,17 @@ pub(crate) fn answered(
             if let Some(held) = turn.state.settle(batch) {
                 measure(turn.state, &held, elapsed_s, turn.now);
             }
-            take_back(turn, twins);
+            take_back(turn, duplicates);
             fill(turn.state, &assignment, &solved, &name, turn.now);
             checks::audit(turn.state, &assignment, &name);
         }
         Some(Purpose::Audit { .. }) => {
             turn.state.settle(batch);
-            take_back(turn, twins);
+            take_back(turn, duplicates);
             checks::compare(turn, &assignment, &solved, &name);
         }
         Some(Purpose::TieBreak) => {
-            take_back(turn, twins);
+            take_back(turn, duplicates);
             checks::tie_broken(turn, batch, &assignment, solved, &name);
         }
         None => checks::compare(turn, &assignment, &solved, &name),

@@ -1,4 +1,5 @@
-//! A worker that computes wrongly: refused from now on, and what it answered is computed again.
+//! Bans of workers that compute wrongly: such a worker is refused from now on, and what it answered
+//! is computed again.
 
 use crate::close_reason::CloseReason;
 use crate::effect::{Effect, Record};

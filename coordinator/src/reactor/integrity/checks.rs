@@ -1,4 +1,4 @@
-//! Answers against answers: batches that are computed twice, and a third worker where two differ.
+//! Checks of answers against answers: batches that are computed twice, and disputes where two differ.
 
 use std::time::Duration;
 

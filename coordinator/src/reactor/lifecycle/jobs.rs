@@ -210,7 +210,7 @@ pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// Begins the search of an active job again, from its stored evaluations.
+/// Restarts the search of an active job, which replays its stored evaluations.
 pub(crate) fn restart(turn: &mut Turn, id: JobId) {
     batches::revoke_all(turn, id);
     if let Some(job) = turn.state.jobs.get_mut(&id) {

@@ -1,4 +1,4 @@
-//! Stored evaluations of a job, read one by one and told to its search: after a restart, and when
+//! Replay: stored evaluations of a job are read one by one and told to its search, after a restart, and when
 //! a worker is banned whose answers are in them. An evaluation with answers of a banned
 //! worker is computed again; if it changes, those after it in the store belong to another path.
 
@@ -13,7 +13,7 @@ use crate::search::Step;
 use crate::state::{Stage, Trouble};
 use crate::store::EvaluationRecord;
 
-/// A ban is durable: whoever waited for it reads on.
+/// Lets jobs read on that waited for a ban to be durable.
 pub(crate) fn read_on(turn: &mut Turn) {
     if turn.state.ban_pending() {
         return;
@@ -96,7 +96,7 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
     records::despair_if_late(turn, since, error);
 }
 
-/// Tells a search what the store has, or has it computed again.
+/// Tells a search what the store has of an evaluation, or has that computed again.
 fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
     let doubtful = record.workers.iter().any(|worker| turn.state.ban(worker).is_some());
     let attempt = turn.state.new_attempt();

@@ -19,7 +19,7 @@ use crate::store::JobRecord;
 use crate::worker_list;
 
 /// Most banned workers that are shown.
-const EXPELLED_SHOWN_MAX: usize = 1000;
+const BANNED_SHOWN_MAX: usize = 1000;
 
 pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
     let answer = match request {
@@ -197,7 +197,7 @@ fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
 }
 
 fn banned(state: &State, now: Duration) -> Answer {
-    let newest = state.banned.len().saturating_sub(EXPELLED_SHOWN_MAX);
+    let newest = state.banned.len().saturating_sub(BANNED_SHOWN_MAX);
     let shown = state
         .banned
         .iter()

@@ -14,7 +14,7 @@ use crate::state::{State, Worker, sequence};
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
-/// Takes time in which this process did not run out of all that silence is measured by: what came
+/// Takes a gap, in which this process did not run, out of all that silence is measured by: what came
 /// meanwhile is not read yet.
 pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
@@ -43,20 +43,21 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     }
 }
 
+/// Ends the leases of workers that were silent, or have not answered, for too long.
 pub(crate) fn expire(turn: &mut Turn) {
     let expired: Vec<(WorkerId, CloseReason)> = turn
         .state
         .workers
         .iter()
-        .filter_map(|(id, worker)| Some((*id, overdue(turn.state, worker, turn.now)?)))
+        .filter_map(|(id, worker)| Some((*id, expired(turn.state, worker, turn.now)?)))
         .collect();
     for (worker, reason) in expired {
         workers::close(turn, worker, reason);
     }
 }
 
-/// Why the lease of a worker has ended, if it has.
-fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
+/// Returns why the lease of a worker has ended, if it has.
+fn expired(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
     let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
         return Some(CloseReason::Expired { silent });
@@ -67,6 +68,7 @@ fn overdue(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason>
     (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
 }
 
+/// Gives signs of life to workers that have had none for some time.
 pub(crate) fn send_heartbeats(turn: &mut Turn) {
     for (&id, worker) in &mut turn.state.workers {
         if turn.now.saturating_sub(worker.heartbeat_sent) >= turn.state.config.heartbeat {
@@ -87,6 +89,7 @@ pub(crate) fn fail_poisoned(turn: &mut Turn) {
     }
 }
 
+/// Writes refused records again whose time has come.
 pub(crate) fn store_again(turn: &mut Turn) {
     for job in turn.state.jobs.values_mut() {
         let Some(trouble) = &mut job.trouble else {
@@ -99,6 +102,7 @@ pub(crate) fn store_again(turn: &mut Turn) {
     }
 }
 
+/// Publishes the jobs that changed, and now and then all unfinished ones.
 pub(crate) fn publish(turn: &mut Turn) {
     if turn.now.saturating_sub(turn.state.published) >= PUBLISH_EVERY {
         turn.state.published = turn.now;

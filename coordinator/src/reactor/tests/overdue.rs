@@ -158,7 +158,7 @@ fn a_vote_of_a_worker_that_does_not_answer_is_not_waited_for_without_end() {
 }
 
 /// A rig in which worker 2 holds realization 0 alone.
-fn with_suspect() -> Rig {
+fn with_quarantined_realization() -> Rig {
     let mut rig = rig(1, 1, 0.0);
     rig.check(end_of_stream(1), &[]);
     rig.check(on_its_own(2), &["welcome 2, lease 2", "send 2: batch 2 = 0+1"]);
@@ -167,8 +167,8 @@ fn with_suspect() -> Rig {
 }
 
 #[test]
-fn an_overdue_suspect_goes_alone_to_another_worker() {
-    let mut rig = with_suspect();
+fn an_overdue_quarantined_realization_goes_alone_to_another_worker() {
+    let mut rig = with_quarantined_realization();
     rig.check(on_its_own(3), &["welcome 3, lease 3"]);
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
@@ -181,8 +181,8 @@ fn an_overdue_suspect_goes_alone_to_another_worker() {
 }
 
 #[test]
-fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_suspect() {
-    let mut rig = with_suspect();
+fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_quarantined_realization() {
+    let mut rig = with_quarantined_realization();
     rig.event(submit(1, "", propagation(1000)));
     rig.event(stored(2, RecordKey::Job));
     let expected = ["welcome 3, lease 3", "send 3: batch 3 = 0+4", "send 3: batch 4 = 4+4"];
@@ -195,8 +195,8 @@ fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_suspect() {
 }
 
 #[test]
-fn a_death_over_a_copy_of_a_suspect_counts() {
-    let mut rig = with_suspect();
+fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
+    let mut rig = with_quarantined_realization();
     rig.event(on_its_own(3));
     rig.live(OVERDUE);
     rig.check(end_of_stream(3), &[]);
@@ -383,7 +383,7 @@ fn who_does_not_answer_checks_nothing() {
 }
 
 #[test]
-fn a_suspect_does_not_wait_for_who_does_not_answer() {
+fn a_quarantined_realization_does_not_wait_for_who_does_not_answer() {
     let mut rig = with_silent_worker();
     rig.accept(propagation(1));
     rig.event(on_its_own(3));

@@ -180,7 +180,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
 }
 
 #[test]
-fn the_evaluations_of_an_expelled_worker_are_computed_again() {
+fn the_evaluations_of_a_banned_worker_are_computed_again() {
     let (mut rig, store) = rig(&[1, 2], 3);
     let effects = expose(&mut rig, 2);
     assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
@@ -227,7 +227,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
 }
 
 #[test]
-fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
+fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let (mut rig, _) = rig(&[2], 1);
     rig.state.config.store_patience = Some(Duration::from_secs(4));
     let banned = expose(&mut rig, 2).swap_remove(0);
