@@ -5,14 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use osteon_common::parameters::Point;
 use thiserror::Error;
 
+use crate::batch::{Batch, Purpose};
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
+use crate::job::{Job, RequestName, Speculation, Stage};
 use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
-use crate::state::{
-    BATCHES_IN_FLIGHT_MAX, Banned, Batch, Job, Purpose, RequestName, SETTLED_MAX, Speculation,
-    Stage, State,
-};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, Banned, SETTLED_MAX, State};
 use crate::worker_name::WorkerName;
 
 /// What does not fit together.

@@ -6,8 +6,10 @@ use osteon_proto::choice::{JOB_FAILURE, JOB_KIND, JOB_STATUS};
 use osteon_proto::timestamp;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
+use crate::batch::Purpose;
 use crate::ids::JobId;
-use crate::state::{EndedJob, Job, LostInARow, Purpose, Stage, State};
+use crate::job::{EndedJob, Job, Stage};
+use crate::state::{LostInARow, State};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -143,7 +145,9 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
             let what = "a third worker, which decides between two whose answers differ";
             let tie_breakers = evaluation.disputes.iter().flat_map(|dispute| &dispute.tie_breakers);
             let asked = tie_breakers
-                .filter_map(|tie_breaker| state.batches.get(tie_breaker)?.worker_in(state))
+                .filter_map(|tie_breaker| {
+                    state.workers.get(&state.batches.get(tie_breaker)?.worker)
+                })
                 .next();
             let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
             format!("{what} {}{asked}", since(begun.unwrap_or(now)))
@@ -176,7 +180,7 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
         1 => "; another worker computes the same".to_owned(),
         _ => format!("; {others} others compute the same"),
     };
-    let (name, count) = (&batch.worker_in(state)?.name, batch.assignment.indices.count);
+    let (name, count) = (&state.workers.get(&batch.worker)?.name, batch.assignment.indices.count);
     Some(format!("the answer of {name} to {count} realizations {}{instead}", since(batch.sent)))
 }
 

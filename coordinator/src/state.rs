@@ -6,25 +6,20 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::WORKERS_MAX;
-use osteon_common::parameters::Point;
 use osteon_proto::batch::Work;
-use osteon_proto::specification;
-use prost::Message as _;
 
+use crate::batch::{Assignment, Batch, Purpose};
 use crate::config::Config;
 use crate::evaluation::Evaluation;
 use crate::event::Hello;
 use crate::fairness::Shares;
-use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
-use crate::indices::Indices;
+use crate::ids::{BatchId, JobId, LeaseId, WorkerId};
+use crate::job::{EndedJob, Job, RequestName, Stage};
 use crate::notice::Departure;
-use crate::pace::Pace;
 use crate::probation::Probation;
 use crate::rate::Rate;
-use crate::search::Search;
-use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
+use crate::store::BanRecord;
 use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
@@ -90,109 +85,6 @@ pub struct State {
     pub(crate) draining: bool,
 }
 
-/// A job that has not ended.
-#[derive(Debug)]
-pub(crate) struct Job {
-    pub(crate) record: JobRecord,
-    /// Digest of its specification: of two submissions of one request.
-    pub(crate) identity: Identity,
-    pub(crate) stage: Stage,
-    pub(crate) search: Search,
-    /// Speculative evaluations of points that its search may ask for next.
-    pub(crate) speculation: Speculation,
-    /// How many evaluations the store has of it; those that the search was not told are read
-    /// before it goes on.
-    pub(crate) stored: u64,
-    /// Everybody whose answers are in evaluations that the search was told.
-    pub(crate) workers: BTreeSet<WorkerName>,
-    /// Its search is to be restarted, when what is being stored is stored.
-    pub(crate) restart_pending: bool,
-    /// An evaluation was damaged in the store, and computed again.
-    pub(crate) recomputed: bool,
-    /// A client wants it ended as soon as what is being stored is stored.
-    pub(crate) cancelled: bool,
-    pub(crate) rate: Rate,
-    /// How long its realizations take.
-    pub(crate) pace: Pace,
-    /// The newest duplicate of an overdue batch of it.
-    pub(crate) scout: Option<BatchId>,
-    /// Sequence number of its last snapshot that was published.
-    pub(crate) sequence: u64,
-    /// When it last got an answer, or began, or was accepted.
-    pub(crate) progressed: Duration,
-    /// Requests that are answered when the present record is durable: submissions at first,
-    /// cancellations at the end.
-    pub(crate) tokens: Vec<Token>,
-    /// The store's refusal of the present record.
-    pub(crate) trouble: Option<Trouble>,
-}
-
-/// Points that a search may ask for next. Nothing of them is stored or shown.
-#[derive(Debug, Default)]
-pub(crate) struct Speculation {
-    /// The points, the likeliest first.
-    pub(crate) candidates: Vec<Point>,
-    /// The evaluations that are begun of them, in the order of their beginning.
-    pub(crate) evaluations: Vec<Evaluation>,
-}
-
-/// How far a job is.
-#[derive(Debug)]
-pub(crate) enum Stage {
-    /// Its record is being stored; no client has heard of it.
-    Accepting,
-    /// It waits for its turn.
-    Waiting,
-    /// A stored evaluation is being read for its search.
-    Replaying {
-        /// The store was asked for it.
-        asked: bool,
-    },
-    /// Its evaluation is handed out.
-    Computing(Evaluation),
-    /// A complete evaluation is being stored.
-    Storing {
-        /// The evaluation.
-        record: EvaluationRecord,
-        /// Those after it in the store belong to another path.
-        is_last: bool,
-    },
-    /// Its end is being stored.
-    Finishing(EndRecord),
-}
-
-/// Names the request that submitted a job: ids of different clients have nothing in common.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct RequestName {
-    client: String,
-    id: String,
-}
-
-/// Digest of a specification.
-pub(crate) type Identity = [u8; 32];
-
-/// A job whose end is durable: what a list shows of it.
-#[derive(Debug)]
-pub(crate) struct EndedJob {
-    pub(crate) request: Option<RequestName>,
-    pub(crate) identity: Identity,
-    pub(crate) kind: JobKind,
-    /// Who submitted it.
-    pub(crate) client: String,
-    /// What people call it; may be empty.
-    pub(crate) name: String,
-    /// Its rank among the jobs of its client.
-    pub(crate) priority: u32,
-    pub(crate) max_evaluations: u64,
-    /// Realizations of each evaluation.
-    pub(crate) realizations: u64,
-    /// When it was accepted, since the Unix epoch.
-    pub(crate) accepted: Duration,
-    /// Sequence number of its last snapshot.
-    pub(crate) sequence: u64,
-    pub(crate) end: EndRecord,
-}
-
 /// A worker that computes wrongly: refused for the life of the coordinator.
 #[derive(Debug)]
 pub(crate) struct Banned {
@@ -202,16 +94,6 @@ pub(crate) struct Banned {
     pub(crate) store_at: Option<Duration>,
     /// The store refused it, and it is not on its way again.
     pub(crate) refused: bool,
-}
-
-/// A refusal of the store.
-#[derive(Debug)]
-pub(crate) struct Trouble {
-    pub(crate) since: Duration,
-    pub(crate) retry_at: Duration,
-    pub(crate) error: String,
-    /// It is on its way again.
-    pub(crate) on_its_way: bool,
 }
 
 /// Workers of one host.
@@ -272,59 +154,6 @@ pub(crate) struct Missed {
     pub(crate) count: u32,
     /// When the worker could begin the first of them; means nothing while there is none.
     pub(crate) since: Duration,
-}
-
-/// What a batch is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Assignment {
-    pub(crate) job: JobId,
-    /// Attempt at an evaluation.
-    pub(crate) attempt: u64,
-    pub(crate) indices: Indices,
-}
-
-/// Why a batch is computed. Its duplicates have the same purpose: which batch was first decides
-/// nothing, so being a duplicate is a relation between batches and no purpose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Purpose {
-    /// It fills indices of the evaluation that the search asked for.
-    Fill,
-    /// It fills an index over which workers crashed. Its worker holds nothing else meanwhile.
-    Exclusive,
-    /// It fills indices of a point that the search has not asked for.
-    Speculative,
-    /// Its answer is compared with the answer of another worker.
-    Audit {
-        /// How many workers were lost over it.
-        lost: u32,
-    },
-    /// Its answer decides between answers that differ.
-    TieBreak,
-}
-
-impl Purpose {
-    /// Whether the answer fills indices of an evaluation.
-    pub(crate) fn fills(self) -> bool {
-        matches!(self, Self::Fill | Self::Exclusive | Self::Speculative)
-    }
-}
-
-/// A batch that a worker holds.
-#[derive(Debug)]
-pub(crate) struct Batch {
-    pub(crate) assignment: Assignment,
-    pub(crate) purpose: Purpose,
-    pub(crate) worker: WorkerId,
-    pub(crate) sent: Duration,
-    /// When its worker could begin it: when it was sent, or when the worker answered what it had
-    /// been sent before.
-    pub(crate) begun: Duration,
-    /// Computing time that its client was charged for it.
-    pub(crate) charged: Duration,
-    /// The other batches with the same indices and purpose, held by other workers.
-    pub(crate) duplicates: Vec<BatchId>,
-    /// How many of them were sent before it because those before them were overdue.
-    pub(crate) retries: u32,
 }
 
 impl State {
@@ -503,115 +332,5 @@ impl State {
             }
         }
         Some(settled)
-    }
-}
-
-impl Job {
-    /// A job of which nothing is computed here yet, with so many stored evaluations.
-    pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
-        Self {
-            identity: identity(&record.specification),
-            search: Search::new(record.specification.clone()),
-            speculation: Speculation::default(),
-            record,
-            stage,
-            stored,
-            workers: BTreeSet::new(),
-            restart_pending: false,
-            recomputed: false,
-            cancelled: false,
-            rate: Rate::default(),
-            pace: Pace::default(),
-            scout: None,
-            sequence: sequence(0, now),
-            progressed: now,
-            tokens: Vec::new(),
-            trouble: None,
-        }
-    }
-
-    /// The evaluation that the search asked for, while it is under way.
-    pub(crate) fn evaluation(&self) -> Option<&Evaluation> {
-        match &self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        }
-    }
-
-    /// All evaluations under way, that which the search asked for first.
-    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
-        self.evaluation().into_iter().chain(&self.speculation.evaluations)
-    }
-
-    /// As [`Job::evaluations`].
-    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut Evaluation> {
-        let asked_for = match &mut self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        };
-        asked_for.into_iter().chain(&mut self.speculation.evaluations)
-    }
-}
-
-impl Batch {
-    /// The worker that holds it.
-    pub(crate) fn worker_in<'a>(&self, state: &'a State) -> Option<&'a Worker> {
-        state.workers.get(&self.worker)
-    }
-
-    /// Whether an idle worker may have a duplicate of it before it is overdue.
-    pub(crate) fn may_be_duplicated(&self) -> bool {
-        self.purpose == Purpose::Fill && self.duplicates.is_empty()
-    }
-}
-
-impl EndedJob {
-    /// What is kept of a job that ended, after a snapshot with number `sequence`.
-    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
-        let specification = &record.specification;
-        Self {
-            request: RequestName::of(record),
-            identity: identity(specification),
-            kind: specification.kind,
-            client: record.client.clone(),
-            name: record.name.clone(),
-            priority: record.priority,
-            max_evaluations: specification.evaluations_max(),
-            realizations: specification.monte_carlo.realizations,
-            accepted: record.accepted,
-            sequence: self::sequence(sequence, end.ended),
-            end,
-        }
-    }
-}
-
-impl RequestName {
-    /// The request `id` of `client`; `None` without an id: then it is never repeated.
-    pub(crate) fn new(client: &str, id: &str) -> Option<Self> {
-        (!id.is_empty()).then(|| Self { client: client.to_owned(), id: id.to_owned() })
-    }
-
-    /// That which submitted a job.
-    pub(crate) fn of(record: &JobRecord) -> Option<Self> {
-        Self::new(&record.client, &record.request_id)
-    }
-}
-
-/// Number of a snapshot at `now` after one with number `last`: it grows, and since it follows the
-/// clock it grows over restarts too.
-pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
-    u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
-}
-
-/// Digest of a specification: equal for equal ones only.
-pub(crate) fn identity(specification: &JobSpecification) -> Identity {
-    let encoded = specification::to_message(specification).encode_to_vec();
-    *blake3::hash(&encoded).as_bytes()
-}
-
-impl Stage {
-    /// Whether a record of the job is not durable yet.
-    pub(crate) fn is_storing(&self) -> bool {
-        matches!(self, Self::Accepting | Self::Storing { .. } | Self::Finishing(_))
     }
 }

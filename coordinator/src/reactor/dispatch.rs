@@ -15,9 +15,10 @@
 
 use std::collections::BTreeSet;
 
+use crate::batch::{Assignment, Purpose};
 use crate::ids::WorkerId;
+use crate::job::Stage;
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Purpose, Stage};
 
 mod audits;
 pub(super) mod batches;

@@ -1,11 +1,13 @@
 //! Who computes a batch a second time, and who decides between two answers that differ.
 
 use super::{batches, poison};
+use crate::batch::{Assignment, Purpose};
 use crate::dispute::Dispute;
 use crate::evaluation::Audit;
 use crate::ids::{JobId, WorkerId};
+use crate::job::Stage;
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Purpose, Stage, State, Worker};
+use crate::state::{State, Worker};
 
 /// Gives a worker something to check, if there is something that it may: disputes first.
 pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {

@@ -3,13 +3,15 @@
 use std::time::Duration;
 
 use super::departures;
+use crate::batch::{Assignment, Batch, Purpose};
 use crate::crashes::{Cause, LostWorker};
 use crate::effect::Effect;
 use crate::evaluation::Audit;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
+use crate::job::Speculation;
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Batch, Purpose, Speculation, State, Worker};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 
 /// Workers that may be lost over one audit before it is given up.
 const LOST_MAX: u32 = 3;

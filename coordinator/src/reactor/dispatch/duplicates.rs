@@ -1,9 +1,10 @@
 //! Duplicates of slow batches for workers that have nothing to do: the first answer wins.
 
 use super::{batches, eta, schedule};
+use crate::batch::Batch;
 use crate::ids::{BatchId, WorkerId};
 use crate::reactor::turn::Turn;
-use crate::state::{Batch, State, Worker};
+use crate::state::{State, Worker};
 
 /// A batch that takes so many times as long as it should is duplicated before anything is computed
 /// speculatively.

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::batch::{Batch, Purpose};
 use crate::fairness;
 use crate::ids::JobId;
-use crate::state::{Batch, Purpose, State};
+use crate::state::State;
 
 /// Returns when the last batch of what each search waits for should be answered.
 pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {

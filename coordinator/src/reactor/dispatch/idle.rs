@@ -13,12 +13,14 @@ use osteon_common::parameters::Point;
 
 use super::speculation::realizations;
 use super::{batches, eta, sizing};
+use crate::batch::{Assignment, Purpose};
 use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
+use crate::job::{Job, Stage};
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 
 /// When the last batch of what each search waits for should be answered.
 type Etas = BTreeMap<JobId, Duration>;

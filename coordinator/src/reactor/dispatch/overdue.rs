@@ -14,13 +14,14 @@ use std::time::Duration;
 
 use super::poison::{self, Reputation};
 use super::{batches, duplicates, schedule};
+use crate::batch::{Assignment, Batch, Purpose};
 use crate::crashes::Crashes;
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Batch, Purpose, State, Worker};
+use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
 
 /// No batch is overdue before. A worker, a network or a machine may falter for a second or two

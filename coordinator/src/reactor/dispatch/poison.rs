@@ -16,13 +16,15 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
 use super::{batches, schedule};
+use crate::batch::{Assignment, Purpose};
 use crate::crashes::Crashes;
 use crate::evaluation::Evaluation;
 use crate::failure::Failure;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
+use crate::job::Stage;
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Purpose, Stage, State, Worker};
+use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
 
 /// How long the crashes of a host are remembered when no more come.

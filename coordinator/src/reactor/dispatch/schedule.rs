@@ -3,8 +3,10 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
+use crate::batch::Purpose;
 use crate::ids::{JobId, WorkerId};
-use crate::state::{BATCHES_IN_FLIGHT_MAX, Job, Purpose, Stage, State, Worker};
+use crate::job::{Job, Stage};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 use crate::store::JobRecord;
 
 /// Whether anything is to be handed out besides quarantined realizations.

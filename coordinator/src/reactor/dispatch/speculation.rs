@@ -16,11 +16,13 @@ use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 
 use super::batches;
+use crate::batch::{Assignment, Purpose};
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId};
+use crate::job::{Job, Speculation, Stage};
 use crate::reactor::turn::Turn;
 use crate::search::same_point;
-use crate::state::{Assignment, Job, Purpose, Speculation, Stage, State};
+use crate::state::State;
 use crate::worker_name::WorkerName;
 
 /// The most candidates of each job.

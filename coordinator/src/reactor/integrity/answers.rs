@@ -5,13 +5,15 @@ use std::time::Duration;
 use osteon_common::outcome::Solved;
 
 use super::checks;
+use crate::batch::{Assignment, Batch, Purpose};
 use crate::close_reason::CloseReason;
 use crate::fairness;
 use crate::ids::{BatchId, WorkerId};
+use crate::job::Job;
 use crate::reactor::dispatch::{batches, departures, overdue};
 use crate::reactor::lifecycle::{jobs, workers};
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Batch, Job, Purpose, State};
+use crate::state::State;
 use crate::worker_name::WorkerName;
 
 /// Weight of the newest measurement in a worker's rate.

@@ -5,10 +5,11 @@ use crate::close_reason::CloseReason;
 use crate::effect::{Effect, Record};
 use crate::evaluation::Evaluation;
 use crate::ids::{JobId, WorkerId};
+use crate::job::Stage;
 use crate::reactor::dispatch::{batches, speculation};
 use crate::reactor::lifecycle::{jobs, records, replay, workers};
 use crate::reactor::turn::Turn;
-use crate::state::{Banned, Stage};
+use crate::state::Banned;
 use crate::store::BanRecord;
 use crate::worker_name::WorkerName;
 

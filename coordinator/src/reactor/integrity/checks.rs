@@ -6,14 +6,16 @@ use osteon_common::outcome::Solved;
 
 use super::bans;
 use crate::audit;
+use crate::batch::Assignment;
 use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
 use crate::evaluation::{Audit, Evaluation};
 use crate::failure::{Failure, shown};
 use crate::ids::{BatchId, JobId};
+use crate::job::Stage;
 use crate::reactor::dispatch::{overdue, poison};
 use crate::reactor::lifecycle::jobs;
 use crate::reactor::turn::Turn;
-use crate::state::{Assignment, Stage, State};
+use crate::state::State;
 use crate::worker_name::WorkerName;
 
 /// Has a batch that `by` has just answered computed a second time, if it is chosen and there is

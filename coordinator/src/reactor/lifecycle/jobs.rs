@@ -9,11 +9,12 @@ use osteon_common::version::Program;
 use crate::effect::{Effect, Record};
 use crate::failure::Failure;
 use crate::ids::JobId;
+use crate::job::{Job, Stage};
 use crate::notice::Notice;
 use crate::reactor::dispatch::{batches, speculation};
 use crate::reactor::turn::Turn;
 use crate::search::{Ending, Search, Step};
-use crate::state::{Job, Stage, State};
+use crate::state::State;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 
 /// Stores the evaluation of a job once it is complete and checked.

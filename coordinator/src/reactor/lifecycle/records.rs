@@ -6,10 +6,10 @@ use std::time::Duration;
 use super::jobs;
 use crate::effect::{Answer, Effect, Record, RecordKey, Refusal};
 use crate::ids::JobId;
+use crate::job::{EndedJob, Job, RequestName, Stage, Trouble};
 use crate::notice::Notice;
 use crate::reactor::turn::Turn;
 use crate::snapshot;
-use crate::state::{EndedJob, Job, RequestName, Stage, Trouble};
 use crate::store::JobRecord;
 
 /// A record is durable: the job goes on.

@@ -8,9 +8,9 @@ use crate::evaluation::{Before, Evaluation};
 use crate::event::Unread;
 use crate::failure::Failure;
 use crate::ids::JobId;
+use crate::job::{Stage, Trouble};
 use crate::reactor::turn::Turn;
 use crate::search::Step;
-use crate::state::{Stage, Trouble};
 use crate::store::EvaluationRecord;
 
 /// Lets jobs read on that waited for a ban to be durable.

@@ -12,9 +12,10 @@ use super::{jobs, prune, workers};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::Request;
 use crate::ids::{JobId, Token, WorkerId};
+use crate::job::{Job, RequestName, Stage, identity};
 use crate::reactor::turn::Turn;
 use crate::snapshot;
-use crate::state::{Job, RequestName, Stage, State, identity};
+use crate::state::State;
 use crate::store::JobRecord;
 use crate::worker_list;
 

@@ -9,8 +9,9 @@ use super::jobs;
 use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
+use crate::job::{EndedJob, Job, RequestName, Stage, sequence};
 use crate::reactor::turn::Turn;
-use crate::state::{Banned, EndedJob, Job, RequestName, Stage, State, sequence};
+use crate::state::{Banned, State};
 use crate::store::{BanRecord, JobRecord, Store, StoreError};
 
 /// What a store holds, its evaluations aside.

@@ -6,10 +6,11 @@ use super::{jobs, records, workers};
 use crate::close_reason::CloseReason;
 use crate::effect::Effect;
 use crate::ids::{JobId, WorkerId};
+use crate::job::sequence;
 use crate::reactor::dispatch::poison;
 use crate::reactor::turn::Turn;
 use crate::snapshot;
-use crate::state::{State, Worker, sequence};
+use crate::state::{State, Worker};
 
 /// Unfinished jobs are published this often even if nothing about them changed but time.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);

@@ -6,7 +6,7 @@ use osteon_common::document::Format;
 use osteon_common::realization::Ensemble;
 
 use super::*;
-use crate::state::Assignment;
+use crate::batch::Assignment;
 
 #[test]
 fn the_batches_of_a_lost_worker_are_retried_in_halves() {

@@ -2,8 +2,9 @@
 
 use super::checks::{ONE_BIT, wrong};
 use super::*;
+use crate::batch::Purpose;
 use crate::indices::Indices;
-use crate::state::{Purpose, Stage};
+use crate::job::Stage;
 use crate::worker_name::WorkerName;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -52,7 +53,7 @@ impl Rig {
         crate::snapshot::of(&self.state, JobId(1), self.now).unwrap().waiting_for
     }
 
-    fn batch(&self, batch: u64) -> &crate::state::Batch {
+    fn batch(&self, batch: u64) -> &crate::batch::Batch {
         &self.state.batches[&BatchId(batch)]
     }
 }

@@ -1,7 +1,8 @@
 //! Points that are computed before the search asks for them.
 
 use super::*;
-use crate::state::{Purpose, Stage};
+use crate::batch::Purpose;
+use crate::job::Stage;
 
 /// A search over one parameter, whose second point is known from the first on, with workers 1, 2, …
 /// of one thread, each on a host of its own.
