@@ -49,7 +49,7 @@ pub struct Evaluation {
     pub(crate) before: Before,
     /// What became of each index.
     pub(crate) results: Vec<Option<Solved>>,
-    /// How many results are filled.
+    /// How many results there are.
     pub(crate) filled: u64,
     /// Indices to hand out, from the front.
     pub(crate) queue: VecDeque<Indices>,
@@ -58,9 +58,9 @@ pub struct Evaluation {
     pub(crate) crashes: BTreeMap<u64, Crashes>,
     /// Quarantined indices that wait to be handed out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
-    /// Everybody whose answers fill results.
+    /// Every worker whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Place in `workers` of who filled each result; means nothing while the result is empty.
+    /// Place in `workers` of the worker that each result is of; means nothing while there is none.
     owners: Vec<u32>,
     /// Batches to be computed a second time.
     pub(crate) audits: VecDeque<Audit>,

@@ -168,7 +168,8 @@ pub struct Hello {
     pub version: String,
     /// Fingerprint of its numerics.
     pub fingerprint: String,
-    /// Slots it computes on.
+    /// How many realizations it computes at the same time: threads of a processor, or what another
+    /// device has. The field of the wire is called `threads`.
     pub slots: u32,
     /// Host name, for people.
     pub host: String,

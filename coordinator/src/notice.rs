@@ -20,7 +20,7 @@ pub enum Notice {
         worker: WorkerId,
         /// Who it is.
         name: WorkerName,
-        /// Slots it computes on.
+        /// How many realizations it computes at the same time.
         slots: u32,
         /// Version of its program.
         version: String,

@@ -47,7 +47,7 @@ pub enum Insane {
         places: u32,
     },
     /// The count of filled results is wrong.
-    #[error("job {0} miscounts its filled slots")]
+    #[error("job {0} miscounts its filled results")]
     Filled(JobId),
     /// A request id does not lead to the job that has it.
     #[error("the request id of job {0} leads elsewhere")]

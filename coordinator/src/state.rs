@@ -209,9 +209,8 @@ impl State {
 
     /// The work of an assignment, while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
-        let job = self.jobs.get(&assignment.job)?;
-        let evaluation = job.evaluations().find(|it| it.attempt == assignment.attempt)?;
-        let specification = &job.record.specification;
+        let evaluation = self.evaluation_of(assignment)?;
+        let specification = &self.jobs.get(&assignment.job)?.record.specification;
         Some(Work {
             setup: specification.setup,
             point: evaluation.point,
@@ -230,6 +229,12 @@ impl State {
     }
 
     /// The evaluation that a batch is about, while this attempt at it is under way.
+    pub(crate) fn evaluation_of(&self, assignment: &Assignment) -> Option<&Evaluation> {
+        let job = self.jobs.get(&assignment.job)?;
+        job.evaluations().find(|found| found.attempt == assignment.attempt)
+    }
+
+    /// As [`State::evaluation_of`].
     pub(crate) fn evaluation_of_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
         let job = self.jobs.get_mut(&assignment.job)?;
         job.evaluations_mut().find(|found| found.attempt == assignment.attempt)

@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 
 use crate::batch::{Assignment, Purpose};
 use crate::ids::WorkerId;
-use crate::job::Stage;
+use crate::job::Job;
 use crate::reactor::turn::Turn;
 
 mod audits;
@@ -64,7 +64,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(job) = schedule::next_job(turn.state) else {
         return false;
     };
-    let Some(Stage::Computing(evaluation)) = turn.state.jobs.get(&job).map(|job| &job.stage) else {
+    let Some(evaluation) = turn.state.jobs.get(&job).and_then(Job::evaluation) else {
         return false;
     };
     let Some(attached) = turn.state.workers.get(&worker) else {

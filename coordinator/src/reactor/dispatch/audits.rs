@@ -5,7 +5,6 @@ use crate::batch::{Assignment, Purpose};
 use crate::dispute::Dispute;
 use crate::evaluation::Audit;
 use crate::ids::{JobId, WorkerId};
-use crate::job::Stage;
 use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 
@@ -43,9 +42,7 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
 /// The first dispute of a job that this worker is to decide: of those that may, nobody can be
 /// expected to do better.
 fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
-    let Stage::Computing(evaluation) = &state.jobs.get(&job)?.stage else {
-        return None;
-    };
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
     let worker = state.workers.get(&worker)?;
     let is_for = |dispute: &Dispute| {
         let reputation = |worker: &Worker| poison::reputation(state, worker, &dispute.crashes);

@@ -17,7 +17,6 @@ use super::{batches, duplicates, schedule};
 use crate::batch::{Assignment, Batch, Purpose};
 use crate::crashes::Crashes;
 use crate::dispute::Dispute;
-use crate::evaluation::Evaluation;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::reactor::turn::Turn;
@@ -196,7 +195,8 @@ fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option
 /// Chooses the worker that is to have a duplicate of an exclusive batch, be it busy or not.
 fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let batch = state.batches.get(&id)?;
-    let crashes = evaluation_of(state, batch)?.crashes.get(&batch.assignment.indices.first);
+    let crashes =
+        state.evaluation_of(&batch.assignment)?.crashes.get(&batch.assignment.indices.first);
     let nobody = Crashes::default();
     let crashes = crashes.unwrap_or(&nobody);
     if poison::crash_limit_reached(state, crashes, |_| true) {
@@ -245,7 +245,7 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(batch) = state.batches.get(&id) else {
         return false;
     };
-    let Some(evaluation) = evaluation_of(state, batch) else {
+    let Some(evaluation) = state.evaluation_of(&batch.assignment) else {
         return false;
     };
     let about = |it: &&Dispute| it.tie_breakers.contains(&id);
@@ -259,12 +259,6 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
         }
     };
     !in_question && holders(state, id).all(|holder| holder != name)
-}
-
-/// The evaluation that a batch is about, while this attempt at it is under way.
-fn evaluation_of<'a>(state: &'a State, batch: &Batch) -> Option<&'a Evaluation> {
-    let job = state.jobs.get(&batch.assignment.job)?;
-    job.evaluations().find(|found| found.attempt == batch.assignment.attempt)
 }
 
 /// Sends a worker a duplicate of an overdue batch.

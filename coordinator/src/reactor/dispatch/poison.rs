@@ -18,11 +18,9 @@ use osteon_common::realization::Ensemble;
 use super::{batches, schedule};
 use crate::batch::{Assignment, Purpose};
 use crate::crashes::Crashes;
-use crate::evaluation::Evaluation;
 use crate::failure::Failure;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
-use crate::job::Stage;
 use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
@@ -56,7 +54,7 @@ pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
 
 /// Chooses the next quarantined realization of a job that may be handed out, and its worker.
 fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
-    let evaluation = computing(state, job)?;
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
     let open = |index: &&u64| {
         crashes(index).is_none_or(|crashes| !crash_limit_reached(state, crashes, |_| true))
@@ -110,7 +108,7 @@ pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
 
 /// Returns the failure of a job with a poison realization, if it has one.
 pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
-    let evaluation = computing(state, job)?;
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
     let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
     let waiting = evaluation.quarantine.iter().filter_map(over);
     let is_poison = |(_, crashes): &(u64, &Crashes)| is_poison(state, crashes, |_| true, now);
@@ -160,11 +158,4 @@ pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> R
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);
     (state.is_failing(host), silent, crashes.are_of(host), !worker.has_answered)
-}
-
-fn computing(state: &State, job: JobId) -> Option<&Evaluation> {
-    match &state.jobs.get(&job)?.stage {
-        Stage::Computing(evaluation) => Some(evaluation),
-        _ => None,
-    }
 }

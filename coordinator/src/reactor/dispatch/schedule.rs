@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use crate::batch::Purpose;
 use crate::ids::{JobId, WorkerId};
-use crate::job::{Job, Stage};
+use crate::job::Job;
 use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 use crate::store::JobRecord;
 
@@ -43,10 +43,7 @@ pub(crate) fn held(state: &State, worker: &Worker) -> usize {
 pub(crate) fn next_job(state: &State) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
         let job = state.jobs.get(id)?;
-        match &job.stage {
-            Stage::Computing(evaluation) if !evaluation.queue.is_empty() => Some((*id, job)),
-            _ => None,
-        }
+        (!job.evaluation()?.queue.is_empty()).then_some((*id, job))
     });
     let rank = |(id, job): (JobId, &Job)| {
         let JobRecord { client, priority, .. } = &job.record;
@@ -59,11 +56,9 @@ pub(crate) fn next_job(state: &State) -> Option<JobId> {
 
 /// Whether anything waits to be checked.
 pub(crate) fn checks_wait(state: &State) -> bool {
-    state.active.iter().any(|id| match state.jobs.get(id).map(|job| &job.stage) {
-        Some(Stage::Computing(evaluation)) => {
-            !evaluation.audits.is_empty()
-                || evaluation.disputes.iter().any(|dispute| dispute.tie_breakers.is_empty())
-        }
-        _ => false,
+    let mut evaluations = state.active.iter().filter_map(|id| state.jobs.get(id)?.evaluation());
+    evaluations.any(|evaluation| {
+        !evaluation.audits.is_empty()
+            || evaluation.disputes.iter().any(|dispute| dispute.tie_breakers.is_empty())
     })
 }

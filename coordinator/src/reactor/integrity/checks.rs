@@ -11,7 +11,6 @@ use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
 use crate::evaluation::{Audit, Evaluation};
 use crate::failure::{Failure, shown};
 use crate::ids::{BatchId, JobId};
-use crate::job::Stage;
 use crate::reactor::dispatch::{overdue, poison};
 use crate::reactor::lifecycle::jobs;
 use crate::reactor::turn::Turn;
@@ -134,9 +133,7 @@ fn give_up_audits(state: &mut State, job: JobId) {
 
 /// Why a job fails over its disputes, if it does.
 fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
-    let Stage::Computing(evaluation) = &state.jobs.get(&job)?.stage else {
-        return None;
-    };
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
         let nobody = !state.answers_batches(|name| !dispute.involves(name));
