@@ -179,11 +179,7 @@ impl Worker {
             }
             Err(NotOpened::Unreachable(reason)) => return Ok(End::Lost(reason)),
             Err(NotOpened::Distrust(failure)) => return self.distrusted(failure),
-            Err(NotOpened::Status(status)) => {
-                // Only an error of the transport has a source.
-                self.ever_answered |= std::error::Error::source(&status).is_none();
-                return self.ended_with(&status);
-            }
+            Err(NotOpened::Status(status)) => return self.ended_with(&status),
         };
         let mut ticks = interval(Duration::from_millis(TICK_MS));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -270,7 +266,9 @@ impl Worker {
     }
 
     /// What a status means: a refusal is final, everything else is a loss.
-    fn ended_with(&self, status: &Status) -> Result<End, WorkerError> {
+    fn ended_with(&mut self, status: &Status) -> Result<End, WorkerError> {
+        // Only an error of the transport has a source.
+        self.ever_answered |= std::error::Error::source(status).is_none();
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
         }
