@@ -31,8 +31,8 @@ pub(crate) struct Outbound {
 }
 
 impl Outbound {
-    /// The way to a worker whose stream takes `messages`; what is received on the other end of it
-    /// is the end of the way.
+    /// Makes the queue to a worker whose stream takes `messages`, and a receiver that ends when the
+    /// queue is dropped.
     pub(crate) fn new(messages: mpsc::Sender<Outgoing>) -> (Self, oneshot::Receiver<()>) {
         let (open, closed) = oneshot::channel();
         (Self { messages, _open: open }, closed)
