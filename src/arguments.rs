@@ -168,6 +168,10 @@ pub(crate) struct CoordinatorArguments {
     #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
           value_parser = fraction)]
     pub(crate) audit_fraction: f64,
+    /// Leave idle the threads that no job needs now, instead of computing points that a search may
+    /// ask for next; changes no bit of a result
+    #[arg(long)]
+    pub(crate) no_speculation: bool,
     /// Delete finished jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,

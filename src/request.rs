@@ -1,6 +1,7 @@
 //! The request that stands for a job: whoever submits it again gets the same job.
 
 use osteon_common::limits::NAME_BYTES_MAX;
+use osteon_proto::identity::{self, NoRandomness};
 
 /// Names a submission. A coordinator keeps the ids of different clients apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,8 +14,11 @@ pub(crate) struct Request {
 
 impl Request {
     /// One that there was never before.
-    pub(crate) fn new() -> Self {
-        Self::with_id(random_id())
+    ///
+    /// # Errors
+    /// When the operating system gives no random numbers.
+    pub(crate) fn new() -> Result<Self, NoRandomness> {
+        identity::random_digits::<16>().map(Self::with_id)
     }
 
     /// One that this user has chosen.
@@ -26,18 +30,10 @@ impl Request {
 /// Who this is for the sharing of workers between users: user and host.
 fn user() -> String {
     let user = ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let mut name = format!("{}@{}", user.unwrap_or_default(), host.trim());
+    let host = identity::host_name().unwrap_or_default();
+    let mut name = format!("{}@{host}", user.unwrap_or_default());
     while name.len() > NAME_BYTES_MAX {
         name.pop();
     }
     name
-}
-
-/// 128 random bits.
-fn random_id() -> String {
-    use std::hash::{BuildHasher as _, RandomState};
-    let process = std::process::id();
-    let half = |salt: u8| RandomState::new().hash_one((process, salt));
-    format!("{:016x}{:016x}", half(0), half(1))
 }

@@ -234,7 +234,7 @@ impl Resolved {
             Command::Token(arguments) => Self::Token(arguments),
             Command::Submit(arguments) => {
                 let coordinator = remote(arguments.client.clone())?;
-                resolve_submit(arguments, coordinator)
+                resolve_submit(arguments, coordinator)?
             }
             Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
             Command::Workers(arguments) => resolve_workers(arguments, remote)?,
@@ -365,16 +365,18 @@ impl From<CredentialArguments> for CredentialFiles {
     }
 }
 
-fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Resolved {
+fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Result<Resolved, Failure> {
     let SubmitArguments { job, client: _, propagate, request_id, name, priority, json } = arguments;
-    Resolved::Submit {
+    Ok(Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
-        request: request_id.map_or_else(Request::new, Request::with_id),
+        request: request_id
+            .map_or_else(Request::new, |id| Ok(Request::with_id(id)))
+            .map_err(Failure::failed)?,
         options: SubmitOptions { priority, name: name.unwrap_or_default() },
         coordinator,
         format: format(json),
-    }
+    })
 }
 
 #[cfg(test)]

@@ -146,7 +146,7 @@ impl ResultsDirectory {
             let client = lines.next().map_or(request.client, str::to_owned);
             return Ok(Request { client, ..request });
         }
-        let request = Request::new();
+        let request = Request::new().map_err(Failure::failed)?;
         let text = format!("{}\n{}\n", request.id, request.client);
         result_files::write(&path, &text).map_err(Failure::Failed)?;
         Ok(request)

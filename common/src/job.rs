@@ -320,9 +320,6 @@ pub struct Search {
     /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
     /// free parameter.
     pub sensitivities: bool,
-    /// Whether workers that nobody else has work for compute points that may be asked for next. It
-    /// changes when a result is there, and no bit of it.
-    pub speculation: bool,
     /// Values that [`Parameter::ALL`] are drawn to, in that order, where they are free.
     pub priors: [Option<Prior>; 7],
 }
@@ -341,7 +338,6 @@ impl Search {
             initial_step: 0.15,
             starts: 1,
             sensitivities: true,
-            speculation: true,
             priors: [None; 7],
         }
     }

@@ -165,7 +165,6 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
     writeln!(out, "initial_step = {:?}", search.initial_step)?;
     writeln!(out, "starts = {}", search.starts)?;
     writeln!(out, "sensitivities = {}", search.sensitivities)?;
-    writeln!(out, "speculation = {}", search.speculation)?;
     priors(out, search)
 }
 

@@ -98,7 +98,6 @@ fn a_minimal_job_has_the_documented_defaults() {
             initial_step: 0.15,
             starts: 1,
             sensitivities: true,
-            speculation: true,
             priors: [None; 7],
         },
     };
@@ -162,7 +161,7 @@ fn a_complete_job_means_what_it_says() {
     assert_eq!(given.search.cost_tolerance, 1e-9);
     assert_eq!(given.search.size_tolerance, 1e-4);
     assert_eq!(given.search.initial_step, 0.1);
-    assert!(!given.search.speculation);
+    assert!(!given.search.sensitivities);
 }
 
 #[test]

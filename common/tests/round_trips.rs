@@ -148,17 +148,15 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
     let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
-    let truths = (any::<bool>(), any::<bool>());
-    (method, 1_u64..=1000, numbers, 1_u64..=100, truths).prop_map(
-        |(method, max_evaluations, numbers, starts, truths)| Search {
+    (method, 1_u64..=1000, numbers, 1_u64..=100, any::<bool>()).prop_map(
+        |(method, max_evaluations, numbers, starts, sensitivities)| Search {
             method,
             max_evaluations,
             cost_tolerance: numbers.0,
             size_tolerance: numbers.1,
             initial_step: numbers.2,
             starts,
-            sensitivities: truths.0,
-            speculation: truths.1,
+            sensitivities,
             priors: [None; 7],
         },
     )

@@ -15,6 +15,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::JoinSet;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 use tokio_rustls::server::TlsStream;
+use tokio_util::either::Either;
 use tonic::transport::server::Connected;
 
 use crate::access::Certificate;
@@ -56,12 +57,9 @@ pub(crate) struct Peer {
     pub(crate) certificate: Certificate,
 }
 
-#[derive(Debug)]
-enum Io {
-    Tcp(TcpStream),
-    Unix(UnixStream),
-    Tls(Box<TlsStream<TcpStream>>),
-}
+/// Bytes to and from a peer.
+type Io = Either<Box<TlsStream<TcpStream>>, Plain>;
+type Plain = Either<TcpStream, UnixStream>;
 
 /// Connections as they come, with TLS if there is any. A peer that does not complete its handshake
 /// is dropped without a word.
@@ -113,11 +111,14 @@ impl Acceptor {
                         }
                     };
                     match (&self.tls, io) {
-                        (Some(tls), Io::Tcp(stream)) => {
+                        (Some(tls), Either::Left(stream)) => {
                             let tls = tls.borrow().clone();
                             self.handshakes.spawn(handshake(tls, stream, place));
                         }
-                        (_, io) => return Connection::new(io, Certificate::Absent, place),
+                        (_, plain) => {
+                            let io = Either::Right(plain);
+                            return Connection::new(io, Certificate::Absent, place);
+                        }
                     }
                 }
             }
@@ -135,16 +136,19 @@ impl Acceptor {
     }
 }
 
-async fn accept(bound: &Bound, places: &Arc<Semaphore>) -> io::Result<(Io, OwnedSemaphorePermit)> {
+async fn accept(
+    bound: &Bound,
+    places: &Arc<Semaphore>,
+) -> io::Result<(Plain, OwnedSemaphorePermit)> {
     let place = Arc::clone(places).acquire_owned().await.map_err(io::Error::other)?;
     let io = match bound {
         Bound::Tcp(listener) => {
             let (stream, _) = listener.accept().await?;
             // Small messages shall not wait for more; without it they are only slower.
             drop(stream.set_nodelay(true));
-            Io::Tcp(stream)
+            Either::Left(stream)
         }
-        Bound::Unix(listener) => Io::Unix(listener.accept().await?.0),
+        Bound::Unix(listener) => Either::Right(listener.accept().await?.0),
     };
     Ok((io, place))
 }
@@ -154,7 +158,7 @@ async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> 
     match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
         Ok(Ok(stream)) => {
             let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
-            Some(Connection::new(Io::Tls(Box::new(stream)), certificate, place))
+            Some(Connection::new(Either::Left(Box::new(stream)), certificate, place))
         }
         Ok(Err(error)) => {
             tracing::debug!(?peer, %error, "a TLS handshake failed");
@@ -191,7 +195,7 @@ impl AsyncRead for Connection {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
-        match self.io.poll_read(cx, buffer) {
+        match Pin::new(&mut self.io).poll_read(cx, buffer) {
             Poll::Ready(read) => {
                 if buffer.filled().len() > before {
                     self.patience = None;
@@ -215,11 +219,7 @@ impl AsyncWrite for Connection {
         cx: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        match &mut self.io {
-            Io::Tcp(io) => Pin::new(io).poll_write(cx, bytes),
-            Io::Unix(io) => Pin::new(io).poll_write(cx, bytes),
-            Io::Tls(io) => Pin::new(io).poll_write(cx, bytes),
-        }
+        Pin::new(&mut self.io).poll_write(cx, bytes)
     }
 
     fn poll_write_vectored(
@@ -227,49 +227,19 @@ impl AsyncWrite for Connection {
         cx: &mut Context<'_>,
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        match &mut self.io {
-            Io::Tcp(io) => Pin::new(io).poll_write_vectored(cx, slices),
-            Io::Unix(io) => Pin::new(io).poll_write_vectored(cx, slices),
-            Io::Tls(io) => Pin::new(io).poll_write_vectored(cx, slices),
-        }
+        Pin::new(&mut self.io).poll_write_vectored(cx, slices)
     }
 
     fn is_write_vectored(&self) -> bool {
-        match &self.io {
-            Io::Tcp(io) => io.is_write_vectored(),
-            Io::Unix(io) => io.is_write_vectored(),
-            Io::Tls(io) => io.is_write_vectored(),
-        }
+        self.io.is_write_vectored()
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        match &mut self.io {
-            Io::Tcp(io) => Pin::new(io).poll_flush(cx),
-            Io::Unix(io) => Pin::new(io).poll_flush(cx),
-            Io::Tls(io) => Pin::new(io).poll_flush(cx),
-        }
+        Pin::new(&mut self.io).poll_flush(cx)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        match &mut self.io {
-            Io::Tcp(io) => Pin::new(io).poll_shutdown(cx),
-            Io::Unix(io) => Pin::new(io).poll_shutdown(cx),
-            Io::Tls(io) => Pin::new(io).poll_shutdown(cx),
-        }
-    }
-}
-
-impl Io {
-    fn poll_read(
-        &mut self,
-        cx: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        match self {
-            Self::Tcp(io) => Pin::new(io).poll_read(cx, buffer),
-            Self::Unix(io) => Pin::new(io).poll_read(cx, buffer),
-            Self::Tls(io) => Pin::new(io).poll_read(cx, buffer),
-        }
+        Pin::new(&mut self.io).poll_shutdown(cx)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tokio_rustls::rustls::crypto::ring;
+use osteon_proto::identity::{self, NoRandomness};
 
 use crate::ids::JobId;
 
@@ -12,11 +12,12 @@ use crate::ids::JobId;
 pub struct AuditKey([u8; 32]);
 
 impl AuditKey {
-    /// A key that nobody knows; `None` if the operating system gives no random numbers.
-    pub(crate) fn random() -> Option<Self> {
-        let mut key = [0; 32];
-        ring::default_provider().secure_random.fill(&mut key).ok()?;
-        Some(Self(key))
+    /// A key that nobody knows.
+    ///
+    /// # Errors
+    /// When the operating system gives no random numbers.
+    pub(crate) fn random() -> Result<Self, NoRandomness> {
+        identity::random_bytes().map(Self)
     }
 }
 

@@ -27,6 +27,8 @@ pub struct Config {
     pub audit_fraction: f64,
     /// Decides which; a running coordinator draws its own.
     pub audit_key: AuditKey,
+    /// Whether slots that nobody has work for compute points that a search may ask for next.
+    pub speculation: bool,
     /// Ended jobs are forgotten after this long; `None`: when a client wants it.
     pub keep_ended: Option<Duration>,
     /// How often time is looked at; also the shortest interval between two snapshots.
@@ -60,6 +62,7 @@ impl Default for Config {
             batch_target: Duration::from_millis(200),
             audit_fraction: AUDIT_FRACTION,
             audit_key: AuditKey::default(),
+            speculation: true,
             keep_ended: None,
             tick: Duration::from_millis(100),
             active_jobs_max: ACTIVE_JOBS_MAX,

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::SystemTime;
 
+use osteon_proto::identity::host_name;
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
 
@@ -215,9 +216,10 @@ impl FromStr for ListenAddress {
 /// name, if it is a name that is known.
 async fn url(local: SocketAddr) -> String {
     if local.ip().is_unspecified() {
-        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-        let host = format!("{}:{}", name.trim(), local.port());
-        if !name.trim().is_empty() && tokio::net::lookup_host(&host).await.is_ok() {
+        let host = host_name().map(|name| format!("{name}:{}", local.port()));
+        if let Some(host) = host
+            && tokio::net::lookup_host(&host).await.is_ok()
+        {
             return format!("http://{host}");
         }
     }
@@ -294,12 +296,12 @@ mod tests {
     #[tokio::test]
     async fn the_url_of_every_address_is_one_that_can_be_dialled() {
         let listener = Listener::bind(&"0.0.0.0:0".parse().unwrap(), true).await.unwrap();
-        let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+        let name = host_name().unwrap();
         let address = listener.url().strip_prefix("http://").unwrap().to_owned();
         // A machine whose own name is not known keeps the address.
         let host = address.rsplit_once(':').unwrap().0;
-        let known = tokio::net::lookup_host((name.trim(), 1)).await.is_ok();
-        assert_eq!(host, if known { name.trim() } else { "0.0.0.0" });
+        let known = tokio::net::lookup_host((name.as_str(), 1)).await.is_ok();
+        assert_eq!(host, if known { &name } else { "0.0.0.0" });
         tokio::net::TcpStream::connect(&address).await.unwrap();
     }
 

@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use osteon_common::limits::{HEADER_BYTES_MAX, MESSAGE_BYTES_MAX, WORKER_MESSAGE_BYTES_MAX};
+use osteon_proto::identity::NoRandomness;
 use osteon_proto::v1;
 use osteon_proto::v1::jobs_server::JobsServer;
 use osteon_proto::v1::workers_server::WorkersServer;
@@ -62,8 +63,8 @@ pub enum StartError {
         source: tokio::task::JoinError,
     },
     /// No secret can be drawn.
-    #[error("the operating system gives no random numbers")]
-    NoRandomness,
+    #[error(transparent)]
+    NoRandomness(#[from] NoRandomness),
     /// The description of the services cannot be read.
     #[error("the services' description for gRPC reflection cannot be read")]
     Reflection {
@@ -99,7 +100,7 @@ pub async fn start(
     let load = move || Restored::load(store.as_mut()).map(|restored| (store, restored));
     let loaded = tokio::task::spawn_blocking(load).await;
     let (store, restored) = loaded.map_err(|source| StartError::Interrupted { source })??;
-    let audit_key = AuditKey::random().ok_or(StartError::NoRandomness)?;
+    let audit_key = AuditKey::random()?;
     let config = Config { audit_key, ..config };
     let clock = Clock::new();
     tracing::info!(

@@ -13,19 +13,23 @@ mod clockwork;
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod fake;
 
+use std::slice;
 use std::time::Duration;
 
 use clockwork::{Clockwork, Times};
-use osteon_common::job::{JobSpecification, Search};
+use osteon_common::job::JobSpecification;
+use osteon_coordinator::config::Config;
 
-/// A job with or without speculation.
-fn by(speculation: bool, job: JobSpecification) -> JobSpecification {
-    JobSpecification { search: Search { speculation, ..job.search }, ..job }
-}
-
-/// When each of some jobs ended; every result is that of a plain loop, to the bit.
-fn run(threads: &[u32], times: Times, jobs: &[JobSpecification]) -> Vec<Duration> {
-    let ended = Clockwork::new(threads, times).run(jobs);
+/// When each of some jobs ended, on a coordinator with or without speculation; every result is that of
+/// a plain loop, to the bit.
+fn run(
+    speculation: bool,
+    threads: &[u32],
+    times: Times,
+    jobs: &[JobSpecification],
+) -> Vec<Duration> {
+    let config = Config { speculation, ..Config::default() };
+    let ended = Clockwork::with_config(threads, times, config).run(jobs);
     for (job, ended) in jobs.iter().zip(&ended) {
         // As text: an unknown standard error is NaN, which equals nothing.
         assert_eq!(format!("{:?}", ended.result), format!("{:?}", fake::plain_run(job)));
@@ -36,8 +40,9 @@ fn run(threads: &[u32], times: Times, jobs: &[JobSpecification]) -> Vec<Duration
 /// How many times as long a search takes without speculation, over workers of so many threads.
 fn gain(threads: &[u32], times: Times, realizations: u64, evaluations: u64) -> f64 {
     let job = fake::identification(realizations, evaluations, 3);
-    let [without, with] = [false, true]
-        .map(|speculation| run(threads, times, &[by(speculation, job.clone())])[0].as_secs_f64());
+    let [without, with] = [false, true].map(|speculation| {
+        run(speculation, threads, times, slice::from_ref(&job))[0].as_secs_f64()
+    });
     println!("{threads:?}, {times:?}, {realizations} realizations: {without:.3} s, {with:.3} s");
     without / with
 }
@@ -79,7 +84,7 @@ fn jobs_of_others_take_no_more_time() {
     for times in [Times::Equal, Times::Spread] {
         for (threads, others) in [(&[1; 4][..], &large), (&[4; 2], &large), (&[1; 4], &another)] {
             let [without, with] = [false, true].map(|speculation| {
-                run(threads, times, &[by(speculation, small.clone()), by(false, others.clone())])
+                run(speculation, threads, times, &[small.clone(), others.clone()])
             });
             println!("{threads:?}, {times:?}: {without:?}, {with:?}");
             for (without, with) in without.iter().zip(with) {

@@ -16,6 +16,7 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
 use tokio_rustls::rustls::sign::CertifiedKey;
 use webpki::{EndEntityCert, KeyUsage};
 
+use crate::pipe;
 use crate::token::{NoToken, Token};
 
 /// What others may do with a file.
@@ -310,7 +311,7 @@ fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
     let max = CREDENTIAL_FILE_BYTES_MAX;
     let piped = metadata.file_type().is_fifo();
     let bytes = match piped {
-        true => user_file::read_pipe(&file, max, Duration::from_secs(CREDENTIAL_PIPE_S_MAX)),
+        true => pipe::read(&file, max, Duration::from_secs(CREDENTIAL_PIPE_S_MAX)),
         false => user_file::read_opened(&file, max),
     };
     match bytes.map_err(unreadable)? {

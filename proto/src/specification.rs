@@ -233,7 +233,6 @@ pub(crate) fn search_to_message(search: &Search) -> v1::Search {
         initial_step: Some(search.initial_step),
         starts: Some(search.starts),
         sensitivities: Some(search.sensitivities),
-        speculation: Some(search.speculation),
         priors: priors_to_message(&search.priors),
     }
 }
@@ -260,7 +259,6 @@ pub(crate) fn search_from_message(
         initial_step: message.initial_step.unwrap_or(default.initial_step),
         starts: message.starts.unwrap_or(default.starts),
         sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
-        speculation: message.speculation.unwrap_or(default.speculation),
         priors: priors_from_message(&message.priors, violations),
     }
 }

@@ -4,7 +4,8 @@
 use std::fmt;
 
 use thiserror::Error;
-use tokio_rustls::rustls::crypto::ring;
+
+use crate::identity::{self, NoRandomness};
 
 /// Every token begins so; scanners for leaked secrets can look for it.
 pub const PREFIX: &str = "osteon_";
@@ -28,11 +29,6 @@ pub struct Token(String);
 )]
 pub struct NoToken;
 
-/// The operating system gives no random numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("the operating system gives no random numbers")]
-pub struct NoRandomness;
-
 /// The BLAKE3 hash of a token. Comparing two takes the same time wherever they differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TokenHash(blake3::Hash);
@@ -43,9 +39,7 @@ impl Token {
     /// # Errors
     /// When the operating system gives no random numbers.
     pub fn generate() -> Result<Self, NoRandomness> {
-        let mut random = [0; RANDOM_BYTES];
-        ring::default_provider().secure_random.fill(&mut random).map_err(|_| NoRandomness)?;
-        let digits: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        let digits = identity::random_digits::<RANDOM_BYTES>()?;
         Ok(Self(format!("{PREFIX}{digits}")))
     }
 

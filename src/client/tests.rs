@@ -97,7 +97,7 @@ async fn a_submission_whose_answer_is_lost_makes_one_job() {
     let proxy = tokio::spawn(loses_the_first_answer(listener, there.clone(), Arc::clone(&cut)));
     let mut client = Client::connect(&remote(&between)).await.unwrap();
     let mut witness = Client::connect(&remote(&there)).await.unwrap();
-    let (specification, request) = (example(), Request::new());
+    let (specification, request) = (example(), Request::new().unwrap());
     let accepted = async {
         while witness.list().await.unwrap().is_empty() {
             sleep(Duration::from_millis(5)).await;
@@ -124,7 +124,7 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
         }
     });
     let mut client = Client::connect(&remote(&socket)).await.unwrap();
-    let (begun, request) = (Instant::now(), Request::new());
+    let (begun, request) = (Instant::now(), Request::new().unwrap());
     let error = client.submit(&example(), &request, SubmitOptions::default()).await.unwrap_err();
     assert!(matches!(error, ClientError::Uncertain { .. }), "{error:?}");
     let told = format!("--request-id {} ", request.id);

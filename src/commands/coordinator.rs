@@ -45,6 +45,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     let store = SqliteStore::open_with(&directory, lost).map_err(Failure::failed)?;
     let config = Config {
         audit_fraction: arguments.audit_fraction,
+        speculation: !arguments.no_speculation,
         keep_ended: arguments.keep_ended,
         heartbeat: arguments.lease / HEARTBEATS_PER_LEASE,
         expiry: arguments.lease,

@@ -195,7 +195,7 @@ async fn drive(
 ) -> Result<Fetched, Failure> {
     let request = match directory {
         Some(directory) => directory.request()?,
-        None => Request::new(),
+        None => Request::new().map_err(Failure::failed)?,
     };
     let options = SubmitOptions { name: name.to_owned(), ..SubmitOptions::default() };
     let job = client.submit(specification, &request, options).await?;

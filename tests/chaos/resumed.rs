@@ -42,11 +42,10 @@ async fn work(url: String, life: Arc<AtomicUsize>, computed: Computed, told: mps
 #[test]
 fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     let scratch = Scratch::new();
-    // What is computed ahead of the search is not on its path.
-    let text = format!("{}speculation = false\n", job(REALIZATIONS, EVALUATIONS));
-    let file = scratch.write("job.toml", &text);
+    let file = scratch.write("job.toml", &job(REALIZATIONS, EVALUATIONS));
     let digest = undisturbed("identify", &file);
-    let mut service = Service::start(&scratch, &["--audit-fraction", "0"]);
+    // What is computed ahead of the search is not on its path.
+    let mut service = Service::start(&scratch, &["--audit-fraction", "0", "--no-speculation"]);
     let mut api = Api::new(service.url());
     let id = api.submit(&specification(&file, JobKind::Identification), "").unwrap();
 

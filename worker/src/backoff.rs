@@ -1,7 +1,8 @@
 //! How long to wait before the next attempt to reach the coordinator.
 
-use std::hash::{BuildHasher as _, RandomState};
 use std::time::Duration;
+
+use osteon_proto::identity::random_number;
 
 /// Wait after the first failure, ms, before jitter.
 const FIRST_MS: u64 = 100;
@@ -18,7 +19,8 @@ pub(crate) struct Backoff {
 impl Backoff {
     /// The next wait.
     pub(crate) fn next(&mut self) -> Duration {
-        self.next_with(RandomState::new().hash_one(self.failures))
+        // Without random numbers the wait is only shorter.
+        self.next_with(random_number().unwrap_or_default())
     }
 
     /// Begins again with the shortest wait.

@@ -5,6 +5,7 @@ use std::fmt;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_proto::endpoint::Endpoint;
+use osteon_proto::identity::NoRandomness;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::tls_failure::TlsFailure;
 use thiserror::Error;
@@ -29,6 +30,9 @@ pub enum WorkerError {
         /// The thread pool's error.
         source: rayon::ThreadPoolBuildError,
     },
+    /// Nothing would tell it from other workers.
+    #[error(transparent)]
+    NoRandomness(#[from] NoRandomness),
     /// The coordinator does not take this worker; trying again would change nothing.
     #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
     Refused {

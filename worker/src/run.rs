@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::identity;
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
@@ -82,7 +83,7 @@ async fn run_on(
             slots: backend.slots(),
             host: host_name(),
             process: std::process::id(),
-            instance: random(),
+            instance: identity::random_number()?,
         }),
         backend,
         finished_sender,
@@ -353,17 +354,10 @@ fn detached(why: Detached) -> &'static str {
     }
 }
 
-/// A random number, not 0.
-fn random() -> u64 {
-    use std::hash::{BuildHasher as _, RandomState};
-    RandomState::new().hash_one(std::process::id()).max(1)
-}
-
 /// Name of this host, for people.
 fn host_name() -> String {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let name: String = name.trim().chars().take(NAME_BYTES_MAX / 4).collect();
-    if name.is_empty() { "unknown".to_owned() } else { name }
+    let name = identity::host_name().unwrap_or_else(|| "unknown".to_owned());
+    name.chars().take(NAME_BYTES_MAX / 4).collect()
 }
 
 #[cfg(test)]

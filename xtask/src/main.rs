@@ -1,6 +1,7 @@
 //! Every developer command in one place: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
 mod chaos;
+mod deny;
 mod digests;
 mod python;
 mod random;
@@ -8,7 +9,7 @@ mod tables;
 
 use std::env;
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context as _, Result, bail};
@@ -57,9 +58,14 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(python::test),
     ),
     (
+        "deny",
+        "licences, versions, sources and advisories of the crates that osteon is built from",
+        Action::Function(deny::check),
+    ),
+    (
         "ci",
-        "what CI runs: lint, every test, the client in Python",
-        Action::Commands(&["lint", "test", "python"]),
+        "what CI runs: lint, deny, every test, the client in Python",
+        Action::Commands(&["lint", "deny", "test", "python"]),
     ),
     (
         "tables",
@@ -162,6 +168,12 @@ fn announce(command: &Command) {
 /// A line on stdout.
 fn say(text: &str) -> Result<()> {
     writeln!(io::stdout(), "{text}").context("cannot write to stdout")
+}
+
+/// The directory where cargo puts programs, this one among them; the target directory is above.
+fn programs() -> Result<PathBuf> {
+    let here = env::current_exe().context("cannot tell where xtask is")?;
+    Ok(here.parent().context("xtask has no directory")?.to_owned())
 }
 
 /// The root of the workspace.

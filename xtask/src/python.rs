@@ -6,21 +6,21 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-use crate::{cargo, cargo_command, root};
+use crate::{cargo, cargo_command, programs, root};
 
 /// Builds the program and runs the tests of `tests/python`, or those in `words`. The Python is
 /// `python3`, or what the variable `PYTHON` names; without one this fails.
 pub(crate) fn test(words: &[String]) -> Result<()> {
     cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
-    // This program lies where cargo puts programs: the other one beside it, the target directory
-    // above.
-    let here = env::current_exe().context("cannot tell where xtask is")?;
-    let programs = here.parent().context("xtask lies nowhere")?;
-    let target = programs.parent().unwrap_or(programs);
+    let programs = programs()?;
     let python = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(python);
     command.current_dir(root()).arg("tests/python/run.py");
-    command.arg("--osteon").arg(programs.join("osteon")).arg("--work").arg(target.join("python"));
+    command
+        .arg("--osteon")
+        .arg(programs.join("osteon"))
+        .arg("--work")
+        .arg(programs.with_file_name("python"));
     cargo(command.args(words)).context(
         "the client in Python needs Python 3.10 or later with its module venv (on Debian the \
          packages python3 and python3-venv), and the packages of tests/python/requirements.txt",

@@ -46,7 +46,6 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         "initial_step",
         "starts",
         "sensitivities",
-        "speculation",
         "priors",
     ];
     let table = reader.table(root, "search", &keys);
@@ -63,7 +62,6 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
         initial_step: reader.number(&table, "initial_step").unwrap_or(default.initial_step),
         starts: reader.whole(&table, "starts", STARTS).unwrap_or(default.starts),
         sensitivities: reader.truth(&table, "sensitivities").unwrap_or(default.sensitivities),
-        speculation: reader.truth(&table, "speculation").unwrap_or(default.speculation),
         priors: priors(reader, &table),
     }
 }

@@ -40,8 +40,16 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let config = Config { active_jobs_max: 2, ..Config::default() };
+        // Speculative batches would be in the way of most stories.
+        let config = Config { active_jobs_max: 2, speculation: false, ..Config::default() };
         Self { state: State::new(config, Duration::ZERO), now: Duration::ZERO }
+    }
+
+    /// The same where idle workers compute points ahead of a search.
+    fn speculating() -> Self {
+        let mut rig = Self::new();
+        rig.state.config.speculation = true;
+        rig
     }
 
     /// A rig with a propagation of so many realizations, job 1, and workers 1, 2, … of so many
@@ -118,8 +126,7 @@ fn propagation(realizations: u64) -> JobSpecification {
         parameters: [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
         monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
         objective: Objective::default(),
-        // What is done ahead would be in the way of what is looked at.
-        search: Search { speculation: false, ..Search::default() },
+        search: Search::default(),
     }
 }
 

@@ -96,7 +96,12 @@ pub(crate) struct Clockwork {
 impl Clockwork {
     /// Workers of so many threads.
     pub(crate) fn new(threads: &[u32], times: Times) -> Self {
-        Self::with(threads, times, REALIZATION, Config::default())
+        Self::with_config(threads, times, Config::default())
+    }
+
+    /// The same at a coordinator with other settings.
+    pub(crate) fn with_config(threads: &[u32], times: Times, config: Config) -> Self {
+        Self::with(threads, times, REALIZATION, config)
     }
 
     /// Workers of so many threads, whose realizations take so long on average.

@@ -91,14 +91,13 @@ impl World {
         let on_path =
             history.iter().filter_map(|row| Some((row, sent.remove(&point_key(&row.point))?)));
         let ahead = on_path.filter(|(row, durable)| *durable < row.number).count() as u64;
-        let search = &specification.search;
         // On the path that comes of a lie a point may be asked for sooner.
         assert!(
-            ahead == 0 || search.speculation || lied,
+            ahead == 0 || self.config.speculation || lied,
             "nobody wanted points to be computed ahead"
         );
         self.counts.ahead += ahead;
-        self.counts.dropped += u64::from(search.speculation) * sent.len() as u64;
+        self.counts.dropped += u64::from(self.config.speculation) * sent.len() as u64;
     }
 
     fn stored(&self, job: JobId) -> Option<StoredJob> {

@@ -50,8 +50,6 @@ pub(super) fn some(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> 
                 0 => fake::propagation(1 + draw(60), 4 * seed + number),
                 _ => searched(draw(3), 1 + draw(40), 2 + draw(12), 4 * seed + number),
             };
-            let search = Search { speculation: draw(3) > 0, ..specification.search };
-            let specification = JobSpecification { search, ..specification };
             let request_id = format!("request {number}");
             let cancels = draw(6) == 0;
             Client {

@@ -86,7 +86,6 @@ prop_compose! {
         initial_step in 0.01..0.5,
         starts in 1_u64..100,
         sensitivities: bool,
-        speculation: bool,
         weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
         solver in solver(),
     ) -> JobSpecification {
@@ -114,7 +113,6 @@ prop_compose! {
                 initial_step,
                 starts,
                 sensitivities,
-                speculation,
                 priors,
                 ..Search::by(method)
             },

@@ -17,6 +17,7 @@ use osteon_common::parameters::Point;
 
 use super::batches;
 use crate::batch::{Assignment, Purpose};
+use crate::config::Config;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId};
 use crate::job::{Job, Speculation, Stage};
@@ -52,7 +53,8 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
             Evaluation::new(number, attempt, point, realizations)
         }
     };
-    let candidates = if speculates(job) { job.search.likely(CANDIDATES_MAX) } else { Vec::new() };
+    let speculates = speculates(&turn.state.config, job);
+    let candidates = if speculates { job.search.likely(CANDIDATES_MAX) } else { Vec::new() };
     let attempt = evaluation.attempt;
     job.stage = Stage::Computing(evaluation);
     adopt_batches(turn.state, id, attempt);
@@ -62,7 +64,8 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
 /// The outcomes of a job's evaluation are there, and on their way to the store: where its search
 /// will go is known, though it is not told yet.
 pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Arc<[Outcome]>) {
-    if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(job)) {
+    let config = &turn.state.config;
+    if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(config, job)) {
         let candidates = job.search.likely_after(outcomes, CANDIDATES_MAX);
         keep(turn, id, candidates);
     }
@@ -98,10 +101,10 @@ pub(crate) fn keep_bound(turn: &mut Turn) {
 }
 
 /// Whether points of a job are computed speculatively.
-fn speculates(job: &Job) -> bool {
+fn speculates(config: &Config, job: &Job) -> bool {
     let specification = &job.record.specification;
-    specification.kind == JobKind::Identification
-        && specification.search.speculation
+    config.speculation
+        && specification.kind == JobKind::Identification
         && specification.monte_carlo.realizations <= REALIZATIONS_MAX
         && !job.cancelled
 }

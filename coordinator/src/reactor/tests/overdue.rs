@@ -210,8 +210,8 @@ fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
 fn what_was_computed_ahead_and_not_answered_is_overdue_when_it_is_asked_for() {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
-    let job = identification(1);
-    rig.accept(JobSpecification { search: Search { speculation: true, ..job.search }, ..job });
+    rig.state.config.speculation = true;
+    rig.accept(identification(1));
     for worker in 1..=2 {
         rig.event(on_its_own(worker));
     }

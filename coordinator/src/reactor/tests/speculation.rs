@@ -7,19 +7,13 @@ use crate::job::Stage;
 /// A search over one parameter, whose second point is known from the first on, with workers 1, 2, …
 /// of one thread, each on a host of its own.
 fn rig(workers: u32) -> Rig {
-    let mut rig = Rig::new();
+    let mut rig = Rig::speculating();
     rig.state.config.audit_fraction = 0.0;
-    rig.accept(search(1));
+    rig.accept(identification(1));
     for worker in 1..=workers {
         rig.event(hello_on(&format!("host {worker}"), worker.into(), worker, 1));
     }
     rig
-}
-
-/// A search of so many realizations.
-fn search(realizations: u64) -> JobSpecification {
-    let job = identification(realizations);
-    JobSpecification { search: Search { speculation: true, ..job.search }, ..job }
 }
 
 fn evaluation(number: u64) -> Event {
@@ -82,8 +76,8 @@ fn other_work_takes_its_place() {
 
 #[test]
 fn threads_that_a_batch_leaves_idle_are_used() {
-    let mut rig = Rig::new();
-    rig.accept(search(2));
+    let mut rig = Rig::speculating();
+    rig.accept(identification(2));
     let expected = ["welcome 1, lease 1", "send 1: batch 1 = 0+2", "send 1: batch 2 = 0+2"];
     rig.check(hello(1, 4), &expected);
     // A thread has room for one more, the worker has no room for one more batch.
@@ -126,9 +120,9 @@ fn a_worker_that_leaves_does_not_wait_for_it() {
 
 #[test]
 fn memory_is_for_what_is_asked_for() {
-    let mut rig = Rig::new();
+    let mut rig = Rig::speculating();
     rig.state.config.active_realizations_max = 5;
-    rig.accept(search(2));
+    rig.accept(identification(2));
     rig.event(hello(1, 4));
     assert_eq!(rig.state.jobs[&JobId(1)].speculation.evaluations.len(), 1);
     // Another job begins, and there is no room for both.

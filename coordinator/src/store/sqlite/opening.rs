@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use osteon_common::user_file;
+use osteon_proto::identity::host_name;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
@@ -234,8 +235,7 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
 
 /// This process, for people.
 fn holder() -> String {
-    let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let host = if host.trim().is_empty() { "this host" } else { host.trim() };
+    let host = host_name().unwrap_or_else(|| "this host".to_owned());
     format!("the coordinator with process {} on {host}", std::process::id())
 }
 

@@ -1,0 +1,105 @@
+//! What comes through a pipe that a user names, such as `--token-file <(pass show osteon)`.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use thiserror::Error;
+
+/// A pipe was not written to its end in time; the payload of an [`io::Error`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("it is a pipe, and nobody wrote it to its end within {seconds} s")]
+pub(crate) struct Unfinished {
+    /// How long was waited, s.
+    seconds: u64,
+}
+
+/// The bytes that come through a pipe until its writers have gone; `None` if there are more than
+/// `bytes_max`. Blocks for at most `limit`.
+///
+/// # Errors
+/// What the operating system says, or [`Unfinished`].
+pub(crate) fn read(
+    mut pipe: &File,
+    bytes_max: u64,
+    limit: Duration,
+) -> io::Result<Option<Vec<u8>>> {
+    let begun = Instant::now();
+    let (mut bytes, mut piece) = (Vec::new(), [0; 4096]);
+    loop {
+        let left = limit.saturating_sub(begun.elapsed());
+        // Without it a pipe that nobody has opened for writing yet would seem to be at its end.
+        let ready = match Timespec::try_from(left) {
+            Ok(left) => poll(&mut [PollFd::new(&pipe, PollFlags::IN)], Some(&left)),
+            Err(_) => return Err(io::ErrorKind::InvalidInput.into()),
+        };
+        match ready {
+            Ok(0) => {
+                let unfinished = Unfinished { seconds: limit.as_secs() };
+                return Err(io::Error::new(io::ErrorKind::TimedOut, unfinished));
+            }
+            Ok(_) => {}
+            Err(rustix::io::Errno::INTR) => continue,
+            Err(error) => return Err(error.into()),
+        }
+        match pipe.read(&mut piece) {
+            Ok(0) => return Ok(Some(bytes)),
+            Ok(count) => bytes.extend(&piece[..count]),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+        if bytes.len() as u64 > bytes_max {
+            return Ok(None);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::OpenOptions;
+    use std::io::Write as _;
+
+    use osteon_common::user_file::open_or_pipe;
+
+    use super::*;
+
+    #[test]
+    fn a_pipe_is_read_to_its_end_within_bounds_of_length_and_time() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let limit = Duration::from_secs(60);
+        let written = |text: &'static [u8], bytes_max| {
+            let pipe = open_or_pipe(&path).unwrap();
+            let path = path.clone();
+            // Nobody writes when it is opened, and not all comes at once.
+            let writer = std::thread::spawn(move || {
+                let mut pipe = OpenOptions::new().write(true).open(path).unwrap();
+                for part in text.chunks(3) {
+                    pipe.write_all(part).unwrap();
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            });
+            let bytes = read(&pipe, bytes_max, limit).unwrap();
+            writer.join().unwrap();
+            bytes
+        };
+        assert_eq!(written(b"a secret", 8).as_deref(), Some(&b"a secret"[..]));
+        assert_eq!(written(b"a secret", 7), None);
+        assert_eq!(written(b"", 7).as_deref(), Some(&b""[..]));
+        // Neither who never comes nor who never ends is waited for longer.
+        let pipe = open_or_pipe(&path).unwrap();
+        let limit = Duration::from_millis(20);
+        let check = || {
+            let error = read(&pipe, 8, limit).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+            assert!(error.to_string().contains("nobody wrote it to its end"), "{error}");
+        };
+        check();
+        let mut writer = OpenOptions::new().write(true).open(&path).unwrap();
+        writer.write_all(b"a").unwrap();
+        check();
+    }
+}

@@ -1,0 +1,70 @@
+//! Checks the crates that osteon is built from by cargo-deny: licences, versions, sources and, where
+//! the database of advisories can be had, known faults. The rules stand in `deny.toml`.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{announce, cargo, cargo_command, programs, root};
+
+/// The version of cargo-deny that the rules are written for.
+const VERSION: &str = "0.20.2";
+/// Longest wait for the database of advisories.
+const FETCH_MAX: Duration = Duration::from_secs(60);
+/// Time between two looks at the process that fetches it.
+const POLL: Duration = Duration::from_millis(100);
+
+/// `cargo xtask deny`.
+pub(crate) fn check(words: &[String]) -> Result<()> {
+    if !words.is_empty() {
+        bail!("usage: cargo xtask deny");
+    }
+    let program = program()?;
+    let deny = |arguments: &[&str]| {
+        let mut command = Command::new(&program);
+        command.args(arguments).current_dir(root());
+        command
+    };
+    cargo(&mut deny(&["check", "licenses", "bans", "sources"]))?;
+    if is_fetched(&mut deny(&["fetch", "db"]))? {
+        return cargo(&mut deny(&["check", "--disable-fetch", "advisories"]));
+    }
+    eprintln!("advisories are not checked: their database cannot be had from here");
+    Ok(())
+}
+
+/// Where cargo-deny is, which is installed below the target directory at the first call.
+fn program() -> Result<PathBuf> {
+    let tools = programs()?.with_file_name("tools");
+    let program = tools.join("bin/cargo-deny");
+    let version = Command::new(&program).arg("--version").output();
+    let installed = version.is_ok_and(|output| {
+        String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!(" {VERSION}"))
+    });
+    if !installed {
+        let install =
+            ["install", "cargo-deny", "--version", VERSION, "--locked", "--force", "--root"];
+        cargo(cargo_command(&install).arg(&tools))?;
+    }
+    Ok(program)
+}
+
+/// Whether the database of advisories could be fetched in time.
+fn is_fetched(command: &mut Command) -> Result<bool> {
+    announce(command);
+    let mut child =
+        command.stderr(Stdio::null()).spawn().with_context(|| format!("cannot run {command:?}"))?;
+    let start = Instant::now();
+    while start.elapsed() < FETCH_MAX {
+        if let Some(status) = child.try_wait()? {
+            return Ok(status.success());
+        }
+        thread::sleep(POLL);
+    }
+    child.kill()?;
+    child.wait()?;
+    Ok(false)
+}
