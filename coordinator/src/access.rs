@@ -6,6 +6,10 @@ use thiserror::Error;
 
 use crate::tokens::{Role, Tokens};
 
+/// The name that a token is registered for, in the extensions of a call.
+#[derive(Debug, Clone)]
+pub(crate) struct Holder(pub(crate) String);
+
 /// The name in a worker's certificate (a URI among its subject's alternative names).
 pub const WORKER_NAME: &str = "urn:osteon:worker";
 /// The name in a client's certificate (a URI among its subject's alternative names).

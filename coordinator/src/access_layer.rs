@@ -15,14 +15,10 @@ use tonic::{Code, Status};
 use tower::Layer;
 
 use crate::accept::Peer;
-use crate::access::{self, Certificate, Denied, Need, Policy};
+use crate::access::{self, Certificate, Denied, Holder, Need, Policy};
 use crate::message_body::MessageBody;
 use crate::places::{Caller, Places};
 use crate::tokens::Role;
-
-/// The name that a token is registered for, in the extensions of a call.
-#[derive(Debug, Clone)]
-pub(crate) struct Holder(pub(crate) String);
 
 /// The one method whose message may be large.
 const SUBMIT: &str = "/osteon.v1.Jobs/Submit";

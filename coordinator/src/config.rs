@@ -27,7 +27,7 @@ pub struct Config {
     pub audit_fraction: f64,
     /// Decides which; a running coordinator draws its own.
     pub audit_key: AuditKey,
-    /// Whether threads that nobody has work for compute points that a search may ask for next.
+    /// Whether slots that nobody has work for compute points that a search may ask for next.
     pub speculation: bool,
     /// Ended jobs are forgotten after this long; `None`: when a client wants it.
     pub keep_ended: Option<Duration>,

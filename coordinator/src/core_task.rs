@@ -6,13 +6,14 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use osteon_proto::v1;
 use tokio::sync::{mpsc, oneshot, watch};
 
+use crate::close_reason::CloseReason;
 use crate::config::Config;
-use crate::effect::{Answer, CloseReason, Effect, Refusal};
+use crate::effect::{Answer, Effect, Refusal};
 use crate::event::{Event, Hello, Request, Unread};
 use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
+use crate::outbound::{self, Outbound};
 use crate::reactor::react;
-use crate::service_workers::{self, Outbound};
 use crate::snapshot;
 use crate::state::State;
 use crate::store_thread::Command;
@@ -149,20 +150,20 @@ impl Core {
             tracing::trace!(?effect);
             match effect {
                 Effect::Welcome { worker, lease } => {
-                    let welcome = service_workers::welcome(worker, lease, &self.config);
+                    let welcome = outbound::welcome(worker, lease, &self.config);
                     self.send(worker, welcome, followups);
                 }
                 Effect::Send { worker, batch, work } => {
-                    self.send(worker, service_workers::batch(batch, &work), followups);
+                    self.send(worker, outbound::batch(batch, &work), followups);
                 }
                 Effect::Revoke { worker, batch } => {
-                    self.send(worker, service_workers::revoke(batch), followups);
+                    self.send(worker, outbound::revoke(batch), followups);
                 }
                 Effect::Heartbeat { worker } => {
-                    self.send(worker, service_workers::heartbeat(), followups);
+                    self.send(worker, outbound::heartbeat(), followups);
                 }
                 Effect::Drain { worker } => {
-                    self.send(worker, service_workers::drain(), followups);
+                    self.send(worker, outbound::drain(), followups);
                 }
                 Effect::Close { worker, reason } => self.close(worker, &reason),
                 Effect::Store(record) => {
@@ -222,7 +223,7 @@ impl Core {
         tracing::debug!(%worker, %reason, "stream of a worker closed");
         if let Some(outbound) = self.outbound.remove(&worker) {
             // A full queue belongs to a worker that does not read; it sees the stream end.
-            let _ = outbound.send(Err(service_workers::status(reason)));
+            let _ = outbound.send(Err(outbound::status(reason)));
         }
     }
 

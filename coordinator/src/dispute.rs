@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use osteon_common::outcome::{Solved, encode};
 
-use crate::evaluation::Indices;
+use crate::crashes::Crashes;
 use crate::ids::BatchId;
-use crate::losses::Losses;
+use crate::indices::Indices;
 use crate::worker_name::WorkerName;
 
 /// Different answers to the same indices, undecided.
@@ -19,9 +19,9 @@ pub struct Dispute {
     /// Since when.
     pub since: Duration,
     /// Batch of the worker that is to decide, and its copies.
-    pub judges: Vec<BatchId>,
+    pub tie_breakers: Vec<BatchId>,
     /// Workers that were lost over it.
-    pub(crate) lost: Losses,
+    pub(crate) crashes: Crashes,
 }
 
 /// What one worker says.
@@ -54,7 +54,13 @@ pub(crate) struct Verdict {
 impl Dispute {
     /// A dispute between two workers whose answers differ.
     pub(crate) fn new(indices: Indices, votes: [Vote; 2], since: Duration) -> Self {
-        Self { indices, votes: votes.into(), since, judges: Vec::new(), lost: Losses::default() }
+        Self {
+            indices,
+            votes: votes.into(),
+            since,
+            tie_breakers: Vec::new(),
+            crashes: Crashes::default(),
+        }
     }
 
     /// Whether `name` is one of those whose answers differ.
@@ -81,7 +87,7 @@ impl Dispute {
         Some(Verdict { believed, liars })
     }
 
-    /// Forgets what an expelled worker says; whether anything is left to decide.
+    /// Forgets what a banned worker says; whether anything is left to decide.
     pub(crate) fn forget(&mut self, name: &WorkerName) -> bool {
         self.votes.retain(|vote| vote.by != *name);
         self.votes.len() > 1

@@ -4,15 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_proto::batch::Work;
-use osteon_proto::malformed::Malformed;
 use osteon_proto::v1::{JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_search::Summary;
 use thiserror::Error;
 
-use crate::event::RecordKey;
+use crate::close_reason::CloseReason;
 use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::notice::Notice;
-use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
 
 /// Something to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,8 +118,8 @@ pub enum Record {
         /// What its path came to.
         summary: Arc<Summary>,
     },
-    /// A worker is expelled.
-    Expulsion(ExpulsionRecord),
+    /// A worker is banned.
+    Ban(BanRecord),
 }
 
 impl Record {
@@ -130,9 +129,22 @@ impl Record {
             Self::Job(record) => (record.job, RecordKey::Job),
             Self::Evaluation { record, .. } => (record.job, RecordKey::Evaluation(record.number)),
             Self::End { end, .. } => (end.job, RecordKey::End),
-            Self::Expulsion(record) => (record.job, RecordKey::Expulsion(record.number)),
+            Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
         }
     }
+}
+
+/// Names one record of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordKey {
+    /// The job itself.
+    Job,
+    /// The evaluation with this number.
+    Evaluation(u64),
+    /// Its end.
+    End,
+    /// The ban with this number, of a worker that was found in it.
+    Ban(u64),
 }
 
 /// Answer to a request.
@@ -153,8 +165,8 @@ pub enum Answer {
     Ended(EndRecord),
     /// These ended jobs are forgotten.
     Pruned(Vec<JobId>),
-    /// The expelled workers, with the time since then.
-    Expelled(Vec<(ExpulsionRecord, Duration)>),
+    /// The banned workers, with the time since then.
+    Banned(Vec<(BanRecord, Duration)>),
     /// The attached workers, and those that went last.
     Workers(ListWorkersResponse),
     /// How a worker stands.
@@ -234,92 +246,4 @@ pub enum Refusal {
         /// What the store said.
         error: String,
     },
-}
-
-/// Why a worker's stream is closed.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum CloseReason {
-    /// Its numerics differ from the coordinator's.
-    #[error(
-        "this worker's numerics are `{}`, the coordinator's are `{coordinator}`; \
-         results would not be reproducible: run the same version of osteon on both",
-        worker.escape_debug()
-    )]
-    FingerprintDiffers {
-        /// Fingerprint of the worker.
-        worker: String,
-        /// Fingerprint of the coordinator.
-        coordinator: String,
-    },
-    /// It was found to compute wrongly.
-    #[error(
-        "this worker is expelled: it {reason}; check its machine, and start it again when it is \
-         repaired"
-    )]
-    Expelled {
-        /// What was found.
-        reason: String,
-    },
-    /// An impossible number of threads.
-    #[error("this worker announces {threads} threads; 1 to {max} are allowed")]
-    Threads {
-        /// What it announced.
-        threads: u32,
-        /// Most threads allowed.
-        max: u32,
-    },
-    /// A name of its introduction is too long.
-    #[error("a name in this worker's hello has {bytes} bytes; at most {max} are allowed")]
-    NameTooLong {
-        /// Its length.
-        bytes: usize,
-        /// Most bytes allowed.
-        max: usize,
-    },
-    /// Too many workers are attached.
-    #[error("{limit} workers are attached already, the most allowed; attach again later")]
-    TooManyWorkers {
-        /// Most workers allowed.
-        limit: usize,
-    },
-    /// Nothing was heard of it.
-    #[error("nothing was heard of this worker for {silent:?}; its lease has ended, attach again")]
-    Expired {
-        /// For how long.
-        silent: Duration,
-    },
-    /// It lives, but does not answer.
-    #[error(
-        "this worker has not answered anything it holds for {waited:?}; its lease has ended, \
-         attach again"
-    )]
-    Unanswering {
-        /// For how long.
-        waited: Duration,
-    },
-    /// It does not read what is sent to it.
-    #[error("this worker does not read its stream; its lease has ended, attach again")]
-    NotReading,
-    /// A message that no worker of this version sends.
-    #[error("a message of this worker is malformed: {0}")]
-    Malformed(#[from] Malformed),
-    /// An answer of the wrong length.
-    #[error("the answer to batch {batch} has {found} realizations, expected {expected}")]
-    WrongCount {
-        /// The batch.
-        batch: BatchId,
-        /// How many it has.
-        found: usize,
-        /// How many it must have.
-        expected: u64,
-    },
-    /// A second hello.
-    #[error("this worker said hello twice on one stream")]
-    SecondHello,
-    /// It wanted to leave, and has answered everything.
-    #[error("this worker has drained")]
-    Drained,
-    /// The coordinator is stopping.
-    #[error("the coordinator is shutting down; attach again when it is back")]
-    Draining,
 }

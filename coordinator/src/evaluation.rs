@@ -1,4 +1,4 @@
-//! One evaluation under way: a slot for each index, and the indices that nobody computes.
+//! One evaluation under way: a result for each index, and the indices that nobody computes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -8,25 +8,10 @@ use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
+use crate::crashes::{Crashes, LostWorker};
 use crate::dispute::{self, Dispute, Vote};
-use crate::losses::{Loss, Losses};
+use crate::indices::Indices;
 use crate::worker_name::WorkerName;
-
-/// Consecutive indices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Indices {
-    /// The first.
-    pub first: u64,
-    /// How many, at least one.
-    pub count: u64,
-}
-
-impl Indices {
-    /// The index after the last.
-    pub fn end(self) -> u64 {
-        self.first + self.count
-    }
-}
 
 /// A batch that is to be computed a second time, by another worker.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +32,7 @@ pub(crate) enum Before {
     Nothing,
     /// Something that cannot be read.
     Damaged,
-    /// Outcomes, some of them by a worker that was expelled.
+    /// Outcomes, some of them by a worker that was banned.
     Stored(Arc<[Outcome]>),
 }
 
@@ -57,25 +42,25 @@ pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
     /// Number of this attempt at it: what was sent in an earlier one means nothing in this.
-    pub(crate) round: u64,
+    pub(crate) attempt: u64,
     /// The point.
     pub point: Point,
     /// What the store has of it.
     pub(crate) before: Before,
     /// What became of each index.
-    pub(crate) slots: Vec<Option<Solved>>,
-    /// How many slots are filled.
+    pub(crate) results: Vec<Option<Solved>>,
+    /// How many results there are.
     pub(crate) filled: u64,
     /// Indices to hand out, from the front.
     pub(crate) queue: VecDeque<Indices>,
     /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
     /// they held nothing else; those that wait are in `quarantine`.
-    pub(crate) suspects: BTreeMap<u64, Losses>,
-    /// Suspects to hand out, each alone to a worker that holds nothing else.
+    pub(crate) crashes: BTreeMap<u64, Crashes>,
+    /// Quarantined indices that wait to be handed out, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
-    /// Everybody whose answers fill slots.
+    /// Every worker whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Place in `workers` of who filled each slot; means nothing while the slot is empty.
+    /// Place in `workers` of the worker that each result is of; means nothing while there is none.
     owners: Vec<u32>,
     /// Batches to be computed a second time.
     pub(crate) audits: VecDeque<Audit>,
@@ -88,18 +73,18 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Attempt `round` at an evaluation of which nothing is known.
-    pub fn new(number: u64, round: u64, point: Point, realizations: u64) -> Self {
+    /// The attempt with number `attempt` at an evaluation of which nothing is known.
+    pub fn new(number: u64, attempt: u64, point: Point, realizations: u64) -> Self {
         let length = usize::try_from(realizations).unwrap_or(usize::MAX);
         Self {
             number,
-            round,
+            attempt,
             point,
             before: Before::Nothing,
-            slots: vec![None; length],
+            results: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
-            suspects: BTreeMap::new(),
+            crashes: BTreeMap::new(),
             quarantine: VecDeque::new(),
             workers: Vec::new(),
             owners: vec![0; length],
@@ -115,7 +100,7 @@ impl Evaluation {
         self.filled
     }
 
-    /// Realizations that nobody computes, the suspects aside.
+    /// Realizations that nobody computes, quarantined ones aside.
     pub fn queued(&self) -> u64 {
         self.queue.iter().map(|indices| indices.count).sum()
     }
@@ -154,25 +139,25 @@ impl Evaluation {
     }
 
     /// Puts one index that was alone in a batch of a lost worker into quarantine.
-    pub(crate) fn suspect(&mut self, index: u64, loss: &Loss) {
-        self.blame(index, loss);
+    pub(crate) fn quarantine(&mut self, index: u64, loss: &LostWorker) {
+        self.count_crash(index, loss);
         self.quarantine.push_back(index);
     }
 
     /// A worker was lost over one index, of which another worker holds a copy.
-    pub(crate) fn blame(&mut self, index: u64, loss: &Loss) {
-        self.suspects.entry(index).or_default().add(loss);
+    pub(crate) fn count_crash(&mut self, index: u64, loss: &LostWorker) {
+        self.crashes.entry(index).or_default().add(loss);
     }
 
     /// A worker is back: nothing that it held is to blame.
-    pub(crate) fn forgive(&mut self, name: &WorkerName) {
-        let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.lost);
-        for losses in self.suspects.values_mut().chain(judged) {
-            losses.forgive(name);
+    pub(crate) fn forget_crashes(&mut self, name: &WorkerName) {
+        let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.crashes);
+        for crashes in self.crashes.values_mut().chain(judged) {
+            crashes.forget(name);
         }
     }
 
-    /// Fills the empty slots of `indices` with the answer of `by`.
+    /// Fills the empty results of `indices` with the answer of `by`.
     pub fn fill(&mut self, indices: Indices, solved: &[Solved], by: &WorkerName) {
         let known = self.workers.iter().position(|worker| worker == by);
         let place = known.unwrap_or_else(|| {
@@ -181,18 +166,18 @@ impl Evaluation {
         });
         let owner = u32::try_from(place).unwrap_or(u32::MAX);
         let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
-        let slots = self.slots.iter_mut().zip(&mut self.owners).skip(first);
-        for ((slot, owned), solved) in slots.zip(solved) {
-            if slot.is_none() {
-                *slot = Some(*solved);
+        let results = self.results.iter_mut().zip(&mut self.owners).skip(first);
+        for ((result, owned), solved) in results.zip(solved) {
+            if result.is_none() {
+                *result = Some(*solved);
                 *owned = owner;
                 self.filled += 1;
             }
         }
     }
 
-    /// Compares an answer of `by` with what fills the slots of `indices`: what differs, from the
-    /// first difference on as far as one worker filled the slots. Empty slots agree.
+    /// Compares an answer of `by` with what fills the results of `indices`: what differs, from the
+    /// first difference on as far as one worker filled the results. Empty results agree.
     pub(crate) fn compare(
         &self,
         indices: Indices,
@@ -200,14 +185,14 @@ impl Evaluation {
         by: &WorkerName,
     ) -> Option<(Indices, [Vote; 2])> {
         let first = usize::try_from(indices.first).ok()?;
-        let slots = self.slots.get(first..)?;
-        let differs = |(slot, later): (&Option<Solved>, &Solved)| {
-            slot.is_some_and(|earlier| !dispute::same(earlier, *later))
+        let results = self.results.get(first..)?;
+        let differs = |(result, later): (&Option<Solved>, &Solved)| {
+            result.is_some_and(|earlier| !dispute::same(earlier, *later))
         };
-        let at = slots.iter().zip(solved).position(differs)?;
+        let at = results.iter().zip(solved).position(differs)?;
         let owner = self.owners.get(first + at)?;
-        let whose = self.owners.get(first + at..)?.iter().zip(slots.get(at..)?);
-        let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, slot)| *slot);
+        let whose = self.owners.get(first + at..)?.iter().zip(results.get(at..)?);
+        let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, result)| *result);
         let earlier: Vec<Solved> = run.take(solved.len() - at).collect();
         let later = solved.get(at..at + earlier.len())?.to_vec();
         let indices = Indices { first: indices.first + at as u64, count: earlier.len() as u64 };
@@ -216,7 +201,7 @@ impl Evaluation {
         Some((indices, [Vote { by: owner, solved: earlier }, later]))
     }
 
-    /// Who filled the slot of an index.
+    /// Who filled the result of an index.
     pub(crate) fn owner(&self, index: u64) -> Option<WorkerName> {
         let owner = self.owners.get(usize::try_from(index).ok()?)?;
         self.workers.get(usize::try_from(*owner).ok()?).cloned()
@@ -224,7 +209,7 @@ impl Evaluation {
 
     /// Whether every index has an outcome, and nothing about them is to be checked any more.
     pub(crate) fn is_settled(&self) -> bool {
-        self.filled >= self.slots.len() as u64
+        self.filled >= self.results.len() as u64
             && self.audits.is_empty()
             && self.audits_out == 0
             && self.disputes.is_empty()
@@ -249,8 +234,9 @@ impl Evaluation {
         if !self.is_settled() {
             return None;
         }
-        let outcomes: Option<_> = self.slots.iter().map(|slot| slot.map(|it| it.outcome)).collect();
-        let successes = self.slots.iter().flatten().filter(|solved| solved.outcome.is_ok());
+        let outcomes: Option<_> =
+            self.results.iter().map(|result| result.map(|it| it.outcome)).collect();
+        let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
         let errors = successes.map(|solved| solved.estimated_error).collect();
         Some((outcomes?, quantile::estimated_error(errors)))
     }

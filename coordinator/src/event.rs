@@ -6,7 +6,8 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Solved;
 
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
+use crate::effect::RecordKey;
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::store::EvaluationRecord;
 
@@ -144,7 +145,7 @@ pub enum Request {
     /// Ended jobs forgotten.
     Prune(Retention),
     /// The workers that were found to compute wrongly.
-    Expelled,
+    Banned,
     /// The attached workers, and those that went last.
     Workers,
     /// A worker sent away when it has answered what it holds.
@@ -167,25 +168,13 @@ pub struct Hello {
     pub version: String,
     /// Fingerprint of its numerics.
     pub fingerprint: String,
-    /// Threads it computes on.
-    pub threads: u32,
+    /// How many realizations it computes at the same time: threads of a processor, or what another
+    /// device has. The field of the wire is called `threads`.
+    pub slots: u32,
     /// Host name, for people.
     pub host: String,
     /// Process id, for people.
     pub process: u32,
     /// A number that the process drew at its start, 0 if it told none.
     pub instance: u64,
-}
-
-/// Names one record of a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RecordKey {
-    /// The job itself.
-    Job,
-    /// The evaluation with this number.
-    Evaluation(u64),
-    /// Its end.
-    End,
-    /// The expulsion with this number, of a worker that was found in it.
-    Expulsion(u64),
 }

@@ -1,6 +1,6 @@
 //! Who gets the next batch: clients share the workers evenly, whatever the number of their jobs.
 //!
-//! What counts is computing time of threads. Who has had least of it is served next; a client
+//! What counts is computing time of slots. Who has had least of it is served next; a client
 //! that comes begins with what the least of the others has had, so that it neither waits nor
 //! catches up on the past.
 
@@ -67,9 +67,9 @@ impl Shares {
     }
 }
 
-/// Time of `threads` for `seconds`, within reason.
-pub(crate) fn thread_time(seconds: f64, threads: u32) -> Duration {
-    let time = Duration::try_from_secs_f64(seconds * f64::from(threads));
+/// Time of `slots` for `seconds`, within reason.
+pub(crate) fn slot_time(seconds: f64, slots: u32) -> Duration {
+    let time = Duration::try_from_secs_f64(seconds * f64::from(slots));
     time.unwrap_or(CHARGE_MAX).min(CHARGE_MAX)
 }
 
@@ -98,9 +98,9 @@ mod tests {
 
     #[test]
     fn times_that_cannot_be_are_bounded() {
-        assert_eq!(thread_time(0.5, 4), Duration::from_secs(2));
+        assert_eq!(slot_time(0.5, 4), Duration::from_secs(2));
         for seconds in [f64::NAN, f64::INFINITY, 1e300, -1.0] {
-            assert_eq!(thread_time(seconds, 4), CHARGE_MAX);
+            assert_eq!(slot_time(seconds, 4), CHARGE_MAX);
         }
     }
 }

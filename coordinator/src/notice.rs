@@ -7,7 +7,7 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_search::Ending;
 
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 use crate::ids::{JobId, WorkerId};
 use crate::worker_name::WorkerName;
 
@@ -20,8 +20,8 @@ pub enum Notice {
         worker: WorkerId,
         /// Who it is.
         name: WorkerName,
-        /// Threads it computes on.
-        threads: u32,
+        /// How many realizations it computes at the same time.
+        slots: u32,
         /// Version of its program.
         version: String,
     },
@@ -112,8 +112,8 @@ impl Notice {
     /// another line.
     pub(crate) fn write(&self) {
         match self {
-            Self::WorkerAttached { worker, name, threads, version } => tracing::info!(
-                %worker, host = name.host(), process = name.process(), threads,
+            Self::WorkerAttached { worker, name, slots, version } => tracing::info!(
+                %worker, host = name.host(), process = name.process(), threads = slots,
                 version = version.as_str(), "worker attached"
             ),
             Self::WorkerRefused { worker, name, reason } => tracing::warn!(

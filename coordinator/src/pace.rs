@@ -7,16 +7,16 @@ use crate::fairness;
 /// Of what was known before, so much stays when an answer shows a shorter time.
 const KEPT: f64 = 0.5;
 
-/// Time of one realization of a job on one thread. A slow answer counts at once, a fast one by and
+/// Time of one realization of a job on one slot. A slow answer counts at once, a fast one by and
 /// by: a search goes from points whose realizations are fast to others that take a hundred times as
 /// long, and it is worse to hurry those than to wait a little too long for what is fast.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Pace(Option<f64>);
 
 impl Pace {
-    /// A worker of `threads` threads has answered `count` realizations in `seconds`.
-    pub(crate) fn learn(&mut self, count: u64, threads: u32, seconds: f64) {
-        let one = seconds / rounds(count, threads);
+    /// A worker of `slots` slots has answered `count` realizations in `seconds`.
+    pub(crate) fn learn(&mut self, count: u64, slots: u32, seconds: f64) {
+        let one = seconds / waves(count, slots);
         self.0 = Some(self.0.map_or(one, |known| one.max(KEPT * known)));
     }
 
@@ -25,16 +25,16 @@ impl Pace {
         self.0.is_some()
     }
 
-    /// Time that `count` realizations should take a worker of `threads` threads; `None` while
+    /// Time that `count` realizations should take a worker of `slots` slots; `None` while
     /// nobody has answered anything.
-    pub(crate) fn expected(self, count: u64, threads: u32) -> Option<Duration> {
-        self.0.map(|one| fairness::thread_time(one * rounds(count, threads), 1))
+    pub(crate) fn expected(self, count: u64, slots: u32) -> Option<Duration> {
+        self.0.map(|one| fairness::slot_time(one * waves(count, slots), 1))
     }
 }
 
-/// How many realizations each thread computes that has something to do, on average.
-fn rounds(count: u64, threads: u32) -> f64 {
-    count as f64 / (threads.max(1) as f64).min(count.max(1) as f64)
+/// How many realizations each slot computes that has something to do, on average.
+fn waves(count: u64, slots: u32) -> f64 {
+    count as f64 / (slots.max(1) as f64).min(count.max(1) as f64)
 }
 
 #[cfg(test)]
@@ -46,11 +46,11 @@ mod tests {
         let mut pace = Pace::default();
         assert_eq!((pace.expected(8, 2), pace.is_known()), (None, false));
         let expected =
-            |pace: Pace, count, threads| pace.expected(count, threads).unwrap().as_secs_f64();
-        // 8 on 2 threads in 2 s: 0.5 s each.
+            |pace: Pace, count, slots| pace.expected(count, slots).unwrap().as_secs_f64();
+        // 8 on 2 slots in 2 s: 0.5 s each.
         pace.learn(8, 2, 2.0);
-        for (count, threads, seconds) in [(8, 2, 2.0), (1, 1, 0.5), (1, 64, 0.5), (16, 4, 2.0)] {
-            assert_eq!(expected(pace, count, threads), seconds, "{count} on {threads}");
+        for (count, slots, seconds) in [(8, 2, 2.0), (1, 1, 0.5), (1, 64, 0.5), (16, 4, 2.0)] {
+            assert_eq!(expected(pace, count, slots), seconds, "{count} on {slots}");
         }
         pace.learn(1, 64, 32.0);
         assert_eq!(expected(pace, 1, 1), 32.0);

@@ -12,7 +12,7 @@ use tonic::Status;
 use tonic::codegen::http::Extensions;
 
 use crate::accept::Peer;
-use crate::access_layer::Holder;
+use crate::access::Holder;
 
 /// Who finds no place for this long is refused.
 const PATIENCE: Duration = Duration::from_secs(5);

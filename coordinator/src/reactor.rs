@@ -1,78 +1,88 @@
-//! What a coordinator does about an event: synchronous functions from state, event and time to
-//! effects. No socket, no clock, no task; a run is a function of its events and their times.
+//! Synchronous functions from state, event and time to effects: what a coordinator does about an
+//! event. No socket, no clock, no task; a run is a function of its events and their times.
+//!
+//! Three layers, each of which calls only those below it:
+//!
+//! - `integrity`: which answers count. Takes in answers, compares them, settles disputes, bans workers;
+//! - `lifecycle`: jobs, their records, requests of clients, and workers that come and go;
+//! - `dispatch`: who computes what. Sends batches, their duplicates, audits and speculative ones.
+//!
+//! No file calls another that calls it (`tests/circles.rs`). What a lower layer finds for an upper one
+//! to act on it returns: the failure of a job, or an evaluation that may be complete.
 
 use std::time::Duration;
 
-use crate::effect::Effect;
+use crate::effect::{Effect, RecordKey};
 use crate::event::Event;
 use crate::state::State;
 
-mod ahead;
-mod batches;
-mod checks;
-mod copies;
-mod dispatch;
-mod due;
-mod expulsion;
-mod jobs;
-mod overdue;
-mod prune;
-mod requests;
-mod reread;
-mod restore;
-mod suspects;
-mod ticks;
-mod workers;
+use self::integrity::{answers, bans, checks};
+use self::lifecycle::{prune, records, replay, requests, ticks, workers};
+use self::turn::Turn;
 
-pub(crate) use ahead::LIKELY_MAX;
-pub(crate) use overdue::COPIES_MAX;
-pub use restore::Restored;
+mod dispatch;
+mod integrity;
+mod lifecycle;
+mod turn;
+
+pub(crate) use dispatch::overdue::DUPLICATES_MAX;
+pub(crate) use dispatch::speculation::CANDIDATES_MAX;
+pub use lifecycle::restore::Restored;
 
 #[cfg(test)]
 mod tests;
 
-/// Effects in the order in which they are to be done.
-type Effects = Vec<Effect>;
-
 /// Changes `state` by one event at `now`, and returns what is to be done.
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
-    let mut effects = Vec::new();
+    let mut turn = Turn::new(state, now);
     // A sign of life frees nobody, and there are many of them.
     let frees = !matches!(event, Event::Heartbeat { .. });
-    match event {
-        Event::Tick => ticks::tick(state, now, &mut effects),
-        Event::Requested { token, request } => {
-            requests::requested(state, token, request, now, &mut effects);
-        }
-        Event::Hello { worker, hello } => {
-            workers::hello(state, worker, hello, now, &mut effects);
-        }
-        Event::Answered { worker, batch, solved, elapsed_s } => {
-            batches::answered(state, worker, batch, solved, elapsed_s, now, &mut effects);
-        }
-        Event::Heartbeat { worker } => workers::heard(state, worker, now),
-        Event::WorkerDrains { worker } => workers::drains(state, worker, now, &mut effects),
-        Event::Misbehaved { worker, reason } => {
-            workers::close(state, worker, reason, now, &mut effects);
-        }
-        Event::StreamEnded { worker } => workers::stream_ended(state, worker, now, &mut effects),
-        Event::Stored { job, key } => jobs::stored(state, job, key, now, &mut effects),
-        Event::StoreFailed { job, key, error } => {
-            jobs::store_failed(state, job, key, error, now, &mut effects);
-        }
-        Event::Read { job, number, found } => {
-            reread::read(state, job, number, found, now, &mut effects);
-        }
-        Event::Pruned { token, jobs, outcome } => {
-            prune::pruned(state, token, jobs, outcome, &mut effects);
-        }
-        Event::Drain => workers::drain_all(state, now, &mut effects),
-    }
+    apply(&mut turn, event);
     if frees {
-        dispatch::hand_out(state, now, &mut effects);
+        dispatch::hand_out(&mut turn);
     }
-    if state.draining && state.unstored() == 0 {
-        effects.push(Effect::Stop);
+    if turn.state.draining && turn.state.unstored() == 0 {
+        turn.effects.push(Effect::Stop);
     }
-    effects
+    turn.effects
+}
+
+fn apply(turn: &mut Turn, event: Event) {
+    match event {
+        Event::Tick => tick(turn),
+        Event::Requested { token, request } => requests::requested(turn, token, request),
+        Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
+        Event::Answered { worker, batch, solved, elapsed_s } => {
+            answers::answered(turn, worker, batch, solved, elapsed_s);
+        }
+        Event::Heartbeat { worker } => workers::seen(turn.state, worker, turn.now),
+        Event::WorkerDrains { worker } => workers::drains(turn, worker),
+        Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
+        Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
+        Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
+        Event::Stored { job, key } => records::stored(turn, job, key),
+        Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
+            bans::store_failed(turn, number, error);
+        }
+        Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
+        Event::Read { job, number, found } => replay::read(turn, job, number, found),
+        Event::Pruned { token, jobs, outcome } => prune::pruned(turn, token, jobs, outcome),
+        Event::Drain => workers::drain_all(turn),
+    }
+}
+
+/// What the passing of time brings.
+fn tick(turn: &mut Turn) {
+    ticks::compensate_gap(turn.state, turn.now);
+    ticks::expire(turn);
+    ticks::send_heartbeats(turn);
+    dispatch::overdue::tick(turn);
+    checks::give_up(turn);
+    if !turn.state.draining {
+        ticks::fail_poisoned(turn);
+        ticks::store_again(turn);
+        bans::store_again(turn);
+        prune::tick(turn);
+    }
+    ticks::publish(turn);
 }

@@ -5,14 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use osteon_common::parameters::Point;
 use thiserror::Error;
 
+use crate::batch::{Batch, Purpose};
 use crate::dispute::Dispute;
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
-use crate::reactor::{COPIES_MAX, LIKELY_MAX};
-use crate::state::{
-    Ahead, BATCHES_IN_FLIGHT_MAX, Batch, Expelled, Job, Purpose, RequestName, SETTLED_MAX, Stage,
-    State,
-};
+use crate::job::{Job, RequestName, Speculation, Stage};
+use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
+use crate::state::{BATCHES_IN_FLIGHT_MAX, Banned, SETTLED_MAX, State};
 use crate::worker_name::WorkerName;
 
 /// What does not fit together.
@@ -26,13 +25,10 @@ pub enum Insane {
     Holding(WorkerId, BatchId),
     /// A worker holds too much.
     #[error("worker {0} holds more than it may")]
-    Credit(WorkerId),
-    /// The copies of a batch do not name each other.
-    #[error("batch {0} and its copies do not match")]
-    Twin(BatchId),
-    /// Not exactly those batches may be copied of which there is one and that are no suspects.
-    #[error("the list of batches that may be copied is wrong")]
-    Copyable,
+    TooMuch(WorkerId),
+    /// The duplicates of a batch do not name each other, or differ in what they are for.
+    #[error("batch {0} and its duplicates do not match")]
+    Duplicates(BatchId),
     /// What waits for another worker that computes the same is with nobody, is not the newest of
     /// its copies, or is not waited for.
     #[error("batch {0} cannot be overdue")]
@@ -50,8 +46,8 @@ pub enum Insane {
         /// In how many places it is.
         places: u32,
     },
-    /// The count of filled slots is wrong.
-    #[error("job {0} miscounts its filled slots")]
+    /// The count of filled results is wrong.
+    #[error("job {0} miscounts its filled results")]
     Filled(JobId),
     /// A request id does not lead to the job that has it.
     #[error("the request id of job {0} leads elsewhere")]
@@ -62,12 +58,12 @@ pub enum Insane {
     /// The checks of an evaluation and the batches for them do not match.
     #[error("job {0} miscounts what is being checked")]
     Checks(JobId),
-    /// An answer of an expelled worker counts, or it is attached.
+    /// An answer of a banned worker counts, or it is attached.
     #[error("worker {0} is expelled, and still counts")]
-    Expelled(WorkerName),
-    /// What is computed ahead is none of the points that a search may ask for.
+    Banned(WorkerName),
+    /// A speculative evaluation is of none of the points that a search may ask for.
     #[error("job {0} is ahead with what its search does not ask for")]
-    Ahead(JobId),
+    Speculation(JobId),
     /// A number that is handed out next is not above all in use.
     #[error("a number is about to be given twice")]
     Numbers,
@@ -101,7 +97,7 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         let active = state.active.contains(&id);
         let fits = match &job.stage {
             Stage::Waiting => waiting == 1 && !active,
-            Stage::Rereading { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
+            Stage::Replaying { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
                 waiting == 0 && active
             }
             Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
@@ -135,54 +131,55 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
     }
 }
 
-/// What is ahead is of points that may be asked for, once each, while an evaluation is under way.
+/// Speculative evaluations are of candidates, of each at most one, while an evaluation is under way.
 fn check_ahead(job: &Job) -> Result<(), Insane> {
-    let Ahead { likely, evaluations } = &job.ahead;
+    let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
-    let known = |of: &Evaluation| likely.iter().any(|at| bits(at) == bits(&of.point));
+    let known = |of: &Evaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
     let fits = evaluations.iter().all(known)
         && points.len() == job.evaluations().count()
-        && likely.len() <= LIKELY_MAX
-        && (under_way || likely.is_empty())
-        && evaluations.iter().all(|ahead| ahead.audits_out == 0);
-    if fits { Ok(()) } else { Err(Insane::Ahead(job.record.job)) }
+        && candidates.len() <= CANDIDATES_MAX
+        && (under_way || candidates.is_empty())
+        && evaluations.iter().all(|it| it.audits_out == 0);
+    if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
 }
 
 /// Whether a batch is of this evaluation.
 fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
-    batch.assignment.job == job && batch.assignment.round == evaluation.round
+    batch.assignment.job == job && batch.assignment.attempt == evaluation.attempt
 }
 
-/// Audits and judges are with workers, and nobody who is expelled has a say.
+/// Audits and judges are with workers, and nobody who is banned has a say.
 fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
     };
     let judged = |dispute: &Dispute| {
-        let judges = dispute.judges.iter().filter_map(|judge| state.batches.get(judge));
+        let tie_breakers =
+            dispute.tie_breakers.iter().filter_map(|tie_breaker| state.batches.get(tie_breaker));
         let fits = |batch: &&Batch| {
-            batch.purpose == Purpose::Judge && batch.assignment.indices == dispute.indices
+            batch.purpose == Purpose::TieBreak && batch.assignment.indices == dispute.indices
         };
-        judges.filter(fits).count() == dispute.judges.len()
+        tie_breakers.filter(fits).count() == dispute.tie_breakers.len()
     };
     let disputes = &evaluation.disputes;
-    let judges: usize = disputes.iter().map(|dispute| dispute.judges.len()).sum();
+    let tie_breakers: usize = disputes.iter().map(|dispute| dispute.tie_breakers.len()).sum();
     if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
-        || with(|purpose| *purpose == Purpose::Judge) != judges
+        || with(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
         || !disputes.iter().all(judged)
     {
         return Err(Insane::Checks(job));
     }
-    for Expelled { record, .. } in &state.expelled {
+    for Banned { record, .. } in &state.banned {
         let name = &record.worker;
         let attached = state.workers.values().any(|worker| worker.name == *name);
         let disputes = disputes.iter().any(|dispute| dispute.involves(name));
         let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
         if attached || disputes || told || evaluation.workers.contains(name) {
-            return Err(Insane::Expelled(name.clone()));
+            return Err(Insane::Banned(name.clone()));
         }
     }
     Ok(())
@@ -190,14 +187,13 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
 
 fn check_workers(state: &State) -> Result<(), Insane> {
     for (&id, worker) in &state.workers {
-        let exclusive = |batch: &BatchId| state.batches.get(batch).is_some_and(|b| b.exclusive);
         let held = worker.in_flight.len();
-        let alone = !worker.in_flight.iter().any(exclusive) || held == 1;
-        let ahead = |batch: &&BatchId| state.batches.get(batch).is_some_and(|b| b.ahead);
-        let ahead = worker.in_flight.iter().filter(ahead).count();
-        if held > BATCHES_IN_FLIGHT_MAX || !alone || ahead > 1 || worker.settled.len() > SETTLED_MAX
-        {
-            return Err(Insane::Credit(id));
+        let count = |purpose| state.held_for(worker, purpose).count();
+        let alone = count(Purpose::Exclusive) == 0 || held == 1;
+        let speculative = count(Purpose::Speculative);
+        let remembered = worker.settled.len();
+        if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
+            return Err(Insane::TooMuch(id));
         }
         for batch in &worker.in_flight {
             if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
@@ -209,14 +205,11 @@ fn check_workers(state: &State) -> Result<(), Insane> {
 }
 
 fn check_batches(state: &State) -> Result<(), Insane> {
-    let copyable = state.batches.iter().filter(|(_, batch)| batch.is_copyable());
-    let expected = copyable.map(|(id, _)| id);
-    if !state.copyable.iter().eq(expected) {
-        return Err(Insane::Copyable);
-    }
     let overdue = |id: &&BatchId| {
         let batch = state.batches.get(id);
-        batch.is_some_and(|batch| !batch.ahead && batch.twins.iter().all(|twin| twin < id))
+        batch.is_some_and(|batch| {
+            batch.purpose != Purpose::Speculative && batch.duplicates.iter().all(|it| it < id)
+        })
     };
     if let Some(id) = state.overdue.iter().find(|id| !overdue(id)) {
         return Err(Insane::Overdue(*id));
@@ -227,23 +220,23 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         if held != 1 {
             return Err(Insane::Holding(batch.worker, id));
         }
-        let matches = |twin: &BatchId| {
-            state.batches.get(twin).is_some_and(|twin| {
-                twin.twins.iter().filter(|of| **of == id).count() == 1
-                    && twin.twins.len() == batch.twins.len()
-                    && twin.assignment == batch.assignment
-                    && (twin.purpose, twin.exclusive) == (batch.purpose, batch.exclusive)
-                    && twin.worker != batch.worker
+        let matches = |other: &BatchId| {
+            state.batches.get(other).is_some_and(|other| {
+                other.duplicates.iter().filter(|of| **of == id).count() == 1
+                    && other.duplicates.len() == batch.duplicates.len()
+                    && (other.assignment, other.purpose) == (batch.assignment, batch.purpose)
+                    && other.worker != batch.worker
             })
         };
-        if !batch.twins.iter().all(matches) || batch.twins.len() >= COPIES_MAX {
-            return Err(Insane::Twin(id));
+        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= DUPLICATES_MAX {
+            return Err(Insane::Duplicates(id));
         }
-        let round = batch.assignment.round;
+        let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.round == round);
-        let ahead = job.is_some_and(|job| job.ahead.evaluations.iter().any(|it| it.round == round));
-        if asked_for == ahead || batch.ahead != ahead {
+        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.attempt == attempt);
+        let speculative = job
+            .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
+        if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {
             return Err(Insane::Stray(id));
         }
     }
@@ -253,7 +246,7 @@ fn check_batches(state: &State) -> Result<(), Insane> {
 /// Every index is in exactly one place.
 fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let mut places: Vec<u32> =
-        evaluation.slots.iter().map(|slot| u32::from(slot.is_some())).collect();
+        evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
     if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
         return Err(Insane::Filled(job));
     }
@@ -263,7 +256,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()
-        .filter(|batch| is_of(batch, job, evaluation) && batch.purpose == Purpose::Fill)
+        .filter(|batch| is_of(batch, job, evaluation) && batch.purpose.fills())
         .map(|batch| (batch.assignment.indices.first, batch.assignment.indices.count))
         .collect();
     for (first, count) in queued.chain(quarantine).chain(out) {

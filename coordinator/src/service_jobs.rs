@@ -23,7 +23,7 @@ use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
-use crate::access_layer::Holder;
+use crate::access::Holder;
 use crate::backing_up;
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
@@ -273,10 +273,10 @@ impl Jobs for JobsService {
         &self,
         _: Request<ListExpelledRequest>,
     ) -> Result<Response<ListExpelledResponse>, Status> {
-        let Answer::Expelled(expelled) = self.ask(event::Request::Expelled).await? else {
+        let Answer::Banned(banned) = self.ask(event::Request::Banned).await? else {
             return Err(unexpected());
         };
-        let workers = expelled.into_iter().map(|(record, elapsed)| ExpelledWorker {
+        let workers = banned.into_iter().map(|(record, elapsed)| ExpelledWorker {
             host: record.worker.host().to_owned(),
             process: record.worker.process(),
             job: record.job.to_string(),

@@ -1,60 +1,27 @@
-//! The service of workers: bytes of a stream into events, effects into bytes.
+//! The service of workers: bytes of a stream into events.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use futures::{Stream, StreamExt as _};
-use osteon_proto::batch::{self, Work};
+use osteon_proto::batch;
 use osteon_proto::malformed::Malformed;
-use osteon_proto::status::resource_exhausted;
 use osteon_proto::v1::attach_request::Message as Request;
-use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::workers_server::Workers;
-use osteon_proto::v1::{
-    AttachRequest, AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerHello, WorkerWelcome,
-};
-use tokio::sync::{mpsc, oneshot};
+use osteon_proto::v1::{AttachRequest, AttachResponse, Heartbeat, WorkerHello};
+use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::{Code, Status, Streaming};
+use tonic::{Status, Streaming};
 
-use crate::config::Config;
+use crate::close_reason::CloseReason;
 use crate::core_task::Message;
-use crate::effect::CloseReason;
 use crate::event::{Event, Hello};
-use crate::ids::{BatchId, LeaseId, WorkerId};
+use crate::ids::{BatchId, WorkerId};
+use crate::outbound::{OUTBOUND_MAX, Outbound, Outgoing};
 
-/// Messages to one worker that may wait: its batches, their revocations, signs of life.
-const OUTBOUND_MAX: usize = 64;
-/// When a worker that finds no place may try again.
-const RETRY: Duration = Duration::from_secs(30);
 /// A new stream must say hello within this time.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// What goes to a worker.
-type Outgoing = Result<AttachResponse, Status>;
-
-/// Where messages to one worker go. Its stream ends when this is dropped, be it ever so full.
-#[derive(Debug)]
-pub(crate) struct Outbound {
-    messages: mpsc::Sender<Outgoing>,
-    /// Never sent on: its end is the message.
-    _open: oneshot::Sender<()>,
-}
-
-impl Outbound {
-    /// Queues a message.
-    ///
-    /// # Errors
-    /// When the queue is full or the worker is gone.
-    pub(crate) fn send(&self, message: Outgoing) -> Result<(), NotReading> {
-        self.messages.try_send(message).map_err(|_| NotReading)
-    }
-}
-
-/// A worker takes no message.
-#[derive(Debug)]
-pub(crate) struct NotReading;
 
 /// The service of workers.
 pub(crate) struct WorkersService {
@@ -89,8 +56,7 @@ fn attach(
 ) -> ReceiverStream<Outgoing> {
     let (outgoing, stream) = mpsc::channel(OUTBOUND_MAX);
     tokio::spawn(async move {
-        let (open, closed) = oneshot::channel();
-        let outbound = Outbound { messages: outgoing.clone(), _open: open };
+        let (outbound, closed) = Outbound::new(outgoing.clone());
         tokio::select! {
             () = forward(worker, incoming, &messages, outbound) => {}
             // The coordinator has dropped the other end: it closed the stream.
@@ -148,7 +114,7 @@ async fn forward(
 
 fn introduce(hello: WorkerHello) -> Hello {
     let WorkerHello { version, fingerprint, threads, host, process, instance } = hello;
-    Hello { version, fingerprint, threads, host, process, instance }
+    Hello { version, fingerprint, slots: threads, host, process, instance }
 }
 
 fn event(worker: WorkerId, message: AttachRequest) -> Event {
@@ -172,65 +138,12 @@ fn event(worker: WorkerId, message: AttachRequest) -> Event {
     }
 }
 
-/// The first message to an attached worker.
-pub(crate) fn welcome(worker: WorkerId, lease: LeaseId, config: &Config) -> AttachResponse {
-    respond(Response::Welcome(WorkerWelcome {
-        worker: worker.0,
-        lease: lease.0,
-        heartbeat_s: config.heartbeat.as_secs_f64(),
-        expiry_s: config.expiry.as_secs_f64(),
-    }))
-}
-
-/// A batch for a worker.
-pub(crate) fn batch(id: BatchId, work: &Work) -> AttachResponse {
-    respond(Response::Batch(batch::to_message(id.0, work)))
-}
-
-/// A batch that a worker is to forget.
-pub(crate) fn revoke(batch: BatchId) -> AttachResponse {
-    respond(Response::Revoke(BatchRevoke { batch: batch.0 }))
-}
-
-/// The wish that a worker leaves when it has answered what it holds.
-pub(crate) fn drain() -> AttachResponse {
-    respond(Response::Drain(WorkerDrain {}))
-}
-
-/// A sign of life.
-pub(crate) fn heartbeat() -> AttachResponse {
-    respond(Response::Heartbeat(Heartbeat {}))
-}
-
-/// The status that ends a worker's stream.
-pub(crate) fn status(reason: &CloseReason) -> Status {
-    let code = match reason {
-        CloseReason::FingerprintDiffers { .. } => Code::FailedPrecondition,
-        CloseReason::Threads { .. }
-        | CloseReason::NameTooLong { .. }
-        | CloseReason::Malformed(_)
-        | CloseReason::WrongCount { .. }
-        | CloseReason::SecondHello => Code::InvalidArgument,
-        CloseReason::Expelled { .. } => Code::PermissionDenied,
-        CloseReason::TooManyWorkers { .. } => {
-            return resource_exhausted(reason.to_string(), RETRY);
-        }
-        CloseReason::Expired { .. } | CloseReason::Unanswering { .. } | CloseReason::NotReading => {
-            Code::Aborted
-        }
-        CloseReason::Drained => Code::Ok,
-        CloseReason::Draining => Code::Unavailable,
-    };
-    Status::new(code, reason.to_string())
-}
-
-fn respond(message: Response) -> AttachResponse {
-    AttachResponse { message: Some(message) }
-}
-
 #[cfg(test)]
 mod tests {
+    use tonic::Code;
+
     use super::*;
+    use crate::outbound::{heartbeat, status};
 
     /// A worker that says hello, then neither speaks nor reads.
     async fn attached() -> (Outbound, mpsc::Receiver<Message>, ReceiverStream<Outgoing>) {

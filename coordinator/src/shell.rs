@@ -106,7 +106,7 @@ pub async fn start(
     tracing::info!(
         unfinished_jobs = restored.unfinished(),
         ended_jobs = restored.ended(),
-        expelled_workers = restored.expelled(),
+        expelled_workers = restored.banned(),
         "jobs recovered from the store"
     );
     let (state, effects) = State::restore(config, restored, clock.now());

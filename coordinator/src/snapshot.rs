@@ -6,8 +6,10 @@ use osteon_proto::choice::{JOB_FAILURE, JOB_KIND, JOB_STATUS};
 use osteon_proto::timestamp;
 use osteon_proto::v1::{JobSnapshot, JobState};
 
+use crate::batch::Purpose;
 use crate::ids::JobId;
-use crate::state::{EndedJob, Job, LostInARow, Stage, State};
+use crate::job::{EndedJob, Job, Stage};
+use crate::state::{LostInARow, State};
 
 /// Without an answer for this long, a snapshot says what is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -39,7 +41,7 @@ pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot>
     match &job.stage {
         Stage::Accepting => return None,
         Stage::Waiting => snapshot.set_state(JobState::Waiting),
-        Stage::Rereading { .. } => snapshot.set_state(JobState::Running),
+        Stage::Replaying { .. } => snapshot.set_state(JobState::Running),
         Stage::Computing(evaluation) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
@@ -106,7 +108,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(trouble) = &job.trouble {
         let does = match job.stage {
-            Stage::Rereading { .. } => "give",
+            Stage::Replaying { .. } => "give",
             _ => "take",
         };
         return format!(
@@ -130,7 +132,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
             state.waiting.len(),
             since(job.progressed)
         ),
-        Stage::Rereading { .. } => format!(
+        Stage::Replaying { .. } => format!(
             "its stored evaluations, {} of {} are read again",
             job.search.evaluations(),
             job.stored
@@ -141,9 +143,12 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::Computing(evaluation) if !evaluation.disputes.is_empty() => {
             let begun = evaluation.disputes.iter().map(|dispute| dispute.since).min();
             let what = "a third worker, which decides between two whose answers differ";
-            let judges = evaluation.disputes.iter().flat_map(|dispute| &dispute.judges);
-            let asked =
-                judges.filter_map(|judge| state.batches.get(judge)?.worker_in(state)).next();
+            let tie_breakers = evaluation.disputes.iter().flat_map(|dispute| &dispute.tie_breakers);
+            let asked = tie_breakers
+                .filter_map(|tie_breaker| {
+                    state.workers.get(&state.batches.get(tie_breaker)?.worker)
+                })
+                .next();
             let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
             format!("{what} {}{asked}", since(begun.unwrap_or(now)))
         }
@@ -160,12 +165,11 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
 
 /// The answer that a job waits for longest, in words.
 fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -> Option<String> {
-    let of_job = state
-        .batches
-        .iter()
-        .filter(|(_, batch)| batch.assignment.job == job.record.job && !batch.ahead);
+    let of_job = state.batches.iter().filter(|(_, batch)| {
+        batch.assignment.job == job.record.job && batch.purpose != Purpose::Speculative
+    });
     let (id, batch) = of_job.min_by_key(|(_, batch)| batch.sent)?;
-    let others = batch.twins.len();
+    let others = batch.duplicates.len();
     let instead = match others {
         0 if !state.overdue.contains(id) => String::new(),
         0 if job.pace.is_known() => {
@@ -176,7 +180,7 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
         1 => "; another worker computes the same".to_owned(),
         _ => format!("; {others} others compute the same"),
     };
-    let (name, count) = (&batch.worker_in(state)?.name, batch.assignment.indices.count);
+    let (name, count) = (&state.workers.get(&batch.worker)?.name, batch.assignment.indices.count);
     Some(format!("the answer of {name} to {count} realizations {}{instead}", since(batch.sent)))
 }
 

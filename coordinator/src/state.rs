@@ -6,24 +6,20 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::WORKERS_MAX;
-use osteon_common::parameters::Point;
 use osteon_proto::batch::Work;
-use osteon_proto::specification;
-use osteon_search::Search;
-use prost::Message as _;
 
+use crate::batch::{Assignment, Batch, Purpose};
 use crate::config::Config;
-use crate::evaluation::{Evaluation, Indices};
+use crate::evaluation::Evaluation;
 use crate::event::Hello;
 use crate::fairness::Shares;
-use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::ids::{BatchId, JobId, LeaseId, WorkerId};
+use crate::job::{EndedJob, Job, RequestName, Stage};
 use crate::notice::Departure;
-use crate::pace::Pace;
 use crate::probation::Probation;
 use crate::rate::Rate;
-use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord};
+use crate::store::BanRecord;
 use crate::worker_name::WorkerName;
 
 /// Batches that a worker holds at a time: it computes one while the next is on its way.
@@ -70,7 +66,7 @@ pub struct State {
     /// Workers that went last, the newest at the end, at most [`DEPARTED_MAX`].
     pub(crate) departed: VecDeque<Departed>,
     /// Workers that compute wrongly, in the order in which they were found.
-    pub(crate) expelled: Vec<Expelled>,
+    pub(crate) banned: Vec<Banned>,
     /// How many workers of a host were lost in a row with what they held, none answering anything
     /// in between.
     pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
@@ -79,140 +75,25 @@ pub struct State {
     /// Since when there has been no worker; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
-    /// Batches that idle workers may have copies of, in the order they were sent.
-    pub(crate) copyable: BTreeSet<BatchId>,
-    /// Batches that are overdue and wait for another worker that computes the same; of copies the
+    /// Batches that are overdue and wait for another worker that computes the same; of duplicates the
     /// newest.
     pub(crate) overdue: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
-    pub(crate) next_round: u64,
+    pub(crate) next_attempt: u64,
     pub(crate) draining: bool,
-}
-
-/// A job that has not ended.
-#[derive(Debug)]
-pub(crate) struct Job {
-    pub(crate) record: JobRecord,
-    /// Digest of its specification: of two submissions of one request.
-    pub(crate) identity: Identity,
-    pub(crate) stage: Stage,
-    pub(crate) search: Search,
-    /// What is computed before the search asks for it.
-    pub(crate) ahead: Ahead,
-    /// How many evaluations the store has of it; those that the search was not told are read
-    /// before it goes on.
-    pub(crate) stored: u64,
-    /// Everybody whose answers are in evaluations that the search was told.
-    pub(crate) workers: BTreeSet<WorkerName>,
-    /// What it was told is to be read again, when what is being stored is stored.
-    pub(crate) rewind: bool,
-    /// An evaluation was damaged in the store, and computed again.
-    pub(crate) mended: bool,
-    /// A client wants it ended as soon as what is being stored is stored.
-    pub(crate) cancelled: bool,
-    pub(crate) rate: Rate,
-    /// How long its realizations take.
-    pub(crate) pace: Pace,
-    /// The newest copy of an overdue batch of it.
-    pub(crate) scout: Option<BatchId>,
-    /// Sequence number of its last snapshot that was published.
-    pub(crate) sequence: u64,
-    /// When it last got an answer, or began, or was accepted.
-    pub(crate) progressed: Duration,
-    /// Requests that are answered when the present record is durable: submissions at first,
-    /// cancellations at the end.
-    pub(crate) tokens: Vec<Token>,
-    /// The store's refusal of the present record.
-    pub(crate) trouble: Option<Trouble>,
-}
-
-/// Points that a search may ask for next. Nothing of them is stored or shown.
-#[derive(Debug, Default)]
-pub(crate) struct Ahead {
-    /// The points, the likeliest first.
-    pub(crate) likely: Vec<Point>,
-    /// The evaluations that are begun of them, in the order of their beginning.
-    pub(crate) evaluations: Vec<Evaluation>,
-}
-
-/// How far a job is.
-#[derive(Debug)]
-pub(crate) enum Stage {
-    /// Its record is being stored; no client has heard of it.
-    Accepting,
-    /// It waits for its turn.
-    Waiting,
-    /// A stored evaluation is being read for its search.
-    Rereading {
-        /// The store was asked for it.
-        asked: bool,
-    },
-    /// Its evaluation is handed out.
-    Computing(Evaluation),
-    /// A complete evaluation is being stored.
-    Storing {
-        /// The evaluation.
-        record: EvaluationRecord,
-        /// Those after it in the store belong to another path.
-        is_last: bool,
-    },
-    /// Its end is being stored.
-    Finishing(EndRecord),
-}
-
-/// Names the request that submitted a job: ids of different clients have nothing in common.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct RequestName {
-    client: String,
-    id: String,
-}
-
-/// Digest of a specification.
-pub(crate) type Identity = [u8; 32];
-
-/// A job whose end is durable: what a list shows of it.
-#[derive(Debug)]
-pub(crate) struct EndedJob {
-    pub(crate) request: Option<RequestName>,
-    pub(crate) identity: Identity,
-    pub(crate) kind: JobKind,
-    /// Who submitted it.
-    pub(crate) client: String,
-    /// What people call it; may be empty.
-    pub(crate) name: String,
-    /// Its rank among the jobs of its client.
-    pub(crate) priority: u32,
-    pub(crate) max_evaluations: u64,
-    /// Realizations of each evaluation.
-    pub(crate) realizations: u64,
-    /// When it was accepted, since the Unix epoch.
-    pub(crate) accepted: Duration,
-    /// Sequence number of its last snapshot.
-    pub(crate) sequence: u64,
-    pub(crate) end: EndRecord,
 }
 
 /// A worker that computes wrongly: refused for the life of the coordinator.
 #[derive(Debug)]
-pub(crate) struct Expelled {
-    pub(crate) record: ExpulsionRecord,
+pub(crate) struct Banned {
+    pub(crate) record: BanRecord,
     /// When its record is written again; `None` once it is durable. Until then no job reads its
     /// stored evaluations: after a crash nobody would know which of them are wrong.
     pub(crate) store_at: Option<Duration>,
     /// The store refused it, and it is not on its way again.
     pub(crate) refused: bool,
-}
-
-/// A refusal of the store.
-#[derive(Debug)]
-pub(crate) struct Trouble {
-    pub(crate) since: Duration,
-    pub(crate) retry_at: Duration,
-    pub(crate) error: String,
-    /// It is on its way again.
-    pub(crate) on_its_way: bool,
 }
 
 /// Workers of one host.
@@ -245,15 +126,15 @@ pub(crate) struct Worker {
     /// Since when it is there.
     pub(crate) attached: Duration,
     /// When its last message came.
-    pub(crate) heard: Duration,
+    pub(crate) last_seen: Duration,
     /// When its last answer came, or it attached.
     pub(crate) answered: Duration,
     /// It has answered something in this stay.
-    pub(crate) proven: bool,
+    pub(crate) has_answered: bool,
     /// Batches that others answered in its place, since its last answer to one that it held.
     pub(crate) missed: Missed,
     /// When the last sign of life was given to it.
-    pub(crate) beat: Duration,
+    pub(crate) heartbeat_sent: Duration,
     /// Batches it holds, in the order they were sent.
     pub(crate) in_flight: Vec<BatchId>,
     /// Batches it answered or was told to forget, newest last.
@@ -275,51 +156,6 @@ pub(crate) struct Missed {
     pub(crate) since: Duration,
 }
 
-/// What a batch is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Assignment {
-    pub(crate) job: JobId,
-    /// Attempt at an evaluation.
-    pub(crate) round: u64,
-    pub(crate) indices: Indices,
-}
-
-/// What a batch is computed for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Purpose {
-    /// To fill slots.
-    Fill,
-    /// To be compared with the answer of another worker.
-    Audit {
-        /// Workers that were lost over it.
-        lost: u32,
-    },
-    /// To decide between answers that differ.
-    Judge,
-}
-
-/// A batch that a worker holds.
-#[derive(Debug)]
-pub(crate) struct Batch {
-    pub(crate) assignment: Assignment,
-    pub(crate) purpose: Purpose,
-    pub(crate) worker: WorkerId,
-    pub(crate) sent: Duration,
-    /// When its worker could begin it: when it was sent, or when the worker answered what it had
-    /// been sent before.
-    pub(crate) begun: Duration,
-    /// Computing time that its client was charged for it.
-    pub(crate) charged: Duration,
-    /// The other batches with the same indices and purpose, when there are copies.
-    pub(crate) twins: Vec<BatchId>,
-    /// How many of them were sent before it because those before them were overdue.
-    pub(crate) retries: u32,
-    /// A suspect: its worker holds nothing else, and it is not copied unless it is overdue.
-    pub(crate) exclusive: bool,
-    /// Of a point that the search has not asked for.
-    pub(crate) ahead: bool,
-}
-
 impl State {
     /// A coordinator that knows no job, as of `now`.
     pub fn new(config: Config, now: Duration) -> Self {
@@ -339,17 +175,16 @@ impl State {
             pruned: None,
             workers: BTreeMap::new(),
             departed: VecDeque::new(),
-            expelled: Vec::new(),
+            banned: Vec::new(),
             lost_in_a_row: BTreeMap::new(),
             probation: Probation::default(),
             no_worker_since: now,
             batches: BTreeMap::new(),
-            copyable: BTreeSet::new(),
             overdue: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
-            next_round: 1,
+            next_attempt: 1,
             draining: false,
         }
     }
@@ -366,17 +201,16 @@ impl State {
 
     /// Records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
-        let on_its_way = |expelled: &&Expelled| expelled.store_at.is_some() && !expelled.refused;
-        let expelled = self.expelled.iter().filter(on_its_way).count();
+        let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
+        let banned = self.banned.iter().filter(on_its_way).count();
         let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
-        jobs.count() + expelled
+        jobs.count() + banned
     }
 
     /// The work of an assignment, while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
-        let job = self.jobs.get(&assignment.job)?;
-        let evaluation = job.evaluations().find(|it| it.round == assignment.round)?;
-        let specification = &job.record.specification;
+        let evaluation = self.evaluation_of(assignment)?;
+        let specification = &self.jobs.get(&assignment.job)?.record.specification;
         Some(Work {
             setup: specification.setup,
             point: evaluation.point,
@@ -395,21 +229,32 @@ impl State {
     }
 
     /// The evaluation that a batch is about, while this attempt at it is under way.
-    pub(crate) fn attempt_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
+    pub(crate) fn evaluation_of(&self, assignment: &Assignment) -> Option<&Evaluation> {
+        let job = self.jobs.get(&assignment.job)?;
+        job.evaluations().find(|found| found.attempt == assignment.attempt)
+    }
+
+    /// As [`State::evaluation_of`].
+    pub(crate) fn evaluation_of_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
         let job = self.jobs.get_mut(&assignment.job)?;
-        job.evaluations_mut().find(|found| found.round == assignment.round)
+        job.evaluations_mut().find(|found| found.attempt == assignment.attempt)
     }
 
     /// A number for the next attempt at an evaluation.
-    pub(crate) fn round(&mut self) -> u64 {
-        self.next_round += 1;
-        self.next_round - 1
+    pub(crate) fn new_attempt(&mut self) -> u64 {
+        self.next_attempt += 1;
+        self.next_attempt - 1
     }
 
-    /// The expulsion of a worker, if it was expelled.
-    pub(crate) fn expulsion(&self, name: &WorkerName) -> Option<&ExpulsionRecord> {
-        let found = self.expelled.iter().find(|expelled| expelled.record.worker == *name);
-        found.map(|expelled| &expelled.record)
+    /// The ban of a worker, if it was banned.
+    pub(crate) fn ban(&self, name: &WorkerName) -> Option<&BanRecord> {
+        let found = self.banned.iter().find(|banned| banned.record.worker == *name);
+        found.map(|banned| &banned.record)
+    }
+
+    /// Whether the ban of a worker is not durable yet.
+    pub(crate) fn ban_pending(&self) -> bool {
+        self.banned.iter().any(|banned| banned.store_at.is_some())
     }
 
     /// Whether the workers of a host are lost over whatever they hold.
@@ -418,9 +263,9 @@ impl State {
     }
 
     /// A worker of a host has answered.
-    pub(crate) fn prove(&mut self, worker: WorkerId) {
+    pub(crate) fn note_answer(&mut self, worker: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&worker) {
-            worker.proven = true;
+            worker.has_answered = true;
             self.lost_in_a_row.remove(worker.name.host());
         }
     }
@@ -453,18 +298,28 @@ impl State {
         !self.draining && self.workers.values().any(answers)
     }
 
+    /// The batches that a worker holds for one purpose.
+    pub(crate) fn held_for<'a>(
+        &'a self,
+        worker: &'a Worker,
+        purpose: Purpose,
+    ) -> impl Iterator<Item = BatchId> + 'a {
+        let is_for =
+            move |id: &BatchId| self.batches.get(id).is_some_and(|it| it.purpose == purpose);
+        worker.in_flight.iter().copied().filter(is_for)
+    }
+
     /// Forgets a batch, and remembers with its worker what it was about.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
-        self.copyable.remove(&batch);
         self.overdue.remove(&batch);
-        if let Some(evaluation) = self.attempt_mut(&settled.assignment) {
+        if let Some(evaluation) = self.evaluation_of_mut(&settled.assignment) {
             match settled.purpose {
-                Purpose::Fill => {}
+                Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
                 Purpose::Audit { .. } => evaluation.audits_out -= 1,
-                Purpose::Judge => {
+                Purpose::TieBreak => {
                     for dispute in &mut evaluation.disputes {
-                        dispute.judges.retain(|judge| *judge != batch);
+                        dispute.tie_breakers.retain(|tie_breaker| *tie_breaker != batch);
                     }
                 }
             }
@@ -476,124 +331,11 @@ impl State {
                 worker.settled.pop_front();
             }
         }
-        for id in &settled.twins {
-            if let Some(twin) = self.batches.get_mut(id) {
-                twin.twins.retain(|other| *other != batch);
-                if twin.is_copyable() {
-                    self.copyable.insert(*id);
-                }
+        for duplicate in &settled.duplicates {
+            if let Some(duplicate) = self.batches.get_mut(duplicate) {
+                duplicate.duplicates.retain(|other| *other != batch);
             }
         }
         Some(settled)
-    }
-}
-
-impl Job {
-    /// A job of which nothing is computed here yet, with so many stored evaluations.
-    pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
-        Self {
-            identity: identity(&record.specification),
-            search: Search::new(record.specification.clone()),
-            ahead: Ahead::default(),
-            record,
-            stage,
-            stored,
-            workers: BTreeSet::new(),
-            rewind: false,
-            mended: false,
-            cancelled: false,
-            rate: Rate::default(),
-            pace: Pace::default(),
-            scout: None,
-            sequence: sequence(0, now),
-            progressed: now,
-            tokens: Vec::new(),
-            trouble: None,
-        }
-    }
-
-    /// The evaluation that the search asked for, while it is under way.
-    pub(crate) fn evaluation(&self) -> Option<&Evaluation> {
-        match &self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        }
-    }
-
-    /// All evaluations under way, that which the search asked for first.
-    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
-        self.evaluation().into_iter().chain(&self.ahead.evaluations)
-    }
-
-    /// As [`Job::evaluations`].
-    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut Evaluation> {
-        let asked_for = match &mut self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        };
-        asked_for.into_iter().chain(&mut self.ahead.evaluations)
-    }
-}
-
-impl Batch {
-    /// The worker that holds it.
-    pub(crate) fn worker_in<'a>(&self, state: &'a State) -> Option<&'a Worker> {
-        state.workers.get(&self.worker)
-    }
-
-    /// Whether an idle worker may have a copy of it before it is overdue.
-    pub(crate) fn is_copyable(&self) -> bool {
-        self.purpose == Purpose::Fill && self.twins.is_empty() && !self.exclusive && !self.ahead
-    }
-}
-
-impl EndedJob {
-    /// What is kept of a job that ended, after a snapshot with number `sequence`.
-    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
-        let specification = &record.specification;
-        Self {
-            request: RequestName::of(record),
-            identity: identity(specification),
-            kind: specification.kind,
-            client: record.client.clone(),
-            name: record.name.clone(),
-            priority: record.priority,
-            max_evaluations: specification.evaluations_max(),
-            realizations: specification.monte_carlo.realizations,
-            accepted: record.accepted,
-            sequence: self::sequence(sequence, end.ended),
-            end,
-        }
-    }
-}
-
-impl RequestName {
-    /// The request `id` of `client`; `None` without an id: then it is never repeated.
-    pub(crate) fn new(client: &str, id: &str) -> Option<Self> {
-        (!id.is_empty()).then(|| Self { client: client.to_owned(), id: id.to_owned() })
-    }
-
-    /// That which submitted a job.
-    pub(crate) fn of(record: &JobRecord) -> Option<Self> {
-        Self::new(&record.client, &record.request_id)
-    }
-}
-
-/// Number of a snapshot at `now` after one with number `last`: it grows, and since it follows the
-/// clock it grows over restarts too.
-pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
-    u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
-}
-
-/// Digest of a specification: equal for equal ones only.
-pub(crate) fn identity(specification: &JobSpecification) -> Identity {
-    let encoded = specification::to_message(specification).encode_to_vec();
-    *blake3::hash(&encoded).as_bytes()
-}
-
-impl Stage {
-    /// Whether a record of the job is not durable yet.
-    pub(crate) fn is_storing(&self) -> bool {
-        matches!(self, Self::Accepting | Self::Storing { .. } | Self::Finishing(_))
     }
 }

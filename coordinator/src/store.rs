@@ -65,8 +65,8 @@ pub struct EvaluationRecord {
 
 /// A worker that was found to compute wrongly.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ExpulsionRecord {
-    /// Number of the expulsion, from 1.
+pub struct BanRecord {
+    /// Number of the ban, from 1.
     pub number: u64,
     /// The worker.
     pub worker: WorkerName,
@@ -368,9 +368,9 @@ pub enum DamagedRecord {
     /// What its path came to.
     #[error("the summary")]
     Summary,
-    /// An expulsion of a worker that was found in it.
+    /// A ban of a worker that was found in it.
     #[error("the expulsion of a worker, found in a realization")]
-    Expulsion,
+    Ban,
 }
 
 /// What is done between two pieces of a copy; `Break` ends it.
@@ -472,17 +472,17 @@ pub trait Store {
     /// When the store cannot be read.
     fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError>;
 
-    /// Makes durable that a worker is expelled.
+    /// Makes durable that a worker is banned.
     ///
     /// # Errors
     /// When that is not durable.
-    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError>;
+    fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError>;
 
-    /// All expelled workers, in the order of their numbers.
+    /// All banned workers, in the order of their numbers.
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError>;
+    fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError>;
 
     /// Ended jobs with evaluations that a worker contributed to.
     ///
@@ -490,9 +490,9 @@ pub trait Store {
     /// When the store cannot be read.
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
 
-    /// Forgets all expelled workers.
+    /// Forgets all banned workers.
     ///
     /// # Errors
     /// When that is not durable.
-    fn forget_expulsions(&mut self) -> Result<(), StoreError>;
+    fn forget_bans(&mut self) -> Result<(), StoreError>;
 }

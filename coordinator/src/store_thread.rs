@@ -15,7 +15,7 @@ use crate::event::{Event, Unread};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
 use crate::leftover::Reading;
-use crate::store::{ExpulsionRecord, Store, StoreError};
+use crate::store::{BanRecord, Store, StoreError};
 
 /// Commands that may wait: a record for every job, and some readers.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
@@ -165,7 +165,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::End { end, summary } => store.finish_job(end, summary),
-        Record::Expulsion(record) => expel(store, record),
+        Record::Ban(record) => ban(store, record),
     };
     match done {
         Ok(()) => Event::Stored { job, key },
@@ -176,9 +176,9 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
     }
 }
 
-/// Stores an expulsion, and says whose results can no longer be relied on.
-fn expel(store: &mut dyn Store, record: &ExpulsionRecord) -> Result<(), StoreError> {
-    store.put_expulsion(record)?;
+/// Stores a ban, and says whose results can no longer be relied on.
+fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
+    store.put_ban(record)?;
     // The log is a service: what it fails to say does not undo what is stored.
     let ended = store.ended_with(&record.worker).unwrap_or_default();
     if !ended.is_empty() {

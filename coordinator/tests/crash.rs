@@ -100,7 +100,7 @@ fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
             assert!(live_with(directory.path(), &specification, None, Crew::WITH_LIAR));
         }
         let mut store = SqliteStore::open(directory.path()).unwrap();
-        let found = !store.expulsions().unwrap().is_empty();
+        let found = !store.bans().unwrap().is_empty();
         drop(store);
         (ended, found, result(directory.path()) == expected)
     };
@@ -108,9 +108,9 @@ fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
     let mut found = 0;
     for write in 1.. {
         for death in [Death::Before(write), Death::After(write)] {
-            let (ended, expelled, right) = lives(Some(death));
-            assert!(right || !expelled, "{death:?}");
-            found += u32::from(expelled && !ended);
+            let (ended, banned, right) = lives(Some(death));
+            assert!(right || !banned, "{death:?}");
+            found += u32::from(banned && !ended);
             if ended {
                 assert!(found > write, "{found} of {} times the lie was found", 2 * write);
                 return;

@@ -1,4 +1,4 @@
-//! A worker that computes wrongly, over real sockets: found out, expelled, and without a trace in
+//! A worker that computes wrongly, over real sockets: found out, banned, and without a trace in
 //! the result. Then the job is forgotten.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
@@ -88,9 +88,9 @@ async fn a_liar_leaves_no_trace_and_stays_out() {
     for process in 1..=3 {
         workers.push(tokio::spawn(work(channel(&coordinator).await, process)));
     }
-    let expelled = workers.remove(LIAR as usize - 1);
-    let expelled = tokio::time::timeout(TIMEOUT, expelled).await.unwrap().unwrap().unwrap_err();
-    assert_eq!(expelled.code(), Code::PermissionDenied, "{expelled}");
+    let banned = workers.remove(LIAR as usize - 1);
+    let banned = tokio::time::timeout(TIMEOUT, banned).await.unwrap().unwrap().unwrap_err();
+    assert_eq!(banned.code(), Code::PermissionDenied, "{banned}");
     let again = work(channel(&coordinator).await, LIAR).await.unwrap_err();
     assert_eq!(again.code(), Code::PermissionDenied, "{again}");
 

@@ -13,7 +13,7 @@ use osteon_coordinator::ids::JobId;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
-    EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use osteon_coordinator::worker_name::WorkerName;
 use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
@@ -327,20 +327,20 @@ impl Store for BrokenStore {
         self.sound.last_forgotten()
     }
 
-    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
-        self.sound.put_expulsion(record)
+    fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
+        self.sound.put_ban(record)
     }
 
-    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        self.sound.expulsions()
+    fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
+        self.sound.bans()
     }
 
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
         self.sound.ended_with(worker)
     }
 
-    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
-        self.sound.forget_expulsions()
+    fn forget_bans(&mut self) -> Result<(), StoreError> {
+        self.sound.forget_bans()
     }
 }
 

@@ -54,14 +54,14 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
         ] {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }
-        let world::Counts { stops, cancelled, outages, expelled, pruned, lies, .. } = seen;
+        let world::Counts { stops, cancelled, outages, banned, pruned, lies, .. } = seen;
         let world::Counts { bad_deaths, pauses, damaged, .. } = seen;
         for (name, count) in [
             ("clean stops", stops),
             ("jobs cancelled", cancelled),
             ("outages of the store", outages),
             ("wrong answers", lies),
-            ("workers expelled", expelled),
+            ("workers expelled", banned),
             ("jobs forgotten", pruned),
             ("deaths on a bad node", bad_deaths),
             ("pauses of the coordinator", pauses),

@@ -1,4 +1,4 @@
-//! Realizations on the cores of this worker.
+//! The cores of this worker as a [`Backend`].
 //!
 //! Realization i of a batch is drawn by [`Ensemble`] from (point, germs, i), and solved by
 //! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or what was
@@ -6,7 +6,7 @@
 //! from which nothing can be drawn, is the failure `not_finite` of each realization concerned.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,8 +19,8 @@ use osteon_proto::batch::Work;
 use osteon_solver::{Isa, Solver, Workspace};
 use rayon::prelude::*;
 
+use crate::backend::{Backend, Computed, Done, Task};
 use crate::error::{PanickedCase, WorkerError};
-use crate::state::Computed;
 
 /// Most solvers, each with up to 20 MB of tables, that a worker keeps. Where the jobs that take turns
 /// have more setups than that, tables are made again, which is a small part of a batch's time.
@@ -36,15 +36,17 @@ thread_local! {
 pub(crate) struct Cores {
     pool: rayon::ThreadPool,
     solvers: Arc<Solvers>,
+    /// Batches that somebody waits for, and how to stop them.
+    stops: BTreeMap<Task, StopFlag>,
 }
 
 /// Tells a computation to stop; looked at between realizations.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct StopFlag(Arc<AtomicBool>);
+struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
     /// Stops the computation.
-    pub(crate) fn raise(&self) {
+    fn raise(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
@@ -64,17 +66,19 @@ impl Cores {
             .thread_name(|index| format!("realizations-{index}"))
             .build()
             .map_err(|source| WorkerError::Pool { threads, source })?;
-        Ok(Self { pool, solvers: Arc::new(Solvers::new(isa)) })
+        Ok(Self { pool, solvers: Arc::new(Solvers::new(isa)), stops: BTreeMap::new() })
+    }
+}
+
+impl Backend for Cores {
+    fn slots(&self) -> u32 {
+        // Made from a `u32`.
+        u32::try_from(self.pool.current_num_threads()).unwrap_or(u32::MAX)
     }
 
-    /// Computes `work` on the pool and hands the end of it to `done`, on a thread of the pool.
-    /// Batches begin in the order of the calls.
-    pub(crate) fn start(
-        &self,
-        work: Work,
-        stop: StopFlag,
-        done: impl FnOnce(Computed) + Send + 'static,
-    ) {
+    fn start(&mut self, task: Task, work: Work, done: Done) {
+        let stop = StopFlag::default();
+        self.stops.insert(task, stop.clone());
         let solvers = Arc::clone(&self.solvers);
         self.pool.spawn_fifo(move || {
             let start = Instant::now();
@@ -88,6 +92,12 @@ impl Cores {
                 }
             });
         });
+    }
+
+    fn forget(&mut self, task: Task) {
+        if let Some(stop) = self.stops.remove(&task) {
+            stop.raise();
+        }
     }
 }
 

@@ -1,6 +1,5 @@
-//! The one async file of the worker: moves bytes between coordinator, state and cores.
+//! The one async file of the worker: moves bytes between coordinator, state and backend.
 
-use std::collections::BTreeMap;
 use std::future::Future;
 use std::pin::{Pin, pin};
 use std::time::{Duration, Instant};
@@ -19,12 +18,11 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status, Streaming};
 use tracing::{info, trace, warn};
 
+use crate::backend::{Backend, Computed, Task};
 use crate::backoff::Backoff;
-use crate::compute::{Cores, StopFlag};
+use crate::compute::Cores;
 use crate::error::WorkerError;
-use crate::state::{
-    BATCHES_HELD_MAX, Computed, Detached, Effect, Event, Failure, Identity, State, Task,
-};
+use crate::state::{BATCHES_HELD_MAX, Detached, Effect, Event, Failure, Identity, State};
 
 /// Longest wait for a connection and for the answer to hello, s.
 const ATTACH_S_MAX: u64 = 10;
@@ -69,16 +67,25 @@ pub async fn run(
         instruction_set = config.isa.name(),
         "starting"
     );
+    let backend = Box::new(Cores::new(config.threads, config.isa)?);
+    run_on(backend, config, shutdown).await
+}
+
+/// As [`run`], on a device that is there already.
+async fn run_on(
+    backend: Box<dyn Backend>,
+    config: WorkerConfig,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), WorkerError> {
     let (finished_sender, finished) = mpsc::channel(BATCHES_HELD_MAX);
     let mut worker = Worker {
         state: State::new(Identity {
-            threads: config.threads,
+            slots: backend.slots(),
             host: host_name(),
             process: std::process::id(),
             instance: identity::random_number()?,
         }),
-        cores: Cores::new(config.threads, config.isa)?,
-        stops: BTreeMap::new(),
+        backend,
         finished_sender,
         finished,
         started: Instant::now(),
@@ -102,9 +109,7 @@ pub async fn run(
 
 struct Worker {
     state: State,
-    cores: Cores,
-    /// Computations that have not ended, and how to stop them.
-    stops: BTreeMap<Task, StopFlag>,
+    backend: Box<dyn Backend>,
     finished_sender: mpsc::Sender<(Task, Computed)>,
     finished: mpsc::Receiver<(Task, Computed)>,
     started: Instant,
@@ -232,7 +237,7 @@ impl Worker {
         outbox: Option<&mpsc::Sender<AttachRequest>>,
     ) -> Result<Option<End>, WorkerError> {
         if let Event::Computed(task, _) = &event {
-            self.stops.remove(task);
+            self.backend.forget(*task);
         }
         trace!(?event, "event");
         let mut end = None;
@@ -245,19 +250,14 @@ impl Worker {
                     }
                 }
                 Effect::Compute(task, work) => {
-                    let stop = StopFlag::default();
-                    self.stops.insert(task, stop.clone());
                     let sender = self.finished_sender.clone();
-                    self.cores.start(*work, stop, move |computed| {
+                    let done = move |computed| {
                         // Fails only when the worker has ended and nobody waits.
                         drop(sender.blocking_send((task, computed)));
-                    });
+                    };
+                    self.backend.start(task, *work, Box::new(done));
                 }
-                Effect::Abandon(task) => {
-                    if let Some(stop) = self.stops.get(&task) {
-                        stop.raise();
-                    }
-                }
+                Effect::Abandon(task) => self.backend.forget(task),
                 Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),
                 Effect::Leave => return Ok(Some(End::Left)),
                 Effect::Fail(failure) => return Err(self.failed(failure)),

@@ -5,7 +5,6 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::outcome::Solved;
 use osteon_common::version;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
@@ -13,6 +12,7 @@ use osteon_proto::v1;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 
+use crate::backend::{Computed, Task};
 use crate::error::PanickedCase;
 
 /// Most batches that a worker holds; a coordinator that sends more has lost count.
@@ -25,45 +25,14 @@ const SPAN_S: (f64, f64) = (0.01, 3600.0);
 /// Who this worker is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Identity {
-    /// Threads it computes on.
-    pub(crate) threads: u32,
+    /// Realizations that it computes at the same time.
+    pub(crate) slots: u32,
     /// Host name, for people.
     pub(crate) host: String,
     /// Process id, for people.
     pub(crate) process: u32,
     /// Tells this process from one with the same host name and process id, in another container.
     pub(crate) instance: u64,
-}
-
-/// One batch of one attachment. Batch numbers are unique for one life of a coordinator only, so
-/// an answer is told from a late one by the number of the attachment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Task {
-    /// Number of the attachment, grows with every one.
-    pub(crate) attachment: u64,
-    /// Number of the batch.
-    pub(crate) batch: u64,
-}
-
-/// How the computation of a batch ended.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Computed {
-    /// All realizations, in index order.
-    Complete {
-        /// The realizations.
-        solved: Vec<Solved>,
-        /// Wall time, s.
-        elapsed_s: f64,
-    },
-    /// Given up before its end, as was asked for.
-    Abandoned,
-    /// The solver panicked.
-    Panicked {
-        /// On this realization.
-        case: Box<PanickedCase>,
-        /// With this message.
-        message: String,
-    },
 }
 
 /// Everything that can happen to a worker.
@@ -169,7 +138,8 @@ impl State {
         Request::Hello(v1::WorkerHello {
             version: version::VERSION.to_owned(),
             fingerprint: version::fingerprint(),
-            threads: self.identity.threads,
+            // The field is named for the one kind of slots that there was at first.
+            threads: self.identity.slots,
             host: self.identity.host.clone(),
             process: self.identity.process,
             instance: self.identity.instance,

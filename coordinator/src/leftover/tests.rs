@@ -14,7 +14,8 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::*;
 use crate::effect::Record;
-use crate::event::{Event, RecordKey};
+use crate::effect::RecordKey;
+use crate::event::Event;
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, JobRecord};
 use crate::store_thread::{Command, serve};

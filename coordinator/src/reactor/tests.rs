@@ -11,12 +11,12 @@ use osteon_common::version;
 
 use super::*;
 use crate::config::Config;
-use crate::effect::{Answer, Record};
-use crate::event::{Hello, RecordKey, Request};
+use crate::effect::{Answer, Effect, Record, RecordKey};
+
+use crate::event::{Hello, Request};
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::sanity::sanity_check;
 
-mod ahead;
 mod checks;
 mod dispatch;
 mod fairness;
@@ -25,7 +25,8 @@ mod lost;
 mod notices;
 mod overdue;
 mod prune;
-mod reread;
+mod replay;
+mod speculation;
 mod workers;
 
 /// A minute.
@@ -170,7 +171,7 @@ fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
     let hello = Hello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
-        threads,
+        slots: threads,
         host: host.to_owned(),
         process,
         instance: 0,
@@ -212,7 +213,7 @@ fn described(effect: &Effect) -> String {
         Effect::Store(Record::Evaluation { record, .. }) => {
             format!("store job {} evaluation {}", record.job, record.number)
         }
-        Effect::Store(Record::Expulsion(record)) => {
+        Effect::Store(Record::Ban(record)) => {
             format!("store expulsion {}: {} {}", record.number, record.worker, record.reason)
         }
         Effect::Read { job, number } => format!("read job {job} evaluation {number}"),
@@ -242,7 +243,7 @@ fn answered(answer: &Answer) -> String {
         }
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
-        Answer::Expelled(expelled) => format!("expelled {}", expelled.len()),
+        Answer::Banned(banned) => format!("expelled {}", banned.len()),
         Answer::Workers(list) => {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }

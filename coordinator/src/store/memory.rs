@@ -5,9 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use osteon_search::Summary;
 
-use super::{
-    EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
-};
+use super::{BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
 use crate::ids::JobId;
 use crate::worker_name::WorkerName;
 
@@ -21,7 +19,7 @@ struct Content {
     last_forgotten: Option<JobId>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
     summaries: BTreeMap<JobId, Summary>,
-    expulsions: BTreeMap<u64, ExpulsionRecord>,
+    bans: BTreeMap<u64, BanRecord>,
 }
 
 impl MemoryStore {
@@ -113,13 +111,13 @@ impl Store for MemoryStore {
         Ok(self.content().last_forgotten)
     }
 
-    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
-        self.content().expulsions.insert(record.number, record.clone());
+    fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
+        self.content().bans.insert(record.number, record.clone());
         Ok(())
     }
 
-    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        Ok(self.content().expulsions.values().cloned().collect())
+    fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
+        Ok(self.content().bans.values().cloned().collect())
     }
 
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
@@ -130,8 +128,8 @@ impl Store for MemoryStore {
         Ok(jobs.into_iter().filter(ended).collect())
     }
 
-    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
-        self.content().expulsions.clear();
+    fn forget_bans(&mut self) -> Result<(), StoreError> {
+        self.content().bans.clear();
         Ok(())
     }
 }

@@ -18,8 +18,8 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    Between, DamagedRecord, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store,
-    StoreError, StoredJob,
+    BanRecord, Between, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError,
+    StoredJob,
 };
 use crate::ids::JobId;
 use crate::worker_name::WorkerName;
@@ -35,7 +35,7 @@ mod summary;
 pub use acknowledged::LostJobs;
 use acknowledged::Mark;
 use columns::{
-    JobColumns, end_checksum, evaluation, evaluation_checksum, expulsion_checksum, job_checksum,
+    JobColumns, ban_checksum, end_checksum, evaluation, evaluation_checksum, job_checksum,
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 
@@ -390,43 +390,43 @@ impl Store for &SqliteStore {
         Ok(u64::try_from(known).ok().filter(|known| *known > 0).map(JobId))
     }
 
-    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
-        let ExpulsionRecord { number, worker, job, reason, at } = record;
+    fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
+        let BanRecord { number, worker, job, reason, at } = record;
         let sql =
             "INSERT OR REPLACE INTO expulsion (number, host, process, instance, job, reason, at_ns,
                    checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
         let instance = worker.instance().cast_signed();
-        let checksum = expulsion_checksum(record);
+        let checksum = ban_checksum(record);
         let values = params![number, host, process, instance, job.0, reason, at, checksum];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
         Ok(())
     }
 
-    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
+    fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
         let sql =
             "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
                    ORDER BY number";
         let read = |row: &Row<'_>| {
             let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);
             let instance: i64 = row.get(7)?;
-            let record = ExpulsionRecord {
+            let record = BanRecord {
                 number: row.get(0)?,
                 worker: WorkerName::new(&host, row.get(2)?, instance.cast_unsigned()),
                 job: JobId(row.get(3)?),
                 reason: row.get(4)?,
                 at: Duration::from_nanos(row.get(5)?),
             };
-            Ok((checksum == expulsion_checksum(&record), record))
+            Ok((checksum == ban_checksum(&record), record))
         };
-        let run = || -> rusqlite::Result<Vec<(bool, ExpulsionRecord)>> {
+        let run = || -> rusqlite::Result<Vec<(bool, BanRecord)>> {
             self.connection.prepare(sql)?.query_map([], read)?.collect()
         };
         let rows = run().map_err(|source| self.refused(source))?;
         let checked = rows
             .into_iter()
             .map(|(intact, record)| intact.then_some(record.clone()).ok_or(record.job));
-        checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Expulsion))
+        checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Ban))
     }
 
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
@@ -442,13 +442,15 @@ impl Store for &SqliteStore {
         run().map_err(|source| self.refused(source))
     }
 
-    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
+    fn forget_bans(&mut self) -> Result<(), StoreError> {
         let forgotten = self.connection.execute("DELETE FROM expulsion", []);
         forgotten.map(drop).map_err(|source| self.refused(source))
     }
 
     fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
-        backup::copy(self, between)
+        let mut store = *self;
+        let mut lend = || between(&mut store as &mut dyn Store);
+        backup::copy(&self.connection, &self.path, &mut lend)
     }
 }
 

@@ -134,7 +134,7 @@ impl Clockwork {
                 swallows: None,
             };
             clockwork.workers.insert(worker, idle);
-            let hello = Hello { threads, ..fake::hello(process) };
+            let hello = Hello { slots: threads, ..fake::hello(process) };
             clockwork.react(Event::Hello { worker, hello });
         }
         clockwork.after(TICK, Happening::Tick);

@@ -80,7 +80,7 @@ pub(crate) fn attached(process: u32) -> Event {
 pub(crate) fn hello(process: u32) -> Hello {
     let WorkerHello { version, fingerprint, threads, host, process, instance } =
         wire_hello(process);
-    Hello { version, fingerprint, threads, host, process, instance }
+    Hello { version, fingerprint, slots: threads, host, process, instance }
 }
 
 /// The same as it is sent.
@@ -101,7 +101,7 @@ pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::End { end, summary } => store.finish_job(end, summary),
-        Record::Expulsion(record) => store.put_expulsion(record),
+        Record::Ban(record) => store.put_ban(record),
     }
     .unwrap();
     let (job, key) = record.key();

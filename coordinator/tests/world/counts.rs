@@ -23,13 +23,13 @@ pub(crate) struct Counts {
     pub(crate) checked: u64,
     /// Wrong answers.
     pub(crate) lies: u64,
-    /// Workers expelled.
-    pub(crate) expelled: u64,
+    /// Workers banned.
+    pub(crate) banned: u64,
     /// Stored evaluations that were replaced by others.
     pub(crate) replaced: u64,
     /// Stored evaluations that were computed again and found the same.
     pub(crate) confirmed: u64,
-    /// Restarts with expelled workers in the store.
+    /// Restarts with banned workers in the store.
     pub(crate) remembered: u64,
     /// Jobs that ended right although somebody had lied in them.
     pub(crate) repaired: u64,
@@ -65,7 +65,7 @@ impl Counts {
         self.outages += other.outages;
         self.checked += other.checked;
         self.lies += other.lies;
-        self.expelled += other.expelled;
+        self.banned += other.banned;
         self.replaced += other.replaced;
         self.confirmed += other.confirmed;
         self.remembered += other.remembered;

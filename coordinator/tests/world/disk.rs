@@ -12,11 +12,11 @@ impl World {
     /// Looks at a record when the coordinator has decided on it.
     pub(super) fn look_at(&mut self, record: &Record) {
         match record {
-            Record::Expulsion(record) => {
+            Record::Ban(record) => {
                 let process = record.worker.process();
                 let lied = self.lies.iter().any(|(liar, _)| *liar == process);
                 assert!(lied, "{record:?}: it never lied");
-                self.counts.expelled += u64::from(self.expelled.insert(process));
+                self.counts.banned += u64::from(self.banned.insert(process));
             }
             Record::End { end, .. } => {
                 // Written again, it was decided on before.
@@ -27,7 +27,7 @@ impl World {
                 // Of a job whose client has not heard of it nothing is known here.
                 let seed = of_job.map(|client| client.specification.monte_carlo.seed);
                 let at_large = |(liar, of): &(u32, u64)| {
-                    seed.is_none_or(|seed| seed == *of) && !self.expelled.contains(liar)
+                    seed.is_none_or(|seed| seed == *of) && !self.banned.contains(liar)
                 };
                 if self.lies.iter().any(at_large) {
                     self.deceived.insert(end.job);
@@ -74,7 +74,7 @@ impl World {
             Record::Job(record) => {
                 self.seeds.insert(record.job, record.specification.monte_carlo.seed);
             }
-            Record::End { .. } | Record::Expulsion(_) => {}
+            Record::End { .. } | Record::Ban(_) => {}
         }
         fake::written(&mut self.store, record)
     }

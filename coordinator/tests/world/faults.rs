@@ -52,7 +52,7 @@ impl World {
             known.heard = until;
             if !known.bad
                 && known.swallows == 0
-                && !self.expelled.contains(&process)
+                && !self.banned.contains(&process)
                 && self.draw(2) == 0
             {
                 self.after(1, Happening::GiveUp(worker));
@@ -71,7 +71,7 @@ impl World {
     /// A process that gives signs of life, and never answers one in `swallows` of its batches.
     pub(super) fn arrive_silent(&mut self, process: u32, swallows: u64) {
         let worker = WorkerId(self.number());
-        let hello = Hello { host: "silent".to_owned(), threads: 2, ..fake::hello(process) };
+        let hello = Hello { host: "silent".to_owned(), slots: 2, ..fake::hello(process) };
         let known = Worker { process, swallows, heard: self.now, ..Worker::default() };
         self.workers.insert(worker, known);
         self.react(Event::Hello { worker, hello });

@@ -25,7 +25,7 @@ impl World {
     pub(super) fn process(&mut self) -> u32 {
         let gone = |process: &u32| {
             let here = self.workers.values().any(|worker| worker.process == *process);
-            !here && !self.expelled.contains(process)
+            !here && !self.banned.contains(process)
         };
         let gone: Vec<u32> = (1..=self.processes).filter(gone).collect();
         let returns = self.draw(2) == 0;

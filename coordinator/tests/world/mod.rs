@@ -109,8 +109,8 @@ pub(crate) struct World {
     liars: BTreeSet<u32>,
     /// Who has lied about realizations of which seed.
     lies: BTreeSet<(u32, u64)>,
-    /// Who is expelled.
-    expelled: BTreeSet<u32>,
+    /// Who is banned.
+    banned: BTreeSet<u32>,
     /// Seed, point and indices of batches that were answered in this life of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
     /// Seed of each job.
@@ -192,7 +192,7 @@ impl World {
             outage,
             liars,
             lies: BTreeSet::new(),
-            expelled: BTreeSet::new(),
+            banned: BTreeSet::new(),
             answered_batches: BTreeSet::new(),
             seeds: BTreeMap::new(),
             durable: BTreeMap::new(),
@@ -348,7 +348,7 @@ impl World {
     fn attach(&mut self, process: u32) {
         let worker = WorkerId(self.number());
         let threads = 1 + self.draw(4) as u32;
-        let hello = Hello { threads, ..fake::hello(process) };
+        let hello = Hello { slots: threads, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
     }
@@ -459,9 +459,9 @@ impl World {
         self.answered_batches.clear();
         self.submissions.clear();
         self.cancellations.clear();
-        let expelled = self.store.expulsions().unwrap();
-        self.counts.remembered += u64::from(!expelled.is_empty());
-        self.expelled = expelled.iter().map(|record| record.worker.process()).collect();
+        let banned = self.store.bans().unwrap();
+        self.counts.remembered += u64::from(!banned.is_empty());
+        self.banned = banned.iter().map(|record| record.worker.process()).collect();
         let restored = Restored::load(&mut self.store).unwrap();
         let (state, effects) = State::restore(self.config, restored, self.now);
         self.state = state;

@@ -7,6 +7,7 @@ use osteon_common::parameters::Point;
 use super::*;
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const TASK: Task = Task { attachment: 1, batch: 1 };
 const DEADLINE: Duration = Duration::from_secs(60);
 
 fn work(point: Point, first: u64, count: u32) -> Work {
@@ -15,8 +16,9 @@ fn work(point: Point, first: u64, count: u32) -> Work {
 
 fn solved(threads: u32, work: Work) -> Vec<Solved> {
     let (sender, receiver) = mpsc::channel();
-    let cores = Cores::new(threads, Isa::fastest()).unwrap();
-    cores.start(work, StopFlag::default(), move |computed| sender.send(computed).unwrap());
+    let mut cores = Cores::new(threads, Isa::fastest()).unwrap();
+    assert_eq!(cores.slots(), threads);
+    cores.start(TASK, work, Box::new(move |computed| sender.send(computed).unwrap()));
     match receiver.recv_timeout(DEADLINE).unwrap() {
         Computed::Complete { solved, .. } => solved,
         other => panic!("{other:?}"),
@@ -58,13 +60,13 @@ fn a_point_without_an_ensemble_fails_at_every_index() {
 }
 
 #[test]
-fn a_raised_flag_ends_the_computation() {
+fn a_batch_that_is_forgotten_is_given_up() {
     let (sender, receiver) = mpsc::channel();
-    let cores = Cores::new(1, Isa::fastest()).unwrap();
-    let stop = StopFlag::default();
-    stop.raise();
-    cores.start(work(POINT, 0, 65_536), stop, move |computed| sender.send(computed).unwrap());
+    let mut cores = Cores::new(1, Isa::fastest()).unwrap();
+    cores.start(TASK, work(POINT, 0, 65_536), Box::new(move |it| sender.send(it).unwrap()));
+    cores.forget(TASK);
     assert_eq!(receiver.recv_timeout(DEADLINE).unwrap(), Computed::Abandoned);
+    assert!(cores.stops.is_empty());
 }
 
 #[test]

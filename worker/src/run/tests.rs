@@ -1,19 +1,26 @@
 //! The worker against coordinators that misbehave, over a Unix socket.
 
+use std::collections::BTreeMap;
 use std::future::pending;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 
+use osteon_common::case::Setup;
+use osteon_common::germ_source::GermSource;
+use osteon_common::outcome::Solved;
+use osteon_common::parameters::Point;
+use osteon_proto::batch::{self, Work};
 use osteon_proto::v1::attach_response::Message as Reply;
 use osteon_proto::v1::workers_server::{Workers, WorkersServer};
-use osteon_proto::v1::{Batch, WorkerWelcome};
+use osteon_proto::v1::{Batch, BatchRevoke, WorkerDrain, WorkerWelcome};
 use tokio::net::UnixListener;
 use tokio_stream::wrappers::UnixListenerStream;
 use tonic::transport::Server;
 use tonic::{Request as Call, Response};
 
 use super::*;
+use crate::backend::Done;
 
 /// What a false coordinator does with every worker.
 #[derive(Debug, Clone, Copy)]
@@ -26,11 +33,16 @@ enum Script {
     Garble,
     /// Says nothing.
     Silence,
+    /// Takes it, sends three batches, takes back the second once the first is answered, and leaves
+    /// when the third is answered.
+    Work,
 }
 
 struct FalseCoordinator {
     script: Script,
     attachments: Arc<AtomicU32>,
+    /// What workers said.
+    heard: Arc<Mutex<Vec<Request>>>,
 }
 
 #[tonic::async_trait]
@@ -43,9 +55,12 @@ impl Workers for FalseCoordinator {
     ) -> Result<Response<Self::AttachStream>, Status> {
         self.attachments.fetch_add(1, Ordering::SeqCst);
         let mut requests = call.into_inner();
-        requests.message().await?;
+        let hello = requests.message().await?.and_then(|request| request.message);
+        self.heard.lock().unwrap().extend(hello);
         let (sender, stream) = mpsc::channel(4);
-        let welcome = WorkerWelcome { worker: 1, lease: 1, heartbeat_s: 0.2, expiry_s: 0.5 };
+        // Only who is silent is to be left soon.
+        let expiry_s = if matches!(self.script, Script::Work) { 60.0 } else { 0.5 };
+        let welcome = WorkerWelcome { worker: 1, lease: 1, heartbeat_s: 0.2, expiry_s };
         let mut script = Vec::new();
         match self.script {
             Script::Refuse => return Err(Status::failed_precondition("numerics differ")),
@@ -54,12 +69,18 @@ impl Workers for FalseCoordinator {
                 script.push(Reply::Welcome(welcome));
                 script.push(Reply::Batch(Batch { batch: 1, count: 1, ..Batch::default() }));
             }
+            Script::Work => {}
             Script::Silence => {
                 script.push(Reply::Welcome(welcome));
                 // Held open until the worker has gone.
                 let open = sender.clone();
                 tokio::spawn(async move { open.closed().await });
             }
+        }
+        if matches!(self.script, Script::Work) {
+            script.push(Reply::Welcome(welcome));
+            script.extend((1..=3).map(|number| Reply::Batch(batch::to_message(number, &work()))));
+            tokio::spawn(take_answers(requests, sender.clone(), Arc::clone(&self.heard)));
         }
         for message in script {
             let _gone = sender.try_send(Ok(AttachResponse { message: Some(message) }));
@@ -68,10 +89,118 @@ impl Workers for FalseCoordinator {
     }
 }
 
+/// Notes what a worker answers, and does the rest of [`Script::Work`].
+async fn take_answers(
+    mut requests: Streaming<AttachRequest>,
+    sender: mpsc::Sender<Result<AttachResponse, Status>>,
+    heard: Arc<Mutex<Vec<Request>>>,
+) {
+    while let Ok(Some(AttachRequest { message: Some(message) })) = requests.message().await {
+        let answered = match &message {
+            Request::Result(result) => result.batch,
+            _ => 0,
+        };
+        heard.lock().unwrap().push(message);
+        let reply = match answered {
+            1 => Reply::Revoke(BatchRevoke { batch: 2 }),
+            3 => Reply::Drain(WorkerDrain {}),
+            _ => continue,
+        };
+        let _gone = sender.send(Ok(AttachResponse { message: Some(reply) })).await;
+    }
+}
+
+fn work() -> Work {
+    let (setup, germs) = (Setup::default(), GermSource::streams(5));
+    Work { setup, point: Point([1.0; 7]), germs, first: 7, count: 2 }
+}
+
+/// A device that computes nothing. It answers a batch when the next one is given to it or it is told
+/// to forget another one.
+#[derive(Debug, Default)]
+struct FakeBackend {
+    open: BTreeMap<Task, Held>,
+    seen: Arc<Mutex<Vec<String>>>,
+}
+
+struct Held(Work, Done);
+
+impl std::fmt::Debug for Held {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.0)
+    }
+}
+
+impl FakeBackend {
+    /// Ends a batch on a thread of its own, as a device does.
+    fn end(held: Held, computed: Computed) {
+        std::thread::spawn(move || (held.1)(computed));
+    }
+}
+
+impl Backend for FakeBackend {
+    fn slots(&self) -> u32 {
+        4096
+    }
+
+    fn start(&mut self, task: Task, work: Work, done: Done) {
+        self.seen.lock().unwrap().push(format!("start {}", task.batch));
+        self.open.insert(task, Held(work, done));
+        if task.batch == 3
+            && let Some(first) = self.open.remove(&Task { batch: 1, ..task })
+        {
+            let solved = outcomes(&first.0);
+            Self::end(first, Computed::Complete { solved, elapsed_s: 0.5 });
+        }
+    }
+
+    fn forget(&mut self, task: Task) {
+        self.seen.lock().unwrap().push(format!("forget {}", task.batch));
+        let Some(held) = self.open.remove(&task) else { return };
+        Self::end(held, Computed::Abandoned);
+        if let Some(third) = self.open.remove(&Task { batch: 3, ..task }) {
+            let solved = outcomes(&third.0);
+            Self::end(third, Computed::Complete { solved, elapsed_s: 0.5 });
+        }
+    }
+}
+
+fn outcomes(work: &Work) -> Vec<Solved> {
+    let indices = work.first..work.first + u64::from(work.count);
+    indices.map(|index| Solved { outcome: Ok(index as f64), estimated_error: 0.0 }).collect()
+}
+
+#[tokio::test]
+async fn a_device_is_told_what_to_compute_and_what_to_forget() {
+    let scene = scene("device", Script::Work);
+    let backend = FakeBackend::default();
+    let seen = Arc::clone(&backend.seen);
+    let ended = run_on(Box::new(backend), config(&scene), pending());
+    timeout(Duration::from_secs(60), ended).await.unwrap().unwrap();
+    let heard = scene.heard.lock().unwrap().clone();
+    let Some(Request::Hello(hello)) = heard.first() else { panic!("{heard:?}") };
+    assert_eq!(hello.threads, 4096);
+    let results = heard.iter().filter_map(|message| match message {
+        Request::Result(result) => {
+            Some((result.batch, batch::answer_from_message(result).unwrap()))
+        }
+        _ => None,
+    });
+    let expected = [(1, outcomes(&work())), (3, outcomes(&work()))];
+    assert_eq!(results.collect::<Vec<_>>(), expected);
+    let mut seen = seen.lock().unwrap().clone();
+    // The end of a batch that was forgotten is told at any time after that.
+    let last = seen.iter().position(|it| it == "forget 3").unwrap();
+    seen.truncate(last);
+    seen.dedup();
+    assert_eq!(seen, ["start 1", "start 2", "start 3", "forget 1", "forget 2"]);
+}
+
 struct Scene {
     endpoint: Endpoint,
     socket: PathBuf,
     attachments: Arc<AtomicU32>,
+    heard: Arc<Mutex<Vec<Request>>>,
 }
 
 impl Drop for Scene {
@@ -87,10 +216,15 @@ fn scene(name: &str, script: Script) -> Scene {
     drop(std::fs::remove_file(&socket));
     let listener = UnixListener::bind(&socket).unwrap();
     let attachments = Arc::new(AtomicU32::new(0));
-    let service = FalseCoordinator { script, attachments: Arc::clone(&attachments) };
+    let heard = Arc::default();
+    let service = FalseCoordinator {
+        script,
+        attachments: Arc::clone(&attachments),
+        heard: Arc::clone(&heard),
+    };
     let router = Server::builder().add_service(WorkersServer::new(service));
     tokio::spawn(router.serve_with_incoming(UnixListenerStream::new(listener)));
-    Scene { endpoint: Endpoint::Unix(socket.clone()), socket, attachments }
+    Scene { endpoint: Endpoint::Unix(socket.clone()), socket, attachments, heard }
 }
 
 fn config(scene: &Scene) -> WorkerConfig {

@@ -16,7 +16,7 @@ struct Recorder {
 
 impl Recorder {
     fn new() -> Self {
-        let identity = Identity { threads: 2, host: "host".to_owned(), process: 7, instance: 9 };
+        let identity = Identity { slots: 2, host: "host".to_owned(), process: 7, instance: 9 };
         Self { state: State::new(identity), now: Duration::ZERO, effects: Vec::new() }
     }
 

@@ -1,4 +1,4 @@
-//! Answers against answers: audits, disputes, expulsions.
+//! Answers against answers: audits, disputes, bans.
 
 use super::*;
 
@@ -88,10 +88,10 @@ fn a_third_worker_decides_against_the_first() {
     rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
-    // The liar filled the slot: the evaluation begins again.
+    // The liar filled the result: the evaluation begins again.
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let expelled = format!("store expulsion 1: node (process 1) {JUDGED}");
-    assert!(effects[0].starts_with(&expelled), "{effects:?}");
+    let banned = format!("store expulsion 1: node (process 1) {JUDGED}");
+    assert!(effects[0].starts_with(&banned), "{effects:?}");
     assert!(effects[1].starts_with("close 1: this worker is expelled"), "{effects:?}");
     assert_eq!(effects[2], "send 2: batch 4 = 0+1");
     // It stays out, and what it says later means nothing.
@@ -109,10 +109,10 @@ fn a_third_worker_decides_against_the_second() {
     rig.check(wrong(2, 2, 0, ONE_BIT), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let expelled = format!("store expulsion 1: node (process 2) {JUDGED}");
-    assert!(effects[0].starts_with(&expelled), "{effects:?}");
+    let banned = format!("store expulsion 1: node (process 2) {JUDGED}");
+    assert!(effects[0].starts_with(&banned), "{effects:?}");
     assert!(effects[1].starts_with("close 2: this worker is expelled"), "{effects:?}");
-    // What it answered filled no slot: nothing is computed again.
+    // What it answered filled no result: nothing is computed again.
     assert_eq!(effects[2], "store job 1 evaluation 0");
 }
 
@@ -186,7 +186,7 @@ fn who_contradicts_itself_needs_no_judge() {
     rig.check(answer(1, 1, 0, 2), &["send 1: batch 3 = 4+1"]);
     rig.check(answer(1, 1, 0, 2), &[]);
     let effects = rig.event(answer(1, 1, 1, 2));
-    let expelled = "store expulsion 1: node (process 1) answered realization 0 as 3900 m/s";
-    assert!(effects[0].starts_with(expelled), "{effects:?}");
+    let banned = "store expulsion 1: node (process 1) answered realization 0 as 3900 m/s";
+    assert!(effects[0].starts_with(banned), "{effects:?}");
     assert!(effects[3].starts_with("close 1: this worker is expelled"), "{effects:?}");
 }

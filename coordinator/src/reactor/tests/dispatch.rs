@@ -1,7 +1,7 @@
 //! Who gets what, and how much of it.
 
 use super::*;
-use crate::reactor::dispatch::batch_size;
+use crate::reactor::dispatch::sizing::batch_size;
 
 /// Batch size for worker 1 of `threads`, measured at `rates` realizations per second, when
 /// `queued` are left.

@@ -6,7 +6,7 @@ use osteon_common::document::Format;
 use osteon_common::realization::Ensemble;
 
 use super::*;
-use crate::state::Assignment;
+use crate::batch::Assignment;
 
 #[test]
 fn the_batches_of_a_lost_worker_are_retried_in_halves() {
@@ -242,7 +242,7 @@ fn a_worker_that_announced_its_end_is_no_sign_against_its_realizations() {
 }
 
 #[test]
-fn a_suspect_is_not_starved_by_the_queue_of_another_job() {
+fn a_quarantined_realization_is_not_starved_by_the_queue_of_another_job() {
     let mut rig = Rig::new();
     rig.accept(propagation(1));
     rig.accept(propagation(1000));
@@ -262,7 +262,7 @@ fn a_suspect_is_not_starved_by_the_queue_of_another_job() {
 }
 
 #[test]
-fn a_suspect_is_never_copied() {
+fn a_quarantined_realization_is_never_duplicated() {
     let mut rig = Rig::with(1, &[1]);
     rig.event(end_of_stream(1));
     rig.check(hello(2, 1), &["welcome 2, lease 2", "send 2: batch 2 = 0+1"]);

@@ -1,7 +1,7 @@
 //! What is told to the log: one notice for each thing that an operator asks about.
 
 use super::*;
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 use crate::notice::{Departure, Notice};
 
 impl Rig {
@@ -68,7 +68,7 @@ fn a_job_is_told_when_it_is_accepted_starts_and_ends() {
 fn a_worker_is_told_when_it_comes_and_when_it_goes_and_why() {
     let mut rig = Rig::with(1000, &[]);
     let told = rig.notices(hello(1, 4));
-    let [Notice::WorkerAttached { worker: WorkerId(1), name, threads: 4, version }] = &told[..]
+    let [Notice::WorkerAttached { worker: WorkerId(1), name, slots: 4, version }] = &told[..]
     else {
         panic!("{told:?}");
     };

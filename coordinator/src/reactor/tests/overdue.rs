@@ -2,8 +2,9 @@
 
 use super::checks::{ONE_BIT, wrong};
 use super::*;
-use crate::evaluation::Indices;
-use crate::state::{Purpose, Stage};
+use crate::batch::Purpose;
+use crate::indices::Indices;
+use crate::job::Stage;
 use crate::worker_name::WorkerName;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -52,7 +53,7 @@ impl Rig {
         crate::snapshot::of(&self.state, JobId(1), self.now).unwrap().waiting_for
     }
 
-    fn batch(&self, batch: u64) -> &crate::state::Batch {
+    fn batch(&self, batch: u64) -> &crate::batch::Batch {
         &self.state.batches[&BatchId(batch)]
     }
 }
@@ -140,7 +141,7 @@ fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
                  (process 3) is asked";
     assert_eq!(rig.waits_for(), waits);
     rig.check(on_its_own(4), &["welcome 4, lease 4", "send 4: batch 4 = 0+1"]);
-    assert_eq!(rig.batch(4).purpose, Purpose::Judge);
+    assert_eq!(rig.batch(4).purpose, Purpose::TieBreak);
     let effects = rig.event(answer(4, 4, 0, 1));
     assert_eq!(effects[0], "revoke 3: batch 3");
     assert!(effects[1].starts_with("store expulsion 1: host 1 (process 1)"), "{effects:?}");
@@ -158,21 +159,21 @@ fn a_vote_of_a_worker_that_does_not_answer_is_not_waited_for_without_end() {
 }
 
 /// A rig in which worker 2 holds realization 0 alone.
-fn with_suspect() -> Rig {
+fn with_quarantined_realization() -> Rig {
     let mut rig = rig(1, 1, 0.0);
     rig.check(end_of_stream(1), &[]);
     rig.check(on_its_own(2), &["welcome 2, lease 2", "send 2: batch 2 = 0+1"]);
-    assert!(rig.batch(2).exclusive);
+    assert_eq!(rig.batch(2).purpose, Purpose::Exclusive);
     rig
 }
 
 #[test]
-fn an_overdue_suspect_goes_alone_to_another_worker() {
-    let mut rig = with_suspect();
+fn an_overdue_quarantined_realization_goes_alone_to_another_worker() {
+    let mut rig = with_quarantined_realization();
     rig.check(on_its_own(3), &["welcome 3, lease 3"]);
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
-    assert!(rig.batch(3).exclusive);
+    assert_eq!(rig.batch(3).purpose, Purpose::Exclusive);
     // Nothing else goes to a worker that holds it.
     rig.event(submit(1, "", propagation(8)));
     rig.check(stored(2, RecordKey::Job), &["answer 1: job 2"]);
@@ -181,8 +182,8 @@ fn an_overdue_suspect_goes_alone_to_another_worker() {
 }
 
 #[test]
-fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_suspect() {
-    let mut rig = with_suspect();
+fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_quarantined_realization() {
+    let mut rig = with_quarantined_realization();
     rig.event(submit(1, "", propagation(1000)));
     rig.event(stored(2, RecordKey::Job));
     let expected = ["welcome 3, lease 3", "send 3: batch 3 = 0+4", "send 3: batch 4 = 4+4"];
@@ -191,17 +192,17 @@ fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_suspect() {
     assert_eq!(rig.live(SECOND / 10), [""; 0]);
     rig.check(answer(3, 3, 0, 4), &[]);
     rig.check(answer(3, 4, 4, 4), &["send 3: batch 5 = 0+1"]);
-    assert!(rig.batch(5).exclusive);
+    assert_eq!(rig.batch(5).purpose, Purpose::Exclusive);
 }
 
 #[test]
-fn a_death_over_a_copy_of_a_suspect_counts() {
-    let mut rig = with_suspect();
+fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
+    let mut rig = with_quarantined_realization();
     rig.event(on_its_own(3));
     rig.live(OVERDUE);
     rig.check(end_of_stream(3), &[]);
     let evaluation = rig.state.jobs[&JobId(1)].evaluation().unwrap();
-    assert!(evaluation.suspects[&0].are_of("host 3"), "{:?}", evaluation.suspects);
+    assert!(evaluation.crashes[&0].are_of("host 3"), "{:?}", evaluation.crashes);
     assert!(evaluation.quarantine.is_empty());
 }
 
@@ -215,14 +216,14 @@ fn what_was_computed_ahead_and_not_answered_is_overdue_when_it_is_asked_for() {
         rig.event(on_its_own(worker));
     }
     // Worker 2 is ahead, and does not answer; nor does worker 1, which gets a copy in a moment.
-    assert!(rig.batch(2).ahead);
+    assert_eq!(rig.batch(2).purpose, Purpose::Speculative);
     assert_eq!(rig.event(answer(1, 1, 0, 1))[0], "store job 1 evaluation 0");
     rig.event(stored(1, RecordKey::Evaluation(0)));
     rig.live(SECOND / 10);
     rig.event(on_its_own(3));
     let holders = |rig: &Rig| -> Vec<u64> {
-        let twins = &rig.batch(2).twins;
-        twins.iter().map(|twin| rig.state.batches[twin].worker.0).collect()
+        let others = &rig.batch(2).duplicates;
+        others.iter().map(|id| rig.state.batches[id].worker.0).collect()
     };
     assert_eq!(holders(&rig), [1]);
     rig.live(OVERDUE - SECOND / 10);
@@ -383,7 +384,7 @@ fn who_does_not_answer_checks_nothing() {
 }
 
 #[test]
-fn a_suspect_does_not_wait_for_who_does_not_answer() {
+fn a_quarantined_realization_does_not_wait_for_who_does_not_answer() {
     let mut rig = with_silent_worker();
     rig.accept(propagation(1));
     rig.event(on_its_own(3));
@@ -447,5 +448,5 @@ fn a_batch_that_is_passed_over_is_overdue_though_its_worker_answers_others() {
         }
         rig.live(SECOND / 10);
     }
-    assert_eq!(rig.batch(passed_over.0).twins.len(), 1);
+    assert_eq!(rig.batch(passed_over.0).duplicates.len(), 1);
 }

@@ -1,7 +1,7 @@
 //! Workers: admitted, refused, silent, leaving.
 
 use super::*;
-use crate::effect::CloseReason;
+use crate::close_reason::CloseReason;
 
 #[test]
 fn every_attachment_has_a_new_lease() {
@@ -26,11 +26,11 @@ fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
     for (event, expected) in [
         (with(|hello| hello.fingerprint = "other".to_owned()), fingerprint.as_str()),
         (
-            with(|hello| hello.threads = 0),
+            with(|hello| hello.slots = 0),
             "close 1: this worker announces 0 threads; 1 to 4096 are allowed",
         ),
         (
-            with(|hello| hello.threads = 4097),
+            with(|hello| hello.slots = 4097),
             "close 1: this worker announces 4097 threads; 1 to 4096 are allowed",
         ),
         (

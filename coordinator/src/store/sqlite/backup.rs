@@ -3,14 +3,15 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
+use std::ops::ControlFlow;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 
 use rusqlite::Connection;
 use rusqlite::backup::{Backup, StepResult};
 
-use super::{SqliteStore, opening};
-use crate::store::{Between, Store, StoreError};
+use super::opening;
+use crate::store::StoreError;
 
 /// Name of the copy in the store's directory, while it is made.
 const COPY: &str = "osteon.backup";
@@ -19,17 +20,19 @@ const PIECE_PAGES: i32 = 256;
 /// Measurements are nobody else's business.
 const COPY_MODE: u32 = 0o600;
 
-/// Copies `store`; see [`Store::copy`].
+/// Copies the database of `connection`, which is the file `store`, and calls `between` between two
+/// pieces; see [`crate::store::Store::copy`].
 pub(super) fn copy(
-    store: &SqliteStore,
-    between: &mut Between<'_>,
+    connection: &Connection,
+    store: &Path,
+    between: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<File>, StoreError> {
-    let path = store.path.with_file_name(COPY);
+    let path = store.with_file_name(COPY);
     remove(&path)?;
     let mut options = OpenOptions::new();
     options.read(true).write(true).create_new(true).mode(COPY_MODE);
     let file = options.open(&path).map_err(|error| failed(&path, error))?;
-    let whole = copy_pages(store, &path, between);
+    let whole = copy_pages(connection, &path, between);
     // Whatever came of it; it stays readable through `file`.
     remove(&path)?;
     let whole = whole.map_err(|source| opening::refusal(&path, source))?;
@@ -43,21 +46,20 @@ pub(super) fn remove_leftover(store: &Path) -> Result<(), StoreError> {
 
 /// Copies page after page; whether it came to its end.
 fn copy_pages(
-    store: &SqliteStore,
+    connection: &Connection,
     path: &Path,
-    between: &mut Between<'_>,
+    between: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> rusqlite::Result<bool> {
     let mut copy = Connection::open(path)?;
     // What is half a copy after a crash is of no use: it needs neither journal nor sync.
     copy.pragma_update(None, "journal_mode", "OFF")?;
     copy.pragma_update(None, "synchronous", "OFF")?;
-    let backup = Backup::new(&store.connection, &mut copy)?;
+    let backup = Backup::new(connection, &mut copy)?;
     loop {
         if backup.step(PIECE_PAGES)? == StepResult::Done {
             return Ok(true);
         }
-        let mut lent = store;
-        if between(&mut lent as &mut dyn Store).is_break() {
+        if between().is_break() {
             return Ok(false);
         }
     }
@@ -77,11 +79,11 @@ fn failed(path: &Path, error: io::Error) -> StoreError {
 #[cfg(test)]
 mod tests {
     use std::io::{Read as _, Seek as _};
-    use std::ops::ControlFlow;
 
     use super::*;
-    use crate::store::StoredJob;
+    use crate::store::sqlite::SqliteStore;
     use crate::store::sqlite::tests::{evaluation, job};
+    use crate::store::{Store as _, StoredJob};
 
     /// A store with evaluations of some 4 MB in all.
     fn filled(directory: &Path) -> SqliteStore {

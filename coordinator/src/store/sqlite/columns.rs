@@ -11,7 +11,7 @@ use osteon_common::version::Program;
 use rusqlite::Row;
 
 use crate::ids::JobId;
-use crate::store::{EndRecord, EvaluationRecord, ExpulsionRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord};
 use crate::worker_name::WorkerName;
 
 /// Bytes of an outcome in a blob: its code, its velocity as little-endian f64.
@@ -69,8 +69,8 @@ pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
     ])
 }
 
-pub(super) fn expulsion_checksum(record: &ExpulsionRecord) -> Vec<u8> {
-    let ExpulsionRecord { number, worker, job, reason, at } = record;
+pub(super) fn ban_checksum(record: &BanRecord) -> Vec<u8> {
+    let BanRecord { number, worker, job, reason, at } = record;
     let numbers = [*number, job.0, nanoseconds(*at), worker.process().into(), worker.instance()];
     let numbers = numbers.map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();

@@ -8,7 +8,7 @@ use osteon_search::Summary;
 use super::SqliteStore;
 use crate::ids::JobId;
 use crate::store::{
-    Between, EndRecord, EvaluationRecord, ExpulsionRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, Between, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use crate::worker_name::WorkerName;
 
@@ -61,20 +61,20 @@ impl Store for SqliteStore {
         (&*self).last_forgotten()
     }
 
-    fn put_expulsion(&mut self, record: &ExpulsionRecord) -> Result<(), StoreError> {
-        (&*self).put_expulsion(record)
+    fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
+        (&*self).put_ban(record)
     }
 
-    fn expulsions(&mut self) -> Result<Vec<ExpulsionRecord>, StoreError> {
-        (&*self).expulsions()
+    fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
+        (&*self).bans()
     }
 
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
         (&*self).ended_with(worker)
     }
 
-    fn forget_expulsions(&mut self) -> Result<(), StoreError> {
-        (&*self).forget_expulsions()
+    fn forget_bans(&mut self) -> Result<(), StoreError> {
+        (&*self).forget_bans()
     }
 
     fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {

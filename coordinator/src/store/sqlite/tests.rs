@@ -110,7 +110,7 @@ fn what_is_put_is_there_after_a_reopening() {
         // Twice: a write whose report was lost is repeated.
         store.put_job(&job(1)).unwrap();
         store.put_job(&job(2)).unwrap();
-        store.put_expulsion(&expulsion(1)).unwrap();
+        store.put_ban(&ban(1)).unwrap();
         store.put_evaluation(&evaluation(2, 0), false).unwrap();
         store.put_evaluation(&evaluation(1, 1), false).unwrap();
         store.put_evaluation(&evaluation(1, 0), false).unwrap();
@@ -130,7 +130,7 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.summary(JobId(2)).unwrap(), None);
     assert_eq!(store.job(JobId(2)).unwrap(), Some(job(2)));
     assert_eq!(store.job(JobId(3)).unwrap(), None);
-    assert_eq!(store.expulsions().unwrap(), [expulsion(1)]);
+    assert_eq!(store.bans().unwrap(), [ban(1)]);
     // Process 0 has computed evaluation 1 of job 1, which has ended, and nobody else has.
     let ended_with = |store: &mut SqliteStore, host, process| {
         store.ended_with(&WorkerName::new(host, process, 0)).unwrap()
@@ -139,8 +139,8 @@ fn what_is_put_is_there_after_a_reopening() {
     for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
         assert_eq!(ended_with(&mut store, host, process), [], "{process} {host}");
     }
-    store.forget_expulsions().unwrap();
-    assert_eq!(store.expulsions().unwrap(), []);
+    store.forget_bans().unwrap();
+    assert_eq!(store.bans().unwrap(), []);
 }
 
 #[test]
@@ -211,8 +211,8 @@ fn pages_that_do_not_fit_together_are_found_at_the_start() {
     assert_eq!(SqliteStore::open(directory.path()).unwrap().jobs().unwrap().len(), 9);
 }
 
-fn expulsion(number: u64) -> ExpulsionRecord {
-    ExpulsionRecord {
+fn ban(number: u64) -> BanRecord {
+    BanRecord {
         number,
         worker: WorkerName::new("a node", 7, u64::MAX),
         job: JobId(2),
@@ -415,7 +415,7 @@ fn every_damaged_record_is_named() {
         ("UPDATE job SET priority = 1", DamagedRecord::Specification),
         ("UPDATE evaluation SET workers = '1 a'", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET workers = ''", DamagedRecord::Evaluation(7)),
-        ("UPDATE expulsion SET host = 'other'", DamagedRecord::Expulsion),
+        ("UPDATE expulsion SET host = 'other'", DamagedRecord::Ban),
         ("UPDATE ending SET status = 'done'", DamagedRecord::End),
         ("UPDATE ending SET status = 'converged'", DamagedRecord::End),
         ("UPDATE ending SET failure = NULL", DamagedRecord::End),
@@ -443,12 +443,12 @@ fn every_damaged_record_is_named() {
         store.put_job(&job(1)).unwrap();
         store.put_evaluation(&evaluation(1, 7), false).unwrap();
         store.finish_job(&end(1), &summary(1)).unwrap();
-        store.put_expulsion(&expulsion(1)).unwrap();
+        store.put_ban(&ban(1)).unwrap();
         store.connection.execute(sql, []).unwrap();
         let jobs = store.jobs().map(|_| ());
         let read = jobs.and_then(|()| store.end(JobId(1)).map(|_| ()));
         let read = read.and_then(|()| evaluations(&mut store, 1).map(|_| ()));
-        let read = read.and_then(|()| store.expulsions().map(|_| ()));
+        let read = read.and_then(|()| store.bans().map(|_| ()));
         let error = read.and_then(|()| store.summary(JobId(1)).map(|_| ())).unwrap_err();
         assert!(
             matches!(&error, StoreError::Damaged { record: found, .. } if *found == record),

@@ -5,9 +5,8 @@ use std::time::Duration;
 use crate::effect::{Answer, Effect, Refusal};
 use crate::event::Retention;
 use crate::ids::{JobId, Token};
+use crate::reactor::turn::Turn;
 use crate::state::State;
-
-use super::Effects;
 
 /// How often it is looked for old jobs.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
@@ -16,34 +15,28 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 const GRACE: Duration = Duration::from_secs(3600);
 
 /// Forgets the jobs that `retention` does not keep; the answer comes when that is durable.
-pub(super) fn requested(
-    state: &State,
-    token: Token,
-    retention: Retention,
-    now: Duration,
-    effects: &mut Effects,
-) {
-    let jobs = chosen(state, retention, now);
+pub(crate) fn requested(turn: &mut Turn, token: Token, retention: Retention) {
+    let jobs = chosen(turn.state, retention, turn.now);
     if jobs.is_empty() {
-        effects.push(Effect::Answer { token, answer: Answer::Pruned(jobs) });
+        turn.effects.push(Effect::Answer { token, answer: Answer::Pruned(jobs) });
     } else {
-        effects.push(Effect::Prune { token: Some(token), jobs });
+        turn.effects.push(Effect::Prune { token: Some(token), jobs });
     }
 }
 
 /// Forgets the jobs that have been ended for longer than the operator wants to keep them.
-pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
-    let Some(keep_for) = state.config.keep_ended else {
+pub(crate) fn tick(turn: &mut Turn) {
+    let Some(keep_for) = turn.state.config.keep_ended else {
         return;
     };
-    let is_first = state.pruned.is_none();
-    if state.pruned.is_some_and(|last| now.saturating_sub(last) < LOOK_EVERY) {
+    let is_first = turn.state.pruned.is_none();
+    if turn.state.pruned.is_some_and(|last| turn.now.saturating_sub(last) < LOOK_EVERY) {
         return;
     }
-    state.pruned = Some(now);
+    turn.state.pruned = Some(turn.now);
     let retention = Retention { keep_for: Some(keep_for), keep_last: None };
-    let jobs = chosen(state, retention, now);
-    let grace = GRACE.min(keep_for).saturating_sub(now.saturating_sub(state.started));
+    let jobs = chosen(turn.state, retention, turn.now);
+    let grace = GRACE.min(keep_for).saturating_sub(turn.now.saturating_sub(turn.state.started));
     // No job that ended in this life can be older than that yet.
     if grace > Duration::ZERO {
         if is_first && !jobs.is_empty() {
@@ -57,25 +50,24 @@ pub(super) fn tick(state: &mut State, now: Duration, effects: &mut Effects) {
         return;
     }
     if !jobs.is_empty() {
-        effects.push(Effect::Prune { token: None, jobs });
+        turn.effects.push(Effect::Prune { token: None, jobs });
     }
 }
 
 /// The jobs are forgotten, or the store did not do it.
-pub(super) fn pruned(
-    state: &mut State,
+pub(crate) fn pruned(
+    turn: &mut Turn,
     token: Option<Token>,
     jobs: Vec<JobId>,
     outcome: Result<(), String>,
-    effects: &mut Effects,
 ) {
     let answer = match outcome {
         Ok(()) => {
             for job in &jobs {
-                if let Some(request) = state.ended.remove(job).and_then(|ended| ended.request)
-                    && state.requests.get(&request) == Some(job)
+                if let Some(request) = turn.state.ended.remove(job).and_then(|ended| ended.request)
+                    && turn.state.requests.get(&request) == Some(job)
                 {
-                    state.requests.remove(&request);
+                    turn.state.requests.remove(&request);
                 }
             }
             Answer::Pruned(jobs)
@@ -83,7 +75,7 @@ pub(super) fn pruned(
         Err(error) => Answer::Refused(Refusal::NotPruned { error }),
     };
     if let Some(token) = token {
-        effects.push(Effect::Answer { token, answer });
+        turn.effects.push(Effect::Answer { token, answer });
     }
 }
 

@@ -1,4 +1,4 @@
-//! Workers that were lost over one thing, and when that thing is to blame.
+//! Workers that were lost over one task, and when the task is poison: when it is to blame.
 //!
 //! Machines fail in more ways than realizations kill: one bad node dies over whatever it is given,
 //! a stopped coordinator loses everybody at once. So a realization is only blamed for workers that
@@ -10,10 +10,10 @@ use std::time::Duration;
 
 use crate::worker_name::WorkerName;
 
-/// So many workers that had shown that they work are enough.
-const CREDIBLE_MAX: usize = 3;
-/// And so many of any kind, so that nothing is tried for ever.
-const LOST_MAX: usize = 10;
+/// So many crashes of workers that had shown that they work make a task poison.
+const CRASH_LIMIT: usize = 3;
+/// And so many lost workers of any kind, so that nothing is tried for ever.
+const LOSS_LIMIT: usize = 10;
 
 /// How the stay of a worker ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,9 +28,9 @@ pub(crate) enum Cause {
     Misbehaviour,
 }
 
-/// The end of a stay.
+/// A worker whose stay has ended.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Loss {
+pub(crate) struct LostWorker {
     /// Who is gone.
     pub(crate) worker: WorkerName,
     /// How.
@@ -40,36 +40,36 @@ pub(crate) struct Loss {
     /// It held one batch and nothing else.
     pub(crate) alone: bool,
     /// It had answered something in this stay.
-    pub(crate) proven: bool,
+    pub(crate) has_answered: bool,
 }
 
-impl Loss {
+impl LostWorker {
     /// Whether it may be a sign against what the worker held.
     fn is_credible(&self) -> bool {
-        self.proven && self.cause == Cause::StreamBroke
+        self.has_answered && self.cause == Cause::StreamBroke
     }
 }
 
-/// Workers that were lost while they held one thing and nothing else.
+/// Workers that were lost while they held one task and nothing else.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Losses(Vec<Loss>);
+pub(crate) struct Crashes(Vec<LostWorker>);
 
-impl Losses {
+impl Crashes {
     /// Takes a loss into account, unless it means nothing.
-    pub(crate) fn add(&mut self, loss: &Loss) {
+    pub(crate) fn add(&mut self, loss: &LostWorker) {
         if loss.alone && loss.cause != Cause::Announced {
             self.0.push(loss.clone());
         }
     }
 
-    /// A worker is back: it did not die.
-    pub(crate) fn forgive(&mut self, name: &WorkerName) {
+    /// Forgets the crashes of a worker that is back: it did not die.
+    pub(crate) fn forget(&mut self, name: &WorkerName) {
         self.0.retain(|loss| loss.worker != *name || loss.cause == Cause::Misbehaviour);
     }
 
-    /// Changes the times of all losses.
-    pub(crate) fn excuse(&mut self, excused: impl Fn(&mut Duration)) {
-        self.0.iter_mut().for_each(|loss| excused(&mut loss.at));
+    /// Changes the times of all crashes.
+    pub(crate) fn shift(&mut self, shift: impl Fn(&mut Duration)) {
+        self.0.iter_mut().for_each(|loss| shift(&mut loss.at));
     }
 
     /// Whether nobody was lost.
@@ -102,13 +102,13 @@ impl Losses {
         self.0.iter().map(|loss| loss.at).max()
     }
 
-    /// Whether enough were lost. `untried` says whether there is a worker that may be expected to
+    /// Whether so many were lost that the task is poison. `untried` says whether there is a worker that may be expected to
     /// do better, on another host or there since before the first loss.
-    pub(crate) fn are_enough(&self, untried: impl FnOnce() -> bool) -> bool {
+    pub(crate) fn reach_limit(&self, untried: impl FnOnce() -> bool) -> bool {
         let credible = || self.0.iter().filter(|loss| loss.is_credible());
         let hosts: BTreeSet<&str> = credible().map(|loss| loss.worker.host()).collect();
-        self.0.len() >= LOST_MAX
-            || (credible().count() >= CREDIBLE_MAX && (hosts.len() >= CREDIBLE_MAX || !untried()))
+        self.0.len() >= LOSS_LIMIT
+            || (credible().count() >= CRASH_LIMIT && (hosts.len() >= CRASH_LIMIT || !untried()))
     }
 }
 
@@ -118,21 +118,21 @@ mod tests {
 
     /// Workers on these hosts are lost; whether that is enough while another host is there, and
     /// while none is.
-    fn check(hosts: &[&str], change: impl Fn(usize, &mut Loss), expected: [bool; 2]) {
-        let mut losses = Losses::default();
+    fn check(hosts: &[&str], change: impl Fn(usize, &mut LostWorker), expected: [bool; 2]) {
+        let mut crashes = Crashes::default();
         for (process, host) in hosts.iter().enumerate() {
-            let mut loss = Loss {
+            let mut loss = LostWorker {
                 worker: WorkerName::new(host, process as u32, 0),
                 cause: Cause::StreamBroke,
                 at: Duration::ZERO,
                 alone: true,
-                proven: true,
+                has_answered: true,
             };
             change(process, &mut loss);
-            losses.add(&loss);
+            crashes.add(&loss);
         }
-        let found = [true, false].map(|untried| losses.are_enough(|| untried));
-        assert_eq!(found, expected, "{losses:?}");
+        let found = [true, false].map(|untried| crashes.reach_limit(|| untried));
+        assert_eq!(found, expected, "{crashes:?}");
     }
 
     #[test]
@@ -149,14 +149,14 @@ mod tests {
     fn what_is_no_death_over_it_counts_little_or_nothing() {
         let hosts = ["a", "b", "c", "d", "e", "f", "g", "h", "i"];
         let eleven = ["a"; 11];
-        let nothing: [fn(usize, &mut Loss); 2] =
+        let nothing: [fn(usize, &mut LostWorker); 2] =
             [|_, loss| loss.alone = false, |_, loss| loss.cause = Cause::Announced];
         for change in nothing {
             check(&hosts, change, [false, false]);
             check(&eleven, change, [false, false]);
         }
-        let little: [fn(usize, &mut Loss); 3] = [
-            |_, loss| loss.proven = false,
+        let little: [fn(usize, &mut LostWorker); 3] = [
+            |_, loss| loss.has_answered = false,
             |_, loss| loss.cause = Cause::Silence,
             |_, loss| loss.cause = Cause::Misbehaviour,
         ];
@@ -164,29 +164,29 @@ mod tests {
             check(&hosts, change, [false, false]);
             check(&eleven, change, [true, true]);
         }
-        check(&hosts[..4], |i, loss| loss.proven = i < 2, [false, false]);
-        check(&hosts[..4], |i, loss| loss.proven = i < 3, [true, true]);
+        check(&hosts[..4], |i, loss| loss.has_answered = i < 2, [false, false]);
+        check(&hosts[..4], |i, loss| loss.has_answered = i < 3, [true, true]);
     }
 
     #[test]
     fn who_comes_back_did_not_die() {
         let name = WorkerName::new("a", 1, 7);
-        let loss = |cause| Loss {
+        let loss = |cause| LostWorker {
             worker: name.clone(),
             cause,
             at: Duration::ZERO,
             alone: true,
-            proven: true,
+            has_answered: true,
         };
         for (cause, left) in
             [(Cause::StreamBroke, 0), (Cause::Silence, 0), (Cause::Misbehaviour, 1)]
         {
-            let mut losses = Losses::default();
-            losses.add(&loss(cause));
-            losses.forgive(&WorkerName::new("a", 1, 8));
-            assert_eq!(losses.count(), 1);
-            losses.forgive(&name);
-            assert_eq!(losses.count(), left, "{cause:?}");
+            let mut crashes = Crashes::default();
+            crashes.add(&loss(cause));
+            crashes.forget(&WorkerName::new("a", 1, 8));
+            assert_eq!(crashes.count(), 1);
+            crashes.forget(&name);
+            assert_eq!(crashes.count(), left, "{cause:?}");
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Points that are computed before the search asks for them.
 
 use super::*;
-use crate::state::Stage;
+use crate::batch::Purpose;
+use crate::job::Stage;
 
 /// A search over one parameter, whose second point is known from the first on, with workers 1, 2, …
 /// of one thread, each on a host of its own.
@@ -38,10 +39,10 @@ fn an_idle_worker_computes_the_next_point_and_nobody_sees_it_before_its_time() {
 fn what_is_under_way_becomes_the_evaluation() {
     let mut rig = rig(2);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    assert!(rig.state.batches[&BatchId(2)].ahead);
+    assert_eq!(rig.state.batches[&BatchId(2)].purpose, Purpose::Speculative);
     rig.check(evaluation(0), &[]);
     let batch = &rig.state.batches[&BatchId(2)];
-    assert!(!batch.ahead && batch.charged > Duration::ZERO);
+    assert!(batch.purpose == Purpose::Fill && batch.charged > Duration::ZERO);
     assert_eq!(rig.event(answer(2, 2, 0, 1))[0], "store job 1 evaluation 1");
 }
 
@@ -107,7 +108,7 @@ fn nobody_else_is_risked_for_a_point_over_which_a_worker_was_lost() {
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     // Now it is asked for, and goes alone to whom most may be expected of.
     rig.check(evaluation(0), &["send 1: batch 3 = 0+1"]);
-    assert!(rig.state.batches[&BatchId(3)].exclusive);
+    assert_eq!(rig.state.batches[&BatchId(3)].purpose, Purpose::Exclusive);
 }
 
 #[test]
@@ -123,12 +124,12 @@ fn memory_is_for_what_is_asked_for() {
     rig.state.config.active_realizations_max = 5;
     rig.accept(identification(2));
     rig.event(hello(1, 4));
-    assert_eq!(rig.state.jobs[&JobId(1)].ahead.evaluations.len(), 1);
+    assert_eq!(rig.state.jobs[&JobId(1)].speculation.evaluations.len(), 1);
     // Another job begins, and there is no room for both.
     rig.event(submit(1, "", propagation(2)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+2"];
     rig.check(stored(2, RecordKey::Job), &expected);
-    assert!(rig.state.jobs[&JobId(1)].ahead.evaluations.is_empty());
+    assert!(rig.state.jobs[&JobId(1)].speculation.evaluations.is_empty());
 }
 
 #[test]

@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use osteon_common::version;
 
-use super::{Effects, jobs};
+use super::jobs;
 use crate::config::Config;
 use crate::effect::Effect;
 use crate::ids::JobId;
-use crate::state::{EndedJob, Expelled, Job, RequestName, Stage, State, sequence};
-use crate::store::{ExpulsionRecord, JobRecord, Store, StoreError};
+use crate::job::{EndedJob, Job, RequestName, Stage, sequence};
+use crate::reactor::turn::Turn;
+use crate::state::{Banned, State};
+use crate::store::{BanRecord, JobRecord, Store, StoreError};
 
 /// What a store holds, its evaluations aside.
 #[derive(Debug, Default)]
@@ -18,7 +20,7 @@ pub struct Restored {
     ended: Vec<(JobId, EndedJob)>,
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
-    expelled: Vec<ExpulsionRecord>,
+    banned: Vec<BanRecord>,
     last_forgotten: Option<JobId>,
 }
 
@@ -26,7 +28,7 @@ impl Restored {
     /// Reads a store. Blocks.
     ///
     /// A job that has not ended and whose evaluations were computed with other numerics than this
-    /// program's begins again: results of two numerics never mix. Workers stay expelled while
+    /// program's begins again: results of two numerics never mix. Workers stay banned while
     /// their answers may be in the evaluations of an unfinished job.
     ///
     /// # Errors
@@ -43,9 +45,9 @@ impl Restored {
             keep_numerics(store, record, evaluations)?;
         }
         if restored.unfinished.is_empty() {
-            store.forget_expulsions()?;
+            store.forget_bans()?;
         }
-        restored.expelled = store.expulsions()?;
+        restored.banned = store.bans()?;
         restored.last_forgotten = store.last_forgotten()?;
         Ok(restored)
     }
@@ -83,9 +85,9 @@ impl Restored {
         self.ended.len()
     }
 
-    /// How many workers are expelled.
-    pub fn expelled(&self) -> usize {
-        self.expelled.len()
+    /// How many workers are banned.
+    pub fn banned(&self) -> usize {
+        self.banned.len()
     }
 }
 
@@ -93,11 +95,10 @@ impl State {
     /// A coordinator that goes on with what was `restored`, as of `now`.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let mut effects = Effects::new();
-        let Restored { ended, unfinished, expelled, last_forgotten } = restored;
+        let Restored { ended, unfinished, banned, last_forgotten } = restored;
         state.next_job = last_forgotten.map_or(1, |job| job.0 + 1);
-        let durable = |record| Expelled { record, store_at: None, refused: false };
-        state.expelled = expelled.into_iter().map(durable).collect();
+        let durable = |record| Banned { record, store_at: None, refused: false };
+        state.banned = banned.into_iter().map(durable).collect();
         for (id, mut job) in ended {
             // Snapshots were published while the end was on its way to the store.
             job.sequence = sequence(job.sequence, now);
@@ -110,7 +111,9 @@ impl State {
             state.waiting.push_back(id);
             state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
         }
-        jobs::begin_waiting(&mut state, now, &mut effects);
+        let mut turn = Turn::new(&mut state, now);
+        jobs::begin_waiting(&mut turn);
+        let effects = turn.effects;
         (state, effects)
     }
 

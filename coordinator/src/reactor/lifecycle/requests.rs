@@ -8,47 +8,43 @@ use osteon_common::job::{Data, Group, JobSpecification};
 use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
-use super::{Effects, jobs, prune, workers};
+use super::{jobs, prune, workers};
 use crate::effect::{Answer, Effect, Record, Refusal};
 use crate::event::Request;
 use crate::ids::{JobId, Token, WorkerId};
+use crate::job::{Job, RequestName, Stage, identity};
+use crate::reactor::turn::Turn;
 use crate::snapshot;
-use crate::state::{Job, RequestName, Stage, State, identity};
+use crate::state::State;
 use crate::store::JobRecord;
 use crate::worker_list;
 
-/// Most expelled workers that are shown.
-const EXPELLED_SHOWN_MAX: usize = 1000;
+/// Most banned workers that are shown.
+const BANNED_SHOWN_MAX: usize = 1000;
 
-pub(super) fn requested(
-    state: &mut State,
-    token: Token,
-    request: Request,
-    now: Duration,
-    effects: &mut Effects,
-) {
+pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
     let answer = match request {
         Request::Submit { specification, request_id, client, priority, name } => {
             let submission = Submission { specification, request_id, client, priority, name };
-            match submit(state, token, submission, now, effects) {
+            match submit(turn, token, submission) {
                 Ok(answer) => answer,
                 Err(refusal) => Some(Answer::Refused(refusal)),
             }
         }
-        Request::Get(job) => Some(get(state, job, now)),
-        Request::List { after, limit } => Some(list(state, after, limit, now)),
-        Request::Cancel(job) => cancel(state, token, job, now, effects),
-        Request::Fetch(job) => Some(fetch(state, job)),
-        Request::Expelled => Some(expelled(state, now)),
-        Request::Workers => Some(Answer::Workers(worker_list::all(state, now))),
-        Request::DrainWorker(worker) => Some(drain(state, worker, now, effects)),
+        Request::Get(job) => Some(get(turn.state, job, turn.now)),
+        Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
+        Request::Cancel(job) => cancel(turn, token, job),
+        Request::Fetch(job) => Some(fetch(turn.state, job)),
+        Request::Banned => Some(banned(turn.state, turn.now)),
+        Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
+        Request::DrainWorker(worker) => Some(drain(turn, worker)),
         Request::Prune(retention) => {
-            prune::requested(state, token, retention, now, effects);
+            prune::requested(turn, token, retention);
             None
         }
     };
     if let Some(answer) = answer {
-        effects.push(Effect::Answer { token, answer });
+        turn.effects.push(Effect::Answer { token, answer });
     }
 }
 
@@ -63,42 +59,40 @@ struct Submission {
 
 /// Accepts a job; the answer comes when it is durable.
 fn submit(
-    state: &mut State,
+    turn: &mut Turn,
     token: Token,
     submission: Submission,
-    now: Duration,
-    effects: &mut Effects,
 ) -> Result<Option<Answer>, Refusal> {
     let Submission { specification, request_id, client, priority, name } = submission;
-    if state.draining {
+    if turn.state.draining {
         return Err(Refusal::Draining);
     }
     let request = RequestName::new(&client, &request_id);
-    if let Some(known) = request.as_ref().and_then(|request| state.requests.get(request)) {
-        return resubmit(state, token, *known, &specification, request_id);
+    if let Some(known) = request.as_ref().and_then(|request| turn.state.requests.get(request)) {
+        return resubmit(turn.state, token, *known, &specification, request_id);
     }
-    if state.unfinished() >= JOBS_MAX {
+    if turn.state.unfinished() >= JOBS_MAX {
         return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
     }
-    find_room(state, &client, bytes(&specification))?;
-    let id = JobId(state.next_job);
-    state.next_job += 1;
-    state.requests.extend(request.map(|request| (request, id)));
+    find_room(turn.state, &client, bytes(&specification))?;
+    let id = JobId(turn.state.next_job);
+    turn.state.next_job += 1;
+    turn.state.requests.extend(request.map(|request| (request, id)));
     let fingerprint = version::fingerprint();
     let record = JobRecord {
         job: id,
         request_id,
         specification,
-        accepted: now,
+        accepted: turn.now,
         fingerprint,
         client,
         priority,
         name,
     };
-    effects.push(Effect::Store(Record::Job(record.clone())));
-    let mut job = Job::new(record, Stage::Accepting, 0, now);
+    turn.effects.push(Effect::Store(Record::Job(record.clone())));
+    let mut job = Job::new(record, Stage::Accepting, 0, turn.now);
     job.tokens.push(token);
-    state.jobs.insert(id, job);
+    turn.state.jobs.insert(id, job);
     Ok(None)
 }
 
@@ -173,20 +167,14 @@ fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Ans
 }
 
 /// Cancels a job; the answer comes when its end is durable.
-fn cancel(
-    state: &mut State,
-    token: Token,
-    id: JobId,
-    now: Duration,
-    effects: &mut Effects,
-) -> Option<Answer> {
-    match state.jobs.get_mut(&id) {
+fn cancel(turn: &mut Turn, token: Token, id: JobId) -> Option<Answer> {
+    match turn.state.jobs.get_mut(&id) {
         Some(job) if !matches!(job.stage, Stage::Accepting) => {
             job.tokens.push(token);
-            jobs::cancel(state, id, now, effects);
+            jobs::cancel(turn, id);
             None
         }
-        _ => Some(get(state, id, now)),
+        _ => Some(get(turn.state, id, turn.now)),
     }
 }
 
@@ -201,20 +189,20 @@ fn fetch(state: &State, id: JobId) -> Answer {
 }
 
 /// Sends a worker away; how it stands then.
-fn drain(state: &mut State, worker: WorkerId, now: Duration, effects: &mut Effects) -> Answer {
-    match workers::send_away(state, worker, now, effects) {
-        Ok(()) => worker_list::of(state, worker, now)
+fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
+    match workers::send_away(turn, worker) {
+        Ok(()) => worker_list::of(turn.state, worker, turn.now)
             .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
         Err(refusal) => Answer::Refused(refusal),
     }
 }
 
-fn expelled(state: &State, now: Duration) -> Answer {
-    let newest = state.expelled.len().saturating_sub(EXPELLED_SHOWN_MAX);
+fn banned(state: &State, now: Duration) -> Answer {
+    let newest = state.banned.len().saturating_sub(BANNED_SHOWN_MAX);
     let shown = state
-        .expelled
+        .banned
         .iter()
         .skip(newest)
-        .map(|expelled| (expelled.record.clone(), now.saturating_sub(expelled.record.at)));
-    Answer::Expelled(shown.collect())
+        .map(|banned| (banned.record.clone(), now.saturating_sub(banned.record.at)));
+    Answer::Banned(shown.collect())
 }

@@ -1,4 +1,4 @@
-//! Stored evaluations told again: after an expulsion, and after a restart.
+//! Stored evaluations told again: after a ban, and after a restart.
 
 use std::collections::BTreeSet;
 
@@ -180,16 +180,16 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
 }
 
 #[test]
-fn the_evaluations_of_an_expelled_worker_are_computed_again() {
+fn the_evaluations_of_a_banned_worker_are_computed_again() {
     let (mut rig, store) = rig(&[1, 2], 3);
     let effects = expose(&mut rig, 2);
     assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
-    // Nothing is read before the expulsion is durable.
+    // Nothing is read before the ban is durable.
     assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
     rig.check_after(Duration::from_secs(2), &[]);
-    rig.check(not_stored(2, RecordKey::Expulsion(1)), &[]);
+    rig.check(not_stored(2, RecordKey::Ban(1)), &[]);
     rig.check_after(Duration::ZERO, &[&effects[0]]);
-    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), [""; 0]);
     rig.event(hello_of(60, 3, 1));
@@ -210,7 +210,7 @@ fn the_evaluations_of_an_expelled_worker_are_computed_again() {
 fn an_evaluation_that_changes_is_the_last_of_its_path() {
     let (mut rig, mut store) = rig(&[2], 3);
     expose(&mut rig, 2);
-    rig.event(stored(2, RecordKey::Expulsion(1)));
+    rig.event(stored(2, RecordKey::Ban(1)));
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     rig.event(hello_of(60, 3, 1));
     let different = answer(60, batch_of(&rig, JobId(1)), 77, 1);
@@ -227,22 +227,22 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
 }
 
 #[test]
-fn an_expulsion_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
+fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let (mut rig, _) = rig(&[2], 1);
     rig.state.config.store_patience = Some(Duration::from_secs(4));
-    let expelled = expose(&mut rig, 2).swap_remove(0);
+    let banned = expose(&mut rig, 2).swap_remove(0);
     let failed = || Event::StoreFailed {
         job: JobId(2),
-        key: RecordKey::Expulsion(1),
+        key: RecordKey::Ban(1),
         error: "the disk is full".to_owned(),
     };
     for _ in 0..2 {
         rig.check(failed(), &[]);
-        rig.check_after(Duration::from_secs(2), &[&expelled]);
+        rig.check_after(Duration::from_secs(2), &[&banned]);
     }
     rig.check(failed(), &["despair after 4s: the disk is full"]);
-    rig.check_after(Duration::from_secs(2), &[&expelled]);
-    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    rig.check_after(Duration::from_secs(2), &[&banned]);
+    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
 }
 
 /// A search of one evaluation, answered by process 2, whose end the store has refused.
@@ -268,7 +268,7 @@ fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
     let mut rig = refused_end();
     rig.check(not_stored(1, RecordKey::End), &[]);
     expose(&mut rig, 2);
-    rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     // Nothing is written meanwhile that is not so.
     rig.check_after(Duration::from_secs(1), &[]);
 
@@ -282,12 +282,12 @@ fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
         let effects = expose(&mut rig, 2);
         assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
         rig.check(not_stored(1, RecordKey::End), &[]);
-        rig.check(stored(2, RecordKey::Expulsion(1)), &["read job 1 evaluation 0"]);
+        rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     }
 
     // On its way, and durable: the log names it.
     let mut rig = refused_end();
     expose(&mut rig, 2);
     rig.check(stored(1, RecordKey::End), &["publish 1"]);
-    rig.check(stored(2, RecordKey::Expulsion(1)), &[]);
+    rig.check(stored(2, RecordKey::Ban(1)), &[]);
 }

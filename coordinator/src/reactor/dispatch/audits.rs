@@ -1,0 +1,68 @@
+//! Who computes a batch a second time, and who decides between two answers that differ.
+
+use super::{batches, poison};
+use crate::batch::{Assignment, Purpose};
+use crate::dispute::Dispute;
+use crate::evaluation::Audit;
+use crate::ids::{JobId, WorkerId};
+use crate::reactor::turn::Turn;
+use crate::state::{State, Worker};
+
+/// Gives a worker something to check, if there is something that it may: disputes first.
+pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
+    let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone()) else {
+        return false;
+    };
+    let on_probation = turn.state.probation.has(&name);
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        if let Some(at) = dispute_for(turn.state, job, worker) {
+            return hand_dispute(turn, job, at, worker);
+        }
+        if on_probation {
+            continue;
+        }
+        let Some(evaluation) = turn.state.evaluation_mut(job) else {
+            continue;
+        };
+        let attempt = evaluation.attempt;
+        let of_others = |audit: &Audit| audit.by != name;
+        let at = evaluation.audits.iter().position(of_others);
+        if let Some(audit) = at.and_then(|at| evaluation.audits.remove(at)) {
+            evaluation.audits_out += 1;
+            let assignment = Assignment { job, attempt, indices: audit.indices };
+            let purpose = Purpose::Audit { lost: audit.lost };
+            batches::send(turn, worker, assignment, purpose);
+            return true;
+        }
+    }
+    false
+}
+
+/// The first dispute of a job that this worker is to decide: of those that may, nobody can be
+/// expected to do better.
+fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let worker = state.workers.get(&worker)?;
+    let is_for = |dispute: &Dispute| {
+        let reputation = |worker: &Worker| poison::reputation(state, worker, &dispute.crashes);
+        let may = |worker: &&Worker| !worker.draining && !dispute.involves(&worker.name);
+        let best = state.workers.values().filter(may).map(reputation).min();
+        dispute.tie_breakers.is_empty() && may(&worker) && best == Some(reputation(worker))
+    };
+    evaluation.disputes.iter().position(is_for)
+}
+
+/// Has a worker decide a dispute.
+fn hand_dispute(turn: &mut Turn, job: JobId, at: usize, worker: WorkerId) -> bool {
+    let Some(evaluation) = turn.state.evaluation_mut(job) else {
+        return false;
+    };
+    let (attempt, indices) = (evaluation.attempt, evaluation.disputes[at].indices);
+    let assignment = Assignment { job, attempt, indices };
+    let batch = batches::send(turn, worker, assignment, Purpose::TieBreak);
+    if let Some(evaluation) = turn.state.evaluation_mut(job) {
+        evaluation.disputes[at].tie_breakers.extend(batch);
+    }
+    batch.is_some()
+}

@@ -1,0 +1,35 @@
+//! A worker leaves the list of those that are attached.
+
+use crate::close_reason::CloseReason;
+use crate::effect::Effect;
+use crate::ids::WorkerId;
+use crate::notice::{Departure, Notice};
+use crate::reactor::turn::Turn;
+use crate::state::{DEPARTED_MAX, Departed, Worker};
+
+/// Closes the stream of a worker that wanted to leave and holds nothing any more.
+pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
+    let drained = |worker: &Worker| worker.draining && worker.in_flight.is_empty();
+    if turn.state.workers.get(&worker).is_some_and(drained) {
+        let reason = CloseReason::Drained;
+        turn.effects.push(Effect::Close { worker, reason: reason.clone() });
+        depart(turn, worker, Departure::Closed(reason));
+    }
+}
+
+/// Removes a worker from the state and returns it: later events of it mean nothing. The caller gives
+/// back the batches that it held.
+pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<Worker> {
+    let gone = turn.state.workers.remove(&worker)?;
+    if turn.state.workers.is_empty() {
+        turn.state.no_worker_since = turn.now;
+    }
+    let (name, batches) = (gone.name.clone(), gone.in_flight.len());
+    let departed = Departed { worker, name: name.clone(), at: turn.now, batches, why: why.clone() };
+    turn.state.departed.push_back(departed);
+    if turn.state.departed.len() > DEPARTED_MAX {
+        turn.state.departed.pop_front();
+    }
+    turn.effects.push(Effect::Note(Notice::WorkerDetached { worker, name, batches, why }));
+    Some(gone)
+}

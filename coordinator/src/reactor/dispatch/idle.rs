@@ -1,0 +1,171 @@
+//! Speculative batches for idle slots, and when these slots had better wait.
+//!
+//! A realization that is begun is not given up before its end, so a slot that is wanted in a
+//! moment waits for that: it waits where the evaluation of the same job is about to be complete,
+//! since then another point may be likelier, and where another job is about to want it.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_common::parameters::Point;
+
+use super::speculation::realizations;
+use super::{batches, eta, sizing};
+use crate::batch::{Assignment, Purpose};
+use crate::evaluation::Evaluation;
+use crate::fairness;
+use crate::ids::{JobId, WorkerId};
+use crate::indices::Indices;
+use crate::job::{Job, Stage};
+use crate::reactor::turn::Turn;
+use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
+
+/// When the last batch of what each search waits for should be answered.
+type Etas = BTreeMap<JobId, Duration>;
+
+/// Hands out speculative batches to the workers with idle slots.
+pub(crate) fn hand_out(turn: &mut Turn) {
+    if next(turn.state).is_none() {
+        return;
+    }
+    let idle = turn.state.workers.iter().map(|(id, worker)| (*id, spare(turn.state, worker)));
+    let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, slots)| *slots > 0).collect();
+    let mut slots: u64 = idle.iter().map(|(_, slots)| slots).sum();
+    let etas = eta::etas(turn.state);
+    let mut wanted = next(turn.state);
+    for (worker, spare) in idle {
+        let Some((job, point)) = wanted else {
+            return;
+        };
+        if !waits(turn.state, job, &point, worker, slots, &etas, turn.now) {
+            send(turn, job, point, worker);
+            slots -= spare;
+            wanted = next(turn.state);
+        }
+    }
+}
+
+/// Chooses the point to compute speculatively next, and its job: what a search will ask for as soon as a record is durable, then
+/// of all jobs that which is likeliest among its job's, then as for other work.
+fn next(state: &State) -> Option<(JobId, Point)> {
+    let of_job = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let has_room = || {
+            let more = job.record.specification.monte_carlo.realizations;
+            realizations(state) + more <= state.config.active_realizations_max
+        };
+        let place =
+            job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
+                Some(begun) => !begun.queue.is_empty() && !begun.lost_over,
+                None => has_room(),
+            })?;
+        let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });
+        let had = state.shares.used(&job.record.client);
+        Some((!certain, place, had, Reverse(job.record.priority), *id))
+    };
+    let (_, place, .., id) = state.active.iter().filter_map(of_job).min()?;
+    let point = state.jobs.get(&id)?.speculation.candidates.get(place)?;
+    Some((id, *point))
+}
+
+/// Whether the idle slots of a worker had better wait; `slots` are idle in all.
+fn waits(
+    state: &State,
+    id: JobId,
+    point: &Point,
+    worker: WorkerId,
+    slots: u64,
+    etas: &Etas,
+    now: Duration,
+) -> bool {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return true;
+    };
+    let spare = spare(state, attached);
+    // What is begun on each slot is not given up before it ends.
+    let begun = spare.min(queued(job, point)) as f64;
+    let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
+    let takes = fairness::slot_time(seconds, 1);
+    let soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
+    etas.get(&id).is_some_and(soon)
+        || slots < spare + wanted_by_others(state, id, now + takes, etas)
+}
+
+/// Counts the realizations of a point that nobody computes.
+fn queued(job: &Job, point: &Point) -> u64 {
+    let realizations = job.record.specification.monte_carlo.realizations;
+    job.speculation.at(point).map_or(realizations, Evaluation::queued)
+}
+
+/// Counts the slots that jobs other than `but` will want before `until`, besides those they have.
+fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
+    let wanted = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let specification = &job.record.specification;
+        let realizations = specification.monte_carlo.realizations;
+        match &job.stage {
+            Stage::Storing { .. } if specification.kind == JobKind::Propagation => None,
+            Stage::Computing(evaluation) => {
+                let soon = etas.get(id).is_some_and(|eta| *eta < until);
+                soon.then_some(evaluation.filled())
+            }
+            Stage::Storing { .. } if has_next(job) => None,
+            Stage::Storing { .. } | Stage::Replaying { .. } => Some(realizations),
+            Stage::Accepting | Stage::Waiting | Stage::Finishing(_) => None,
+        }
+    };
+    state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
+}
+
+/// Whether all of the point is handed out that a job will ask for when its record is durable.
+fn has_next(job: &Job) -> bool {
+    let next = job.speculation.candidates.first().and_then(|next| job.speculation.at(next));
+    next.is_some_and(|next| next.queue.is_empty())
+}
+
+/// Gives the idle slots of a worker a batch of a point.
+fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
+    let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
+    else {
+        return;
+    };
+    let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
+    let size = match batches::realizations_held(turn.state, attached) {
+        0 => sizing::batch_size(turn.state, attached, id, queued).max(spare.min(queued)),
+        _ => spare,
+    };
+    let Some((attempt, indices)) = take(turn.state, id, point, size) else {
+        return;
+    };
+    let assignment = Assignment { job: id, attempt, indices };
+    batches::send(turn, worker, assignment, Purpose::Speculative);
+}
+
+/// Takes indices of a point, whose evaluation is begun now if it was not; returns them with the
+/// number of the attempt.
+fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
+    let attempt = state.new_attempt();
+    let job = state.jobs.get_mut(&id)?;
+    if job.speculation.at(&point).is_none() {
+        // The soonest that it may become; which decides no more than what is audited.
+        let number = job.search.evaluations() + 1;
+        let realizations = job.record.specification.monte_carlo.realizations;
+        job.speculation.evaluations.push(Evaluation::new(number, attempt, point, realizations));
+    }
+    let evaluation = job.speculation.at_mut(&point)?;
+    Some((evaluation.attempt, evaluation.take(size)?))
+}
+
+/// Counts the slots of a worker that nobody has work for.
+fn spare(state: &State, worker: &Worker) -> u64 {
+    let holds = |purpose| state.held_for(worker, purpose).next().is_some();
+    let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
+    let failing = state.is_failing(worker.name.host());
+    let taken = holds(Purpose::Speculative) || holds(Purpose::Exclusive);
+    if !state.is_sound(worker) || full || failing || taken {
+        return 0;
+    }
+    u64::from(worker.hello.slots).saturating_sub(batches::realizations_held(state, worker))
+}

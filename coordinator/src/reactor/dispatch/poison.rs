@@ -1,0 +1,161 @@
+//! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
+//! which worker gets them, and when so many workers crashed over one that it is poison.
+//!
+//! A bad node that has just come back is the one with nothing to do, so being idle is no
+//! recommendation: a quarantined realization goes to the worker with the best reputation, and waits
+//! for it. One over which a worker was lost goes to the worker that has been there longest among
+//! these, so that a node that comes and goes never has it while another is there.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use osteon_common::case::Case;
+use osteon_common::case_file;
+use osteon_common::job::JobSpecification;
+use osteon_common::parameters::Point;
+use osteon_common::realization::Ensemble;
+
+use super::{batches, schedule};
+use crate::batch::{Assignment, Purpose};
+use crate::crashes::Crashes;
+use crate::failure::Failure;
+use crate::ids::{JobId, WorkerId};
+use crate::indices::Indices;
+use crate::reactor::turn::Turn;
+use crate::state::{State, Worker};
+use crate::worker_name::WorkerName;
+
+/// How long the crashes of a host are remembered when no more come.
+const MEMORY: Duration = Duration::from_secs(600);
+
+/// How little may be expected of a worker, the least last: whether its host's workers are lost over
+/// whatever they hold, whether it does not answer what it holds (which costs time, and fails no
+/// job), whether one was lost over this, whether it has not answered anything yet.
+pub(crate) type Reputation = (bool, bool, bool, bool);
+
+/// Hands out quarantined realizations, each alone to a worker that holds nothing. Returns the workers
+/// that are reserved: they get nothing else, so that they hold nothing soon.
+pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
+    let mut kept = BTreeSet::new();
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        while let Some((index, worker)) = next(turn.state, job, turn.now) {
+            let holds = |worker: &Worker| schedule::held(turn.state, worker) > 0;
+            if turn.state.workers.get(&worker).is_none_or(holds) {
+                kept.insert(worker);
+                break;
+            }
+            batches::preempt(turn, worker);
+            send(turn, job, index, worker);
+        }
+    }
+    kept
+}
+
+/// Chooses the next quarantined realization of a job that may be handed out, and its worker.
+fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let crashes = |index: &u64| evaluation.crashes.get(index);
+    let open = |index: &&u64| {
+        crashes(index).is_none_or(|crashes| !crash_limit_reached(state, crashes, |_| true))
+    };
+    let index = evaluation.quarantine.iter().find(open)?;
+    let nobody = Crashes::default();
+    let crashes = crashes(index).unwrap_or(&nobody);
+    Some((*index, taker(state, crashes, now)?))
+}
+
+/// Chooses the worker of a realization over which these crashed, if there is one: a worker that has
+/// answered nothing yet shows first that it answers something else, if there is something else.
+fn taker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
+    let rank = |(id, worker): &(&WorkerId, &Worker)| {
+        let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
+        (reputation(state, worker, crashes), held, **id)
+    };
+    let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);
+    let (id, worker) = takers.min_by_key(rank)?;
+    let recent = crashes.last().is_some_and(|last| now.saturating_sub(last) < state.config.expiry);
+    let harmless = worker.has_answered
+        || (schedule::next_job(state).is_none()
+            && !(recent && state.is_failing(worker.name.host())));
+    harmless.then_some(*id)
+}
+
+fn send(turn: &mut Turn, job: JobId, index: u64, worker: WorkerId) {
+    let Some(evaluation) = turn.state.evaluation_mut(job) else {
+        return;
+    };
+    evaluation.quarantine.retain(|waiting| *waiting != index);
+    let indices = Indices { first: index, count: 1 };
+    let assignment = Assignment { job, attempt: evaluation.attempt, indices };
+    batches::send(turn, worker, assignment, Purpose::Exclusive);
+}
+
+/// Forgets the crashes of a worker that is back: nothing that it held is to blame for its absence.
+pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
+    if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
+        lost.workers.retain(|lost| lost != name);
+    }
+    for job in state.jobs.values_mut() {
+        job.evaluations_mut().for_each(|evaluation| evaluation.forget_crashes(name));
+    }
+}
+
+/// Forgets the crashes of hosts that have lost nobody for long.
+pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
+    state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
+}
+
+/// Returns the failure of a job with a poison realization, if it has one.
+pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
+    let waiting = evaluation.quarantine.iter().filter_map(over);
+    let is_poison = |(_, crashes): &(u64, &Crashes)| is_poison(state, crashes, |_| true, now);
+    let (index, crashes) = waiting.into_iter().find(is_poison)?;
+    let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
+    let specification = &state.jobs.get(&job)?.record.specification;
+    let case = case_file(specification, &evaluation.point, index);
+    Some(Failure::LethalRealization { index, workers: crashes.count(), hosts, case })
+}
+
+/// A realization as a complete case file. What is no elasticity is never solved, and kills nobody.
+fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
+    let ensemble = Ensemble::drawn(point, specification.monte_carlo.germs()).ok();
+    let bone = ensemble.and_then(|ensemble| ensemble.bone(index).ok());
+    let case = bone.map(|bone| Case { setup: specification.setup, bone });
+    case.map_or_else(String::new, |case| case_file::to_toml(&case))
+}
+
+/// Whether something that those in `of` may have is poison: the crash limit is reached, and the lost
+/// workers have stayed away for so long that they will not come back.
+pub(crate) fn is_poison(
+    state: &State,
+    crashes: &Crashes,
+    of: impl Fn(&WorkerName) -> bool,
+    now: Duration,
+) -> bool {
+    let long = |last| now.saturating_sub(last) >= state.config.expiry;
+    crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
+}
+
+/// Whether no worker in `of` is to be risked any more for something over which these crashed.
+pub(crate) fn crash_limit_reached(
+    state: &State,
+    crashes: &Crashes,
+    of: impl Fn(&WorkerName) -> bool,
+) -> bool {
+    let untried = |worker: &Worker| {
+        let (failing, silent, lost, _) = reputation(state, worker, crashes);
+        let stayed = crashes.first().is_some_and(|first| worker.attached < first);
+        !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
+    };
+    crashes.reach_limit(|| state.workers.values().any(untried))
+}
+
+/// Returns how little may be expected of a worker at something over which these crashed.
+pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> Reputation {
+    let host = worker.name.host();
+    let silent = state.probation.has(&worker.name);
+    (state.is_failing(host), silent, crashes.are_of(host), !worker.has_answered)
+}

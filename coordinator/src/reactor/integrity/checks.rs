@@ -1,0 +1,148 @@
+//! Checks of answers against answers: batches that are computed twice, and disputes where two differ.
+
+use std::time::Duration;
+
+use osteon_common::outcome::Solved;
+
+use super::bans;
+use crate::audit;
+use crate::batch::Assignment;
+use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
+use crate::evaluation::{Audit, Evaluation};
+use crate::failure::{Failure, shown};
+use crate::ids::{BatchId, JobId};
+use crate::reactor::dispatch::{overdue, poison};
+use crate::reactor::lifecycle::jobs;
+use crate::reactor::turn::Turn;
+use crate::state::State;
+use crate::worker_name::WorkerName;
+
+/// Has a batch that `by` has just answered computed a second time, if it is chosen and there is
+/// somebody else.
+pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
+    let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
+    if !state.answers_batches(|name| name != by) {
+        return;
+    }
+    let Assignment { job, indices, .. } = *assignment;
+    if let Some(evaluation) = state.evaluation_of_mut(assignment)
+        && audit::is_chosen(&key, job, evaluation.number, indices.first, fraction)
+    {
+        evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
+    }
+}
+
+/// Compares an answer with what is known of its indices.
+pub(crate) fn compare(
+    turn: &mut Turn,
+    assignment: &Assignment,
+    solved: &[Solved],
+    by: &WorkerName,
+) {
+    let Some(evaluation) = turn.state.evaluation_of_mut(assignment) else {
+        return;
+    };
+    let Some((indices, votes)) = evaluation.compare(assignment.indices, solved, by) else {
+        return;
+    };
+    let [earlier, later] = &votes;
+    if earlier.by == later.by {
+        let dispute = Dispute::new(indices, votes.clone(), turn.now);
+        let what = dispute.contradiction().map_or_else(String::new, |it| {
+            let [(_, earlier), (_, later)] = it.answers;
+            format!("realization {} as {} and as {}", it.index, shown(earlier), shown(later))
+        });
+        let reason = format!("answered {what}");
+        bans::ban(turn, by, assignment.job, reason);
+        return;
+    }
+    let known = |dispute: &Dispute| dispute.involves(&earlier.by) && dispute.involves(&later.by);
+    if !evaluation.disputes.iter().any(known) {
+        tracing::warn!(job = %assignment.job, one = %earlier.by, other = %later.by,
+            first = indices.first, "two workers answer differently; a third decides");
+        evaluation.disputes.push(Dispute::new(indices, votes, turn.now));
+    }
+}
+
+/// Takes the answer of a worker that was to decide.
+pub(crate) fn tie_broken(
+    turn: &mut Turn,
+    batch: BatchId,
+    assignment: &Assignment,
+    solved: Vec<Solved>,
+    by: &WorkerName,
+) {
+    let of_batch = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
+    let found = |it: &mut Evaluation| it.disputes.iter().position(of_batch);
+    let at = turn.state.evaluation_of_mut(assignment).and_then(found);
+    turn.state.settle(batch);
+    let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
+        return;
+    };
+    let dispute = &mut evaluation.disputes[at];
+    if let Some(verdict) = dispute.vote(Vote { by: by.clone(), solved }) {
+        evaluation.disputes.remove(at);
+        execute(turn, assignment.job, verdict);
+    }
+}
+
+/// Bans those who were not believed.
+fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
+    let Verdict { believed: [one, other], liars } = verdict;
+    for Contradiction { index, answers: [(_, right), (liar, wrong)] } in liars {
+        let reason = format!(
+            "answered realization {index} of job {job} with {}, while {one} and {other} agree on \
+             {}",
+            shown(wrong),
+            shown(right)
+        );
+        bans::ban(turn, &liar, job, reason);
+    }
+}
+
+/// Gives up what nobody is there to check, and what nobody survives to check. Without a check an
+/// answer is believed; two different answers without a third are the end of their job.
+pub(crate) fn give_up(turn: &mut Turn) {
+    if turn.state.draining {
+        // The next coordinator checks.
+        return;
+    }
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        give_up_audits(turn.state, job);
+        jobs::store_if_complete(turn, job);
+        if let Some(failure) = undecided(turn.state, job, turn.now) {
+            jobs::fail(turn, job, &failure);
+        }
+    }
+}
+
+fn give_up_audits(state: &mut State, job: JobId) {
+    let Some(evaluation) = state.evaluation_mut(job) else {
+        return;
+    };
+    if evaluation.audits.is_empty() {
+        return;
+    }
+    let mut audits = std::mem::take(&mut evaluation.audits);
+    audits.retain(|audit| state.answers_batches(|name| *name != audit.by));
+    if let Some(evaluation) = state.evaluation_mut(job) {
+        evaluation.audits = audits;
+    }
+}
+
+/// Why a job fails over its disputes, if it does.
+fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let hopeless = |dispute: &&Dispute| {
+        let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
+        let nobody = !state.answers_batches(|name| !dispute.involves(name));
+        let others = |name: &WorkerName| !dispute.involves(name);
+        let lethal = poison::is_poison(state, &dispute.crashes, others, now);
+        let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
+        !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
+    };
+    let dispute = evaluation.disputes.iter().find(hopeless)?;
+    let contradiction = Box::new(dispute.contradiction()?);
+    Some(Failure::Contradiction { contradiction, point: evaluation.point })
+}

@@ -1,0 +1,10 @@
+//! Jobs, their records and workers come and go.
+
+pub(super) mod jobs;
+pub(super) mod prune;
+pub(super) mod records;
+pub(super) mod replay;
+pub(super) mod requests;
+pub(super) mod restore;
+pub(super) mod ticks;
+pub(super) mod workers;

@@ -1,0 +1,223 @@
+//! A job's way from acceptance to its end.
+
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use osteon_common::results::Status;
+use osteon_common::version::Program;
+
+use crate::effect::{Effect, Record};
+use crate::failure::Failure;
+use crate::ids::JobId;
+use crate::job::{Job, Stage};
+use crate::notice::Notice;
+use crate::reactor::dispatch::{batches, speculation};
+use crate::reactor::turn::Turn;
+use crate::state::State;
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+use osteon_search::{Ending, Search, Step};
+
+/// Stores the evaluation of a job once it is complete and checked.
+pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let Stage::Computing(evaluation) = &mut job.stage else {
+        return;
+    };
+    let Some((outcomes, estimated_error)) = evaluation.complete() else {
+        return;
+    };
+    let (number, point) = (evaluation.number, evaluation.point);
+    // Only what was there and is the same leaves the path behind it as it was.
+    let is_last = evaluation.changes(&outcomes);
+    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
+    turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    let outcomes = record.outcomes.clone();
+    job.stage = Stage::Storing { record, is_last };
+    if is_last {
+        speculation::prepare(turn, id, &outcomes);
+    }
+}
+
+/// Ends a job because of `failure`.
+pub(crate) fn fail(turn: &mut Turn, id: JobId, failure: &Failure) {
+    let ending = Ending {
+        status: Status::Failed,
+        failure: Some(failure.kind()),
+        reason: Some(failure.to_string()),
+    };
+    finish(turn, id, ending);
+}
+
+/// Ends a job for a client, at once or as soon as what is being stored is stored.
+pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.cancelled = true;
+    match job.stage {
+        Stage::Waiting if job.stored > 0 => {
+            // What it leaves is in the store: nothing of it is computed, it waits for nobody.
+            begin(turn, id);
+        }
+        Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
+        // The store does not give what it would leave besides.
+        Stage::Replaying { .. } if job.trouble.is_some() => {
+            finish(turn, id, cancelled());
+        }
+        Stage::Accepting
+        | Stage::Replaying { .. }
+        | Stage::Storing { .. }
+        | Stage::Finishing(_) => {}
+    }
+}
+
+/// Begins waiting jobs while there is room: of the clients with the fewest active jobs, the
+/// highest priority first, of equal ones the oldest. A client without any active job finds room
+/// beyond the usual, so that no other client keeps it waiting.
+pub(crate) fn begin_waiting(turn: &mut Turn) {
+    while !turn.state.waiting.is_empty() && !turn.state.draining {
+        let Some(id) = next_waiting(turn.state).filter(|job| has_room(turn.state, *job)) else {
+            return;
+        };
+        begin(turn, id);
+    }
+}
+
+/// Whether a waiting job may begin: there is room for its evaluation, and a place.
+pub(crate) fn has_room(state: &State, id: JobId) -> bool {
+    let realizations = |id: &JobId| {
+        let job = state.jobs.get(id);
+        job.map_or(0, |job| job.record.specification.monte_carlo.realizations)
+    };
+    let Some(job) = state.jobs.get(&id) else {
+        return false;
+    };
+    let beyond = if state.shares.jobs(&job.record.client) == 0 { 2 } else { 1 };
+    let active = state.active.iter().map(realizations).sum::<u64>();
+    let fits =
+        active == 0 || active + realizations(&id) <= beyond * state.config.active_realizations_max;
+    fits && (state.active.len() as u64) < beyond * state.config.active_jobs_max as u64
+}
+
+/// The job that begins next.
+fn next_waiting(state: &State) -> Option<JobId> {
+    let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
+    let rank = |(id, job): &(JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        (state.shares.jobs(client), Reverse(*priority), *id)
+    };
+    waiting.min_by_key(rank).map(|(id, _)| id)
+}
+
+/// Begins a waiting job.
+fn begin(turn: &mut Turn, id: JobId) {
+    turn.state.waiting.retain(|waiting| *waiting != id);
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.progressed = turn.now;
+        turn.state.shares.begin(&job.record.client);
+        turn.state.active.insert(id);
+        turn.effects.push(Effect::Note(Notice::JobStarted { job: id, stored: job.stored }));
+        speculation::keep_bound(turn);
+        advance(turn, id);
+    }
+}
+
+/// Goes where the search wants to go, after it was told what the store has.
+pub(crate) fn advance(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    turn.state.changed.insert(id);
+    if job.search.evaluations() < job.stored {
+        read_next(turn, id);
+        return;
+    }
+    let ending = match job.search.ask() {
+        Step::Evaluate(_) if job.cancelled => cancelled(),
+        Step::Evaluate(point) => {
+            speculation::begin(turn, id, point);
+            store_if_complete(turn, id);
+            return;
+        }
+        Step::Done(ending) => ending,
+    };
+    finish(turn, id, ending);
+}
+
+/// Stores the end of a job; the world hears of it when it is durable.
+pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let search = &job.search;
+    // Of groups none is the job's.
+    let best = search.best().filter(|_| !search.is_grouped());
+    let program = Program::this(turn.state.config.commit);
+    let record = EndRecord::new(id, ending, program, turn.now, search.evaluations(), best);
+    let summary = Arc::new(search.summary());
+    turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
+    job.stage = Stage::Finishing(record);
+    job.trouble = None;
+    leave(turn, id);
+}
+
+/// Takes back an end that is not durable and not on its way to be: its answers are not to be
+/// relied on. The job waits for its turn and reads its stored evaluations again.
+pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.trouble = None;
+    job.restart_pending = false;
+    job.workers.clear();
+    job.search = Search::new(job.record.specification.clone());
+    job.stage = Stage::Waiting;
+    turn.state.waiting.push_back(id);
+    begin_waiting(turn);
+}
+
+/// Takes a job out of everything that concerns jobs under way.
+fn leave(turn: &mut Turn, id: JobId) {
+    if turn.state.active.remove(&id)
+        && let Some(job) = turn.state.jobs.get(&id)
+    {
+        turn.state.shares.end(&job.record.client);
+    }
+    turn.state.waiting.retain(|waiting| *waiting != id);
+    turn.state.changed.insert(id);
+    batches::revoke_all(turn, id);
+    for worker in turn.state.workers.values_mut() {
+        worker.rates.remove(&id);
+    }
+    begin_waiting(turn);
+}
+
+/// The end of a job whose client does not want it any more.
+pub(crate) fn cancelled() -> Ending {
+    Ending { status: Status::Cancelled, failure: None, reason: None }
+}
+
+/// Asks for the next stored evaluation of a job, unless a ban is not durable yet.
+pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
+    let may = !turn.state.ban_pending();
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.stage = Stage::Replaying { asked: may };
+        if may {
+            turn.effects.push(Effect::Read { job: id, number: job.search.evaluations() });
+        }
+    }
+}
+
+/// Restarts the search of an active job, which replays its stored evaluations.
+pub(crate) fn restart(turn: &mut Turn, id: JobId) {
+    batches::revoke_all(turn, id);
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.restart_pending = false;
+        job.workers.clear();
+        job.search = Search::new(job.record.specification.clone());
+        advance(turn, id);
+    }
+}

@@ -1,0 +1,122 @@
+//! What the passing of time brings: lost leases, signs of life, writes tried again, snapshots.
+
+use std::time::Duration;
+
+use super::{jobs, records, workers};
+use crate::close_reason::CloseReason;
+use crate::effect::Effect;
+use crate::ids::{JobId, WorkerId};
+use crate::job::sequence;
+use crate::reactor::dispatch::poison;
+use crate::reactor::turn::Turn;
+use crate::snapshot;
+use crate::state::{State, Worker};
+
+/// Unfinished jobs are published this often even if nothing about them changed but time.
+const PUBLISH_EVERY: Duration = Duration::from_secs(1);
+
+/// Takes a gap, in which this process did not run, out of all that silence is measured by: what came
+/// meanwhile is not read yet.
+pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
+    let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
+    if gap <= state.config.heartbeat {
+        return;
+    }
+    tracing::warn!(?gap, "the coordinator stood still; nobody is blamed for it");
+    let excused = |since: &mut Duration| *since = (*since + gap).min(now);
+    for worker in state.workers.values_mut() {
+        excused(&mut worker.last_seen);
+        excused(&mut worker.answered);
+        excused(&mut worker.missed.since);
+    }
+    for batch in state.batches.values_mut() {
+        excused(&mut batch.sent);
+        excused(&mut batch.begun);
+    }
+    for job in state.jobs.values_mut() {
+        for evaluation in job.evaluations_mut() {
+            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
+            for dispute in &mut evaluation.disputes {
+                excused(&mut dispute.since);
+                dispute.crashes.shift(excused);
+            }
+        }
+    }
+}
+
+/// Ends the leases of workers that were silent, or have not answered, for too long.
+pub(crate) fn expire(turn: &mut Turn) {
+    let expired: Vec<(WorkerId, CloseReason)> = turn
+        .state
+        .workers
+        .iter()
+        .filter_map(|(id, worker)| Some((*id, expired(turn.state, worker, turn.now)?)))
+        .collect();
+    for (worker, reason) in expired {
+        workers::close(turn, worker, reason);
+    }
+}
+
+/// Returns why the lease of a worker has ended, if it has.
+fn expired(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
+    let silent = now.saturating_sub(worker.last_seen);
+    if silent > state.config.expiry {
+        return Some(CloseReason::Expired { silent });
+    }
+    let oldest = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
+    let since = oldest.map(|batch| batch.sent).min()?.max(worker.answered);
+    let waited = now.saturating_sub(since);
+    (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
+}
+
+/// Gives signs of life to workers that have had none for some time.
+pub(crate) fn send_heartbeats(turn: &mut Turn) {
+    for (&id, worker) in &mut turn.state.workers {
+        if turn.now.saturating_sub(worker.heartbeat_sent) >= turn.state.config.heartbeat {
+            worker.heartbeat_sent = turn.now;
+            turn.effects.push(Effect::Heartbeat { worker: id });
+        }
+    }
+}
+
+/// Fails the jobs of realizations over which so many workers crashed that no more are risked.
+pub(crate) fn fail_poisoned(turn: &mut Turn) {
+    poison::forget_old_crashes(turn.state, turn.now);
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        if let Some(failure) = poison::failure(turn.state, job, turn.now) {
+            jobs::fail(turn, job, &failure);
+        }
+    }
+}
+
+/// Writes refused records again whose time has come.
+pub(crate) fn store_again(turn: &mut Turn) {
+    for job in turn.state.jobs.values_mut() {
+        let Some(trouble) = &mut job.trouble else {
+            continue;
+        };
+        if turn.now >= trouble.retry_at && !trouble.on_its_way {
+            trouble.on_its_way = true;
+            records::store_again(job, &mut turn.effects);
+        }
+    }
+}
+
+/// Publishes the jobs that changed, and now and then all unfinished ones.
+pub(crate) fn publish(turn: &mut Turn) {
+    if turn.now.saturating_sub(turn.state.published) >= PUBLISH_EVERY {
+        turn.state.published = turn.now;
+        turn.state.changed.extend(&turn.state.active);
+        turn.state.changed.extend(&turn.state.waiting);
+    }
+    let changed: Vec<JobId> = std::mem::take(&mut turn.state.changed).into_iter().collect();
+    for job in changed {
+        if let Some(job) = turn.state.jobs.get_mut(&job) {
+            job.sequence = sequence(job.sequence, turn.now);
+        }
+        if let Some(snapshot) = snapshot::of(turn.state, job, turn.now) {
+            turn.effects.push(Effect::Publish { job, snapshot });
+        }
+    }
+}

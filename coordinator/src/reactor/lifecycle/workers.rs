@@ -1,0 +1,196 @@
+//! Workers come, give signs of life, leave, and are lost.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
+use osteon_common::version;
+
+use crate::close_reason::CloseReason;
+use crate::crashes::{Cause, LostWorker};
+use crate::effect::{Effect, Refusal};
+use crate::event::Hello;
+use crate::ids::{LeaseId, WorkerId};
+use crate::notice::{Departure, Notice};
+use crate::rate::Rate;
+use crate::reactor::dispatch::{batches, departures, overdue, poison};
+use crate::reactor::turn::Turn;
+use crate::state::{Missed, State, Worker};
+use crate::worker_name::WorkerName;
+
+pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
+    if turn.state.workers.contains_key(&worker) {
+        close(turn, worker, CloseReason::SecondHello);
+        return;
+    }
+    if let Err(reason) = admit(turn.state, &hello) {
+        // A name that is too long is not repeated as a whole.
+        let host: String = hello.host.chars().take(NAME_BYTES_MAX).collect();
+        let name = WorkerName::new(&host, hello.process, hello.instance);
+        let refused = Notice::WorkerRefused { worker, name, reason: reason.clone() };
+        turn.effects.extend([Effect::Close { worker, reason }, Effect::Note(refused)]);
+        return;
+    }
+    let lease = LeaseId(turn.state.next_lease);
+    turn.state.next_lease += 1;
+    let name = name(&hello);
+    poison::forget_crashes(turn.state, &name);
+    turn.state.probation.attach(&name, turn.now);
+    turn.effects.push(Effect::Welcome { worker, lease });
+    turn.effects.push(Effect::Note(Notice::WorkerAttached {
+        worker,
+        name: name.clone(),
+        slots: hello.slots,
+        version: hello.version.clone(),
+    }));
+    turn.state.workers.insert(
+        worker,
+        Worker {
+            lease,
+            name,
+            hello,
+            attached: turn.now,
+            last_seen: turn.now,
+            answered: turn.now,
+            has_answered: false,
+            missed: Missed::default(),
+            heartbeat_sent: turn.now,
+            in_flight: Vec::new(),
+            settled: VecDeque::new(),
+            rate: Rate::default(),
+            rates: BTreeMap::new(),
+            draining: false,
+        },
+    );
+}
+
+pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {
+    if let Some(worker) = state.workers.get_mut(&worker) {
+        worker.last_seen = now;
+    }
+}
+
+pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
+    seen(turn.state, worker, turn.now);
+    if let Some(attached) = turn.state.workers.get_mut(&worker) {
+        attached.draining = true;
+    }
+    batches::preempt(turn, worker);
+    departures::dismiss_if_drained(turn, worker);
+}
+
+/// Sends a worker away: it gets nothing new, and leaves when it has answered what it holds.
+///
+/// # Errors
+/// When no such worker is attached.
+pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
+    let attached = turn.state.workers.get_mut(&worker).ok_or(Refusal::NoWorker { worker })?;
+    if !attached.draining {
+        attached.draining = true;
+        turn.effects.push(Effect::Drain { worker });
+        batches::preempt(turn, worker);
+    }
+    Ok(())
+}
+
+/// Closes a worker's stream; what it held goes to others.
+pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
+    if matches!(reason, CloseReason::Unanswering { .. })
+        && let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone())
+    {
+        overdue::begin_probation(turn.state, &name, turn.now, turn.now);
+    }
+    turn.effects.push(Effect::Close { worker, reason: reason.clone() });
+    lost(turn, worker, Departure::Closed(reason));
+}
+
+/// The stream of a worker ended; what it held goes to others.
+pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
+    lost(turn, worker, Departure::StreamEnded);
+}
+
+/// Forgets a worker; what it held goes to others. Later events of it mean nothing.
+fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
+    let cause = cause(&why);
+    let Some(gone) = departures::depart(turn, worker, why) else {
+        return;
+    };
+    let cause = if gone.draining { Cause::Announced } else { cause };
+    if cause != Cause::Announced && !gone.in_flight.is_empty() {
+        turn.state.count_loss(&gone.name, turn.now);
+    }
+    let alone = gone.in_flight.len() == 1;
+    let loss = LostWorker {
+        worker: gone.name,
+        cause,
+        at: turn.now,
+        alone,
+        has_answered: gone.has_answered,
+    };
+    for batch in gone.in_flight {
+        batches::give_back_orphan(turn.state, batch, &loss);
+    }
+}
+
+/// What the way in which a worker went says about it.
+fn cause(why: &Departure) -> Cause {
+    let Departure::Closed(reason) = why else {
+        return Cause::StreamBroke;
+    };
+    match reason {
+        CloseReason::Drained | CloseReason::Draining | CloseReason::Banned { .. } => {
+            Cause::Announced
+        }
+        CloseReason::Expired { .. } => Cause::Silence,
+        CloseReason::Unanswering { .. }
+        | CloseReason::NotReading
+        | CloseReason::Malformed(_)
+        | CloseReason::WrongCount { .. }
+        | CloseReason::SecondHello
+        | CloseReason::FingerprintDiffers { .. }
+        | CloseReason::Slots { .. }
+        | CloseReason::NameTooLong { .. }
+        | CloseReason::TooManyWorkers { .. } => Cause::Misbehaviour,
+    }
+}
+
+/// Begins the end: no new batch, every stream closed; records on their way are waited for.
+pub(crate) fn drain_all(turn: &mut Turn) {
+    turn.state.draining = true;
+    let workers: Vec<WorkerId> = turn.state.workers.keys().copied().collect();
+    for worker in workers {
+        // A worker that is sent away is not to blame for what it held.
+        if let Some(attached) = turn.state.workers.get_mut(&worker) {
+            attached.draining = true;
+        }
+        close(turn, worker, CloseReason::Draining);
+    }
+}
+
+fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
+    let coordinator = version::fingerprint();
+    let longest =
+        [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
+    let bytes = longest.unwrap_or(0);
+    let ban = state.ban(&name(hello));
+    if state.draining {
+        Err(CloseReason::Draining)
+    } else if bytes > NAME_BYTES_MAX {
+        Err(CloseReason::NameTooLong { bytes, max: NAME_BYTES_MAX })
+    } else if hello.fingerprint != coordinator {
+        let worker = hello.fingerprint.clone();
+        Err(CloseReason::FingerprintDiffers { worker, coordinator })
+    } else if let Some(ban) = ban {
+        Err(CloseReason::Banned { reason: ban.reason.clone() })
+    } else if hello.slots == 0 || hello.slots > WORKER_THREADS_MAX {
+        Err(CloseReason::Slots { slots: hello.slots, max: WORKER_THREADS_MAX })
+    } else if state.workers.len() >= WORKERS_MAX {
+        Err(CloseReason::TooManyWorkers { limit: WORKERS_MAX })
+    } else {
+        Ok(())
+    }
+}
+
+fn name(hello: &Hello) -> WorkerName {
+    WorkerName::new(&hello.host, hello.process, hello.instance)
+}

@@ -1,0 +1,403 @@
+//! Reads the sources: the files of a crate refer to each other without a circle, so that each can be
+//! read after those that it builds upon.
+//!
+//! An arrow leads from a file to the file that defines what it names by a path: `crate::…`,
+//! `super::…`, `self::…`, or the name of a module that it declares. `mod x;` alone is no arrow, and
+//! `pub use x::Y` is a signpost: it is no arrow of its own file, and whoever follows it arrives at
+//! the file that it points to. What is compiled for tests only does not count.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+/// Directories whose files form no circle, each the `src` of a crate.
+const DIRECTORIES: [&str; 2] = ["coordinator/src", "worker/src"];
+/// Re-exports that are followed one after the other.
+const SIGNPOSTS_MAX: usize = 8;
+
+/// A path of names, from the root of the crate.
+type Names = Vec<String>;
+
+/// The source of one module in a file of its own.
+struct Module {
+    file: String,
+    /// Paths that its code names, as far as they may lead to another file.
+    named: Vec<Names>,
+    /// What it re-exports, by name (`*` for all), and from where.
+    exported: Vec<(String, Names)>,
+}
+
+#[test]
+fn no_files_of_a_crate_form_a_circle() {
+    for directory in DIRECTORIES {
+        let sources = sources(directory);
+        assert!(sources.len() > 3, "only {} files were found in {directory}", sources.len());
+        if let Some(circle) = circle(arrows(&sources)) {
+            panic!("{directory} has a circle: {}", circle.join(" -> "));
+        }
+    }
+}
+
+#[test]
+fn layers_of_the_reactor_call_downwards_only() {
+    let layers = ["reactor/dispatch", "reactor/lifecycle", "reactor/integrity"];
+    let layer = |file: &str| layers.iter().position(|layer| file.starts_with(layer));
+    let mut count = 0;
+    for (from, targets) in arrows(&sources("coordinator/src")) {
+        for to in targets {
+            if let Some((from_layer, to_layer)) = layer(&from).zip(layer(&to)) {
+                count += 1;
+                assert!(from_layer >= to_layer, "{from} calls {to} in a layer above");
+            }
+        }
+    }
+    assert!(count > 20, "only {count} calls were found");
+}
+
+/// The files of a crate, by their paths below a directory.
+fn sources(directory: &str) -> BTreeMap<String, String> {
+    let mut sources = BTreeMap::new();
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(directory), "", &mut sources);
+    sources
+}
+
+/// Reads the files below a folder, by their paths.
+fn read(folder: &Path, prefix: &str, sources: &mut BTreeMap<String, String>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = format!("{prefix}{}", path.file_name().unwrap().to_str().unwrap());
+        if path.is_dir() {
+            read(&path, &format!("{name}/"), sources);
+        } else if name.ends_with(".rs") {
+            sources.insert(name, fs::read_to_string(&path).unwrap());
+        }
+    }
+}
+
+/// The files that each file refers to.
+fn arrows(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
+    let modules = modules(sources);
+    let targets = |module: &Module| {
+        let targets = module.named.iter().filter_map(|path| target(&modules, path, SIGNPOSTS_MAX));
+        targets.filter(|file| *file != module.file).map(str::to_owned).collect()
+    };
+    modules.values().map(|module| (module.file.clone(), targets(module))).collect()
+}
+
+/// Files that form a circle, the first once more at the end; `None` if there is none.
+fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
+    // What leads nowhere is in no circle, and then what leads only there.
+    loop {
+        let left: BTreeSet<String> = arrows.keys().cloned().collect();
+        arrows.retain(|_, to| {
+            to.retain(|file| left.contains(file));
+            !to.is_empty()
+        });
+        if arrows.len() == left.len() {
+            break;
+        }
+    }
+    // Each of the rest leads to another of the rest: following them comes back.
+    let mut way: Vec<String> = arrows.keys().take(1).cloned().collect();
+    while let Some(next) = way.last().and_then(|last| arrows[last].first()) {
+        let seen = way.iter().position(|file| file == next);
+        way.push(next.clone());
+        if let Some(at) = seen {
+            return Some(way.split_off(at));
+        }
+    }
+    None
+}
+
+/// The file that defines what a path names; `None` if that is no file of the crate.
+fn target<'a>(
+    modules: &'a BTreeMap<Names, Module>,
+    path: &[String],
+    most: usize,
+) -> Option<&'a str> {
+    let depth = (0..=path.len()).rev().find(|depth| modules.contains_key(&path[..*depth]))?;
+    let module = &modules[&path[..depth]];
+    let signpost = path.get(depth).and_then(|name| {
+        module.exported.iter().find(|(exported, _)| exported == name || exported == "*")
+    });
+    match signpost {
+        Some((name, to)) if most > 0 => {
+            let mut to = to.clone();
+            to.extend(path[depth + usize::from(name != "*")..].iter().cloned());
+            target(modules, &to, most - 1)
+        }
+        _ => Some(&module.file),
+    }
+}
+
+/// The modules of a crate that are not for tests only, by their paths.
+fn modules(sources: &BTreeMap<String, String>) -> BTreeMap<Names, Module> {
+    let place = |file: &str| -> Names {
+        let stem = file.trim_end_matches(".rs");
+        let names = stem.split('/').filter(|name| !["lib", "main", "mod"].contains(name));
+        names.map(str::to_owned).collect()
+    };
+    let code: BTreeMap<Names, (&String, Code)> =
+        sources.iter().map(|(file, text)| (place(file), (file, Code::new(text)))).collect();
+    let for_tests: BTreeSet<Names> = code
+        .iter()
+        .flat_map(|(place, (_, code))| code.test_modules.iter().map(|name| child(place, name)))
+        .collect();
+    let is_tested = |place: &Names| (0..=place.len()).any(|i| for_tests.contains(&place[..i]));
+    let children = |place: &Names| -> BTreeSet<&str> {
+        let below = code.keys().filter(|it| it.len() == place.len() + 1 && it.starts_with(place));
+        below.map(|it| it[it.len() - 1].as_str()).collect()
+    };
+    let module = |(place, (file, code)): (&Names, &(&String, Code))| {
+        let (exported, named) = code.paths(place, &children(place));
+        (place.clone(), Module { file: (*file).clone(), named, exported })
+    };
+    code.iter().filter(|(place, _)| !is_tested(place)).map(module).collect()
+}
+
+fn child(place: &[String], name: &str) -> Names {
+    place.iter().cloned().chain([name.to_owned()]).collect()
+}
+
+/// Code in words: names, `::`, and single signs. Comments, texts and what is for tests only are
+/// left out.
+struct Code {
+    words: Vec<String>,
+    /// Modules in files of their own that are for tests only.
+    test_modules: Vec<String>,
+}
+
+impl Code {
+    fn new(text: &str) -> Self {
+        let all = words(text);
+        let (mut kept, mut test_modules) = (Vec::new(), Vec::new());
+        let mut at = 0;
+        while at < all.len() {
+            if all[at..].starts_with(&["#", "[", "cfg", "(", "test", ")", "]"].map(str::to_owned)) {
+                let end = at + item_length(&all[at..]);
+                if let [.., word, name, last] = &all[at..end]
+                    && (word, last) == (&"mod".to_owned(), &";".to_owned())
+                {
+                    test_modules.push(name.clone());
+                }
+                at = end;
+            } else {
+                kept.push(all[at].clone());
+                at += 1;
+            }
+        }
+        Self { words: kept, test_modules }
+    }
+
+    /// What a module re-exports, and the paths that it names otherwise.
+    fn paths(
+        &self,
+        place: &[String],
+        children: &BTreeSet<&str>,
+    ) -> (Vec<(String, Names)>, Vec<Names>) {
+        let (mut exported, mut named) = (Vec::new(), Vec::new());
+        let mut at = 0;
+        let mut public = false;
+        while at < self.words.len() {
+            let word = self.words[at].as_str();
+            let begins = at == 0 || !["::", "."].contains(&self.words[at - 1].as_str());
+            let leads = self.words.get(at + 1).is_some_and(|next| next == "::");
+            public = match word {
+                "use" => at > 0 && ["pub", ")"].contains(&self.words[at - 1].as_str()),
+                ";" => false,
+                _ => public,
+            };
+            let known = ["crate", "super", "self"].contains(&word) || children.contains(word);
+            if !(begins && leads && known) {
+                at += 1;
+                continue;
+            }
+            let mut leaves = Vec::new();
+            at = self.leaves(at, &start(place, word), &mut leaves);
+            if public {
+                exported.extend(leaves);
+            } else {
+                named.extend(leaves.into_iter().map(|(_, path)| path));
+            }
+        }
+        (exported, named)
+    }
+
+    /// Collects what a path or a tree of `use` that begins at a word names, and under which name;
+    /// the index of the word after it.
+    fn leaves(&self, at: usize, from: &[String], leaves: &mut Vec<(String, Names)>) -> usize {
+        let mut path = from.to_vec();
+        let mut at = at + 1;
+        while self.words.get(at).is_some_and(|word| word == "::") {
+            at += 1;
+            match self.words.get(at).map(String::as_str) {
+                Some("{") => {
+                    at += 1;
+                    while self.words.get(at).is_some_and(|word| word != "}") {
+                        if self.words[at] == "," {
+                            at += 1;
+                        } else if self.words[at] == "self" {
+                            leaves.push((path.last().cloned().unwrap_or_default(), path.clone()));
+                            at += 1;
+                        } else {
+                            at = self.leaves(at, &child(&path, &self.words[at]), leaves);
+                        }
+                    }
+                    return at + 1;
+                }
+                Some("super") => drop(path.pop()),
+                Some("<") | None => break,
+                Some(word) => path.push(word.to_owned()),
+            }
+            at += 1;
+        }
+        let mut name = path.last().cloned().unwrap_or_default();
+        if name == "*" {
+            path.pop();
+        }
+        if self.words.get(at).is_some_and(|word| word == "as") {
+            name.clone_from(&self.words[at + 1]);
+            at += 2;
+        }
+        leaves.push((name, path));
+        at
+    }
+}
+
+/// The path that the first word of a path stands for in a module.
+fn start(place: &[String], word: &str) -> Names {
+    match word {
+        "crate" => Names::new(),
+        "self" => place.to_vec(),
+        "super" => place[..place.len().saturating_sub(1)].to_vec(),
+        name => child(place, name),
+    }
+}
+
+/// How many words an item takes: up to its `;` or the end of its block.
+fn item_length(words: &[String]) -> usize {
+    let mut depth = 0;
+    for (at, word) in words.iter().enumerate() {
+        match word.as_str() {
+            "{" => depth += 1,
+            "}" if depth == 1 => return at + 1,
+            "}" => depth -= 1,
+            ";" if depth == 0 => return at + 1,
+            _ => {}
+        }
+    }
+    words.len()
+}
+
+/// The words of a text of Rust.
+fn words(text: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let length = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if let Some(quoted) = quoted(rest) {
+            quoted
+        } else if first.is_alphanumeric() || first == '_' {
+            let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+            words.push(rest[..end].to_owned());
+            end
+        } else if rest.starts_with("::") {
+            words.push("::".to_owned());
+            2
+        } else {
+            if !first.is_whitespace() {
+                words.push(first.to_string());
+            }
+            first.len_utf8()
+        };
+        rest = &rest[length..];
+    }
+    words
+}
+
+/// Length of the text or character at the beginning, if there is one.
+fn quoted(text: &str) -> Option<usize> {
+    if let Some(raw) = text.strip_prefix('r') {
+        let signs = raw.find(|c| c != '#').filter(|at| raw[*at..].starts_with('"'))?;
+        let end = format!("\"{}", "#".repeat(signs));
+        let from = 1 + signs + 1;
+        return text[from..].find(&end).map(|at| from + at + end.len());
+    }
+    let sign = text.chars().next().filter(|sign| ['"', '\''].contains(sign))?;
+    // A lifetime ends with no such sign.
+    let is_lifetime = sign == '\'' && !text[1..].starts_with('\\') && {
+        let second = text.char_indices().nth(2).map(|(_, second)| second);
+        second != Some('\'')
+    };
+    if is_lifetime {
+        return Some(1);
+    }
+    let mut escaped = false;
+    let end = text.char_indices().skip(1).find(|(_, c)| {
+        let ends = *c == sign && !escaped;
+        escaped = *c == '\\' && !escaped;
+        ends
+    });
+    end.map(|(at, _)| at + 1)
+}
+
+/// The circle that these files form.
+fn check(files: &[(&str, &str)], expected: &[&str]) {
+    let sources = files.iter().map(|(file, text)| ((*file).to_owned(), (*text).to_owned()));
+    let found = circle(arrows(&sources.collect())).unwrap_or_default();
+    assert_eq!(found, expected, "{files:?}");
+}
+
+#[test]
+fn a_planted_circle_is_found() {
+    let lib = ("lib.rs", "mod a; mod b; mod c;");
+    let circle = ["a.rs", "b.rs", "a.rs"];
+    for (a, b) in [
+        ("use crate::b::B;", "use crate::a::A;"),
+        ("use super::b::{B, c};", "use crate::{c::C, a::{self}};"),
+        ("fn f() { crate::b::f() }", "impl T for super::a::A {}"),
+        ("use crate::b::*;", "type A = Vec<crate::a::A>;"),
+    ] {
+        check(&[lib, ("a.rs", a), ("b.rs", b), ("c.rs", "use crate::b::B;")], &circle);
+    }
+    // Of three, and of a parent with its child.
+    let three = [("a.rs", "use crate::c::C;"), ("b.rs", "use crate::a::A;")];
+    let expected = ["a.rs", "c.rs", "b.rs", "a.rs"];
+    check(&[lib, three[0], three[1], ("c.rs", "use crate::b::B;")], &expected);
+    let parent = "mod child; struct P; fn f() { child::f() }";
+    let expected = ["a.rs", "a/child.rs", "a.rs"];
+    check(&[("lib.rs", "mod a;"), ("a.rs", parent), ("a/child.rs", "use super::P;")], &expected);
+    // By way of a signpost.
+    let files = [
+        ("lib.rs", "mod a; mod b;"),
+        ("a.rs", "mod child; pub use child::C;"),
+        ("a/child.rs", "use crate::b::B;"),
+        ("b.rs", "use crate::a::C;"),
+    ];
+    check(&files, &["a/child.rs", "b.rs", "a/child.rs"]);
+}
+
+#[test]
+fn what_is_no_circle_is_none() {
+    let lib = ("lib.rs", "mod a; mod b; pub use a::A; pub use b::B;");
+    let a = ("a.rs", "use crate::b::B;");
+    for b in [
+        "use other::a::A;",
+        "//! As `crate::a::A`.\n// use crate::a::A;",
+        "const A: &str = \"use crate::a::A;\"; const B: char = '\"'; fn f<'a>() { \"\\\"crate::a::A\" }",
+        "#[cfg(test)]\nmod tests { use crate::a::A; }",
+        "#[cfg(test)]\nuse crate::a::A;",
+        "use self::b::B; fn f() { x.crate::a::A }",
+    ] {
+        check(&[lib, a, ("b.rs", b)], &[]);
+    }
+    // Files for tests only, and a parent that only shows what its children have.
+    let tests = ("b/tests.rs", "use crate::a::A;");
+    check(&[lib, a, ("b.rs", "#[cfg(test)]\nmod tests;"), tests], &[]);
+    let child = ("b/child.rs", "use super::other::O;");
+    let b = ("b.rs", "mod child; mod other; pub(crate) use self::child::C; pub use other::O;");
+    check(&[lib, a, b, child, ("b/other.rs", "")], &[]);
+}
