@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 
 /// Directories whose files form no circle, each the `src` of a crate.
-const DIRECTORIES: [&str; 2] = ["coordinator/src", "worker/src"];
+const DIRECTORIES: [&str; 3] = ["common/src", "coordinator/src", "worker/src"];
 /// Re-exports that are followed one after the other.
 const SIGNPOSTS_MAX: usize = 8;
 

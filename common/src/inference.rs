@@ -33,67 +33,16 @@ use crate::results::{BestPoint, Evaluation};
 use self::jacobian::log_ratios;
 use self::linear::{Linear, Response};
 
-pub use self::conclusions::{Conclusions, Solutions, below_noise_from, meaning};
-pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
-pub use self::noise::{Noise, NoiseErrors, noise};
-pub use self::profile::{PROFILE_POINTS, Profile, profiles};
-pub use self::solutions::{Solution, Spread, Spreads, solutions, spread};
+pub use self::conclusions::{below_noise_from, meaning};
+pub use self::jacobian::{Jacobian, jacobian};
+pub use self::noise::{Noise, noise};
+pub use self::profile::{PROFILE_POINTS, profiles};
+pub use self::solutions::{solutions, spread};
+pub use crate::conclusions::{
+    Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
+    Solution, Solutions, Spread, Spreads,
+};
 pub use crate::data_statistics::CONFIDENCE;
-
-/// A direction of the box that the data fix.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Direction {
-    /// Singular value: change of ln v and ln Δ, together, for a step over the box.
-    pub singular_value: f64,
-    /// Unit vector, a component for each free parameter, in units of the box.
-    pub components: Vec<f64>,
-}
-
-/// A quantity that follows from the parameters.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity {
-    /// Its value at the best point, in its unit.
-    pub value: f64,
-    /// What noise makes of it.
-    pub known: Option<Known>,
-}
-
-/// How well a quantity is known, as far as the data say anything of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
-    /// Standard error.
-    pub standard_error: f64,
-    /// Ends of its confidence interval.
-    pub interval: [f64; 2],
-    /// Share of its gradient, in units of the box, that lies in directions which the data leave
-    /// free: sine of the angle between it and those that they fix.
-    pub free_share: f64,
-}
-
-/// What the data say.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Inference {
-    /// Whether the model matches the data to within noise.
-    pub matched: bool,
-    /// Level of all intervals.
-    pub level: f64,
-    /// Errors of both moments.
-    pub noise: NoiseErrors,
-    /// The free parameters, in the order of the components of directions.
-    pub free: Vec<Parameter>,
-    /// Derivatives of both moments.
-    pub sensitivities: Vec<Sensitivity>,
-    /// Directions that the data fix, that of the largest singular value first.
-    pub fixed: Vec<Direction>,
-    /// Orthonormal directions that the data leave free.
-    pub undetermined: Vec<Vec<f64>>,
-    /// √(c1111/ρ), m/s.
-    pub bulk_velocity: Quantity,
-    /// The dispersion.
-    pub dispersion: Quantity,
-    /// The free parameters themselves, known only where no direction is left free.
-    pub parameters: Vec<(Parameter, Quantity)>,
-}
 
 /// What set number `set` of the data says, given the best evaluation of its search and all
 /// evaluations of the job. `None` where the derivatives were not measured, or cannot be told.

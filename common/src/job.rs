@@ -7,8 +7,6 @@ use thiserror::Error;
 use crate::case::Setup;
 use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
-use crate::results::Moments;
-use crate::statistics;
 
 /// What a job does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,14 +119,6 @@ impl Data {
             Self::Groups(groups) => groups.get(set).map(|group| group.velocities.as_slice()),
             Self::Moments { .. } => None,
         }
-    }
-
-    /// Moments of a set, by its number; NaN where there is none.
-    pub fn moments(&self, set: usize) -> Moments {
-        if let Self::Moments { mean, coefficient_of_variation } = *self {
-            return Moments { mean, coefficient_of_variation };
-        }
-        self.velocities(set).and_then(statistics::moments).unwrap_or(Moments::UNKNOWN)
     }
 }
 

@@ -3,14 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data_statistics::{KolmogorovTest, MomentIntervals, moment_intervals};
-use crate::inference::Conclusions;
-use crate::job::{Data, Objective, Sampling, Search};
+use crate::conclusions::Conclusions;
+use crate::job::{Objective, Sampling, Search};
+use crate::moments::{KolmogorovTest, MomentIntervals};
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
+
+pub use crate::moments::{Estimate, EstimatedError, Moments};
 
 /// How a job ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -82,51 +84,6 @@ impl JobFailure {
     }
 }
 
-/// Mean and coefficient of variation of a set of velocities (the paper's Secs. 2 and 5).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moments {
-    /// v = (1/N) Σ V_k, m/s.
-    pub mean: f64,
-    /// Δ = √((1/N) Σ (V_k - v)²) / v.
-    pub coefficient_of_variation: f64,
-}
-
-impl Moments {
-    /// Of nothing.
-    pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
-}
-
-/// Moments of a Monte Carlo sample with their standard errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The moments.
-    pub moments: Moments,
-    /// Their standard errors: that of the mean in m/s, that of the coefficient of variation.
-    pub standard_error: Moments,
-    /// Whether they are those that the control variate gives.
-    pub controlled: bool,
-}
-
-impl Estimate {
-    /// Standard errors over the moments themselves: of the mean, of the coefficient of variation.
-    pub fn relative_errors(&self) -> [f64; 2] {
-        let (moments, error) = (self.moments, self.standard_error);
-        [
-            error.mean / moments.mean,
-            error.coefficient_of_variation / moments.coefficient_of_variation,
-        ]
-    }
-}
-
-/// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EstimatedError {
-    /// Their median.
-    pub median: f64,
-    /// The largest.
-    pub largest: f64,
-}
-
 /// What an evaluation is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Role {
@@ -188,18 +145,6 @@ pub struct DataSummary {
     /// Confidence intervals of the moments of their law; `None` where only the moments are known, and
     /// where the velocities give no interval.
     pub intervals: Option<MomentIntervals>,
-}
-
-impl DataSummary {
-    /// Of set number `set` of the data. Resamples velocities, which takes up to a fraction of a second.
-    pub fn of(data: &Data, set: usize) -> Self {
-        let velocities = data.velocities(set);
-        Self {
-            moments: data.moments(set),
-            count: velocities.map(|velocities| velocities.len() as u64),
-            intervals: velocities.and_then(moment_intervals),
-        }
-    }
 }
 
 /// How the search for one group ended.

@@ -1,34 +1,10 @@
 //! All that is concluded from one set of data, as results carry it.
 
-use super::{
-    Inference, Profile, Solution, Spreads, first_below_noise, inference, profiles, solutions,
-    spread,
-};
+use super::{first_below_noise, inference, profiles, solutions, spread};
+use crate::conclusions::{Conclusions, Profile, Solutions};
 use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
 use crate::parameters::Point;
 use crate::results::{BestPoint, Evaluation, PointMeaning};
-
-/// What one set of data says, and which points match it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Conclusions {
-    /// What is identified; `None` where the derivatives were not measured, or cannot be told.
-    pub inference: Option<Inference>,
-    /// Profiles of the cost, one for each free parameter; none of a likelihood, and none with priors.
-    pub profiles: Vec<Profile>,
-    /// The answers from all starts; `None` of a single start.
-    pub solutions: Option<Solutions>,
-}
-
-/// The answers of searches from several starts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solutions {
-    /// The best point of each start that found a feasible one.
-    pub points: Vec<Solution>,
-    /// How many of them match the data as well as the best one, or to the tolerance of the search.
-    pub matching: u64,
-    /// Spreads over these; `None` if there are none.
-    pub spread: Option<Spreads>,
-}
 
 impl Conclusions {
     /// From set number `set` of the data, given the best evaluation of its search, if one was feasible,

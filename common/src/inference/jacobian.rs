@@ -1,6 +1,7 @@
 //! Derivatives of the logarithms of both moments, from differences on common germs.
 
 use super::is_of;
+use crate::conclusions::Sensitivity;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, Moments};
@@ -12,17 +13,6 @@ pub struct Jacobian {
     pub free: Vec<Parameter>,
     /// Their columns: derivatives of ln v and of ln Δ.
     pub columns: Vec<[f64; 2]>,
-}
-
-/// Derivatives of both moments along one parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensitivity {
-    /// The parameter.
-    pub parameter: Parameter,
-    /// Relative change of the mean for a relative change of the parameter, ∂ ln v / ∂ ln p.
-    pub mean: f64,
-    /// That of the coefficient of variation, ∂ ln Δ / ∂ ln p.
-    pub coefficient_of_variation: f64,
 }
 
 /// The Jacobian at the best point of set number `set`: `None` where a derivative was not measured.

@@ -1,6 +1,7 @@
 //! The singular value decomposition of a Jacobian of two rows, and what follows from it.
 
-use super::{Direction, Jacobian};
+use super::Jacobian;
+use crate::conclusions::Direction;
 
 /// A singular value below this part of the largest is one of rounding.
 const RANK: f64 = 1e-6;

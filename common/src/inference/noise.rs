@@ -1,5 +1,6 @@
 //! Errors of the logarithms of both moments, of the data's and of the model's.
 
+use crate::conclusions::NoiseErrors;
 #[cfg(doc)]
 use crate::data_statistics::CONFIDENCE;
 use crate::job::Data;
@@ -17,15 +18,6 @@ pub struct Noise {
     pub data: Option<([[f64; 2]; 2], usize)>,
     /// Of the model's: by sampling, on the diagonal.
     pub model: [f64; 2],
-}
-
-/// Relative standard errors of both moments.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NoiseErrors {
-    /// By the noise of the data; `None` where only their moments are known.
-    pub data: Option<Moments>,
-    /// By sampling.
-    pub sampling: Moments,
 }
 
 /// The noise of set number `set` of the data, and of a model's estimate.

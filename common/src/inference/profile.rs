@@ -4,24 +4,13 @@
 //! variation δ, each times its factor at the best point. Over the whole box that holds to about one
 //! per cent, so a profile says where the data can be matched, and not by how little they are missed.
 
+use crate::conclusions::Profile;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::Moments;
 
 /// Points of a profile, from bound to bound.
 pub const PROFILE_POINTS: usize = 11;
-
-/// The profile of one parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Profile {
-    /// The parameter.
-    pub parameter: Parameter,
-    /// Its values, evenly from the lower bound to the upper, in its unit.
-    pub values: Vec<f64>,
-    /// The lowest cost with the parameter there and the other free ones anywhere in their bounds;
-    /// infinite where no such point is admissible.
-    pub costs: Vec<f64>,
-}
 
 /// The profile of each free parameter, given the best point and its moments.
 pub fn profiles(

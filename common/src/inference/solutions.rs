@@ -1,46 +1,10 @@
 //! The answers of searches from several starts: a sample of what matches the data equally well.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::is_of;
+use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::{Parameter, Point};
 use crate::results::Evaluation;
-
-/// The best point of the search from one start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solution {
-    /// Number of the start, from 0.
-    pub start: u32,
-    /// The point.
-    pub point: Point,
-    /// Its cost.
-    pub cost: f64,
-    /// Evaluations of this search.
-    pub evaluations: u64,
-}
-
-/// Smallest, largest and mean value of something over solutions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Spread {
-    /// Smallest.
-    pub smallest: f64,
-    /// Largest.
-    pub largest: f64,
-    /// Mean.
-    pub mean: f64,
-}
-
-/// Spreads over a set of points.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Spreads {
-    /// Of each parameter.
-    pub parameters: [Spread; 7],
-    /// Of the entries of the elasticity matrix in and above the diagonal, row by row, with row and
-    /// column from 0 (Pa, Kelvin-Mandel).
-    pub entries: Vec<(usize, usize, Spread)>,
-}
 
 /// The best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
