@@ -33,11 +33,13 @@ pub struct Config {
     pub keep_ended: Option<Duration>,
     /// Interval of the ticks, and the minimum interval between two snapshots.
     pub tick: Duration,
-    /// Maximum number of jobs that are computed at a time; the others wait in the order of their
-    /// acceptance.
+    /// Maximum number of active jobs. The others wait: jobs of the clients with the fewest active
+    /// jobs begin first, of these the highest priority, then the oldest. A client without an active
+    /// job may exceed the limit, up to twice its value.
     pub active_jobs_max: usize,
-    /// Maximum number of realizations in the evaluations of the active jobs together. A job may
-    /// exceed it if no other job is active.
+    /// Maximum number of realizations in the evaluations of the active jobs together. A job of a
+    /// client without an active job may exceed it, up to twice its value, and any job if no other
+    /// is active.
     pub active_realizations_max: u64,
     /// Maximum size of the specifications of all jobs that have not ended, bytes; those of one
     /// client may take a quarter of it.

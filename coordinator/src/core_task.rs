@@ -24,7 +24,7 @@ pub(crate) enum Message {
     Event(Event),
     /// A client sends a request and waits for the answer.
     Ask(Request, oneshot::Sender<Answer>),
-    /// A client wants to watch a job.
+    /// A client requests to watch a job.
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
     /// A worker's stream began; messages to it go to `outbound`.
     Attach { worker: WorkerId, hello: Hello, outbound: Outbound },

@@ -18,7 +18,7 @@ pub enum Event {
     Tick,
     /// A client sent a request; its answer goes to `token`.
     Requested {
-        /// Where the answer goes.
+        /// Destination of the answer.
         token: Token,
         /// The request.
         request: Request,

@@ -147,7 +147,7 @@ pub(crate) enum Reading {
 pub(crate) type Reply<T> = oneshot::Sender<Result<T, ReadError>>;
 
 impl Reading {
-    /// Reads the record, unless nobody waits for it any more. Blocks meanwhile.
+    /// Reads the record, unless the receiver has gone. Blocks meanwhile.
     pub(crate) fn serve(self, store: &mut dyn Store) {
         // The receiver may be dropped during the read.
         match self {

@@ -23,7 +23,8 @@ pub enum Insane {
     /// A worker and a batch disagree about which worker holds the batch.
     #[error("worker {0} and batch {1} disagree about who holds it")]
     Holding(WorkerId, BatchId),
-    /// A worker holds more batches than allowed.
+    /// A worker holds more batches than allowed, more than one speculative batch, or another batch
+    /// beside an exclusive one, or too many of its settled batches are remembered.
     #[error("worker {0} holds more than it may")]
     TooMuch(WorkerId),
     /// The duplicates of a batch do not name each other, or differ in their purpose.

@@ -24,7 +24,7 @@ use crate::worker_name::WorkerName;
 
 /// Maximum number of batches that a worker holds: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
-/// When this many workers of a host are lost in a row, its workers receive only work that can do
+/// Number of workers of a host lost in a row after which its workers receive only work that can do
 /// little harm if they are lost again.
 const LOST_IN_A_ROW_MAX: usize = 3;
 /// Number of lost workers that are remembered per host.
@@ -44,9 +44,10 @@ pub struct State {
     pub(crate) ended: BTreeMap<JobId, EndedJob>,
     /// The job that each request submitted.
     pub(crate) requests: BTreeMap<RequestName, JobId>,
-    /// Jobs that have not begun, in the order of their acceptance.
+    /// Jobs that have not begun, in the order of their acceptance; one whose end was taken back is
+    /// last.
     pub(crate) waiting: VecDeque<JobId>,
-    /// Jobs that are computed or whose evaluation is being stored.
+    /// Jobs that are replayed or computed, or whose evaluation is being stored.
     pub(crate) active: BTreeSet<JobId>,
     /// Computing time that the clients of active jobs have received.
     pub(crate) shares: Shares,
@@ -85,7 +86,8 @@ pub struct State {
     pub(crate) draining: bool,
 }
 
-/// A worker that returned wrong answers: refused for the life of the coordinator.
+/// A worker that returned wrong answers. It is refused while this process runs, and after a restart
+/// while its ban is in the store.
 #[derive(Debug)]
 pub(crate) struct Banned {
     pub(crate) record: BanRecord,

@@ -394,7 +394,7 @@ pub trait Store {
     /// in the copy.
     ///
     /// # Errors
-    /// When the store is no file, cannot be read, or the copy cannot be written beside it.
+    /// When the store is not a file or cannot be read, or the copy cannot be written beside it.
     fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
         // A store that copies nothing never calls it.
         let _ = between;

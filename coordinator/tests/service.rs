@@ -272,7 +272,7 @@ async fn a_worker_with_other_numerics_is_refused() {
     coordinator.shutdown().await;
 }
 
-/// A store that accepts jobs, and then refuses or panics at every other record.
+/// A store that accepts jobs, and then refuses every evaluation, or panics at it.
 #[derive(Clone)]
 struct BrokenStore {
     sound: MemoryStore,

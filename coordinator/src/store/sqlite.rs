@@ -40,8 +40,8 @@ use columns::{
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 
-/// The header field of the file that holds the highest identifier of a deleted job; it is written
-/// in the same transaction as the tables.
+/// The header field of the file that holds the highest identifier of a deleted job. It is part of
+/// the database, so it changes in one transaction with the tables.
 const LAST_FORGOTTEN: &str = "user_version";
 
 /// A store in a SQLite file.

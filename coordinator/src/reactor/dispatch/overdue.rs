@@ -36,8 +36,8 @@ const SENT_AT_ONCE_MAX: usize = 64;
 /// A worker is on probation after this many consecutive batches that others answered, over at least
 /// [`OVERDUE_MIN`]. It holds two at a time, so a single pause is not enough.
 const MISSED_MAX: u32 = 3;
-/// A worker that holds an overdue batch for this long is on probation too: there may be no other
-/// worker to answer the batch.
+/// A worker whose batch is overdue, and has been out for this long, is on probation too: there may
+/// be no other worker to answer the batch.
 const SILENT_MAX: Duration = Duration::from_secs(60);
 
 /// Finds batches that are overdue.

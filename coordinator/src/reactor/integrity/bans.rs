@@ -127,7 +127,8 @@ pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
 pub(crate) fn store_again(turn: &mut Turn) {
     let retry_in = turn.state.config.store_retry;
     for banned in &mut turn.state.banned {
-        // A record on its way must not be sent twice: the second write could outlast a shutdown.
+        // The store will report a write that is on its way. A second one could still be on its way
+        // at the end of a shutdown.
         if banned.refused && banned.store_at.is_some_and(|at| turn.now >= at) {
             banned.store_at = Some(turn.now + retry_in);
             banned.refused = false;

@@ -22,8 +22,8 @@ use crate::store::StoreError;
 
 /// Name of the file in the store's directory.
 pub(super) const MARK: &str = "osteon.acknowledged";
-/// Size of a slot, bytes: no disk or file system writes units that are smaller than this and span
-/// two slots.
+/// Size of a slot, bytes: each slot is in blocks of its own on any disk or file system, so that a
+/// write to one never touches the other.
 const SLOT_BYTES: usize = 4096;
 const SLOTS: u64 = 2;
 const LENGTH: u64 = SLOTS * SLOT_BYTES as u64;

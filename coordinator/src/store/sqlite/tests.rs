@@ -326,7 +326,8 @@ fn with_a_rollback_journal_everything_is_the_same() {
     store.put_job(&job(1)).unwrap();
     let path = store.path.clone();
     drop(store);
-    // A file that was created with a write-ahead log, and moved to another disk.
+    // A file that was created with a write-ahead log, and is now opened as on a network file
+    // system.
     let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
