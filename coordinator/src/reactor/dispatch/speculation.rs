@@ -6,9 +6,9 @@
 //! Points that the search can no longer ask for are dropped. So results, store and digest are the
 //! same as without speculation.
 //!
-//! Speculation never delays other work: a worker gets a speculative batch only for idle slots, one
-//! at a time, and the batch is revoked (preempted) when there is other work for these slots.
-//! Therefore no client is charged for it.
+//! Speculation takes no slot from other work: a worker gets a speculative batch only for idle
+//! slots, one at a time, and the batch is revoked (preempted) when there is other work for these
+//! slots. Therefore no client is charged for it.
 
 use std::sync::Arc;
 
