@@ -1,38 +1,40 @@
-//! How long the realizations of a job take, as the newest answers show.
+//! Duration of the realizations of a job, estimated from the newest answers.
 
 use std::time::Duration;
 
 use crate::fairness;
 
-/// Of what was known before, so much stays when an answer shows a shorter time.
+/// Fraction of the previous estimate that is kept when an answer shows a shorter time.
 const KEPT: f64 = 0.5;
 
-/// Time of one realization of a job on one slot. A slow answer counts at once, a fast one by and
-/// by: a search goes from points whose realizations are fast to others that take a hundred times as
-/// long, and it is worse to hurry those than to wait a little too long for what is fast.
+/// Time of one realization of a job on one slot. A slow answer raises the estimate at once, a fast
+/// one lowers it gradually: a search moves from points with fast realizations to points that take a
+/// hundred times as long, and sending duplicates of those too early is worse than waiting a little
+/// too long for the fast ones.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Pace(Option<f64>);
 
 impl Pace {
-    /// A worker of `slots` slots has answered `count` realizations in `seconds`.
+    /// Takes an answer into account: `count` realizations in `seconds` from a worker with `slots`
+    /// slots.
     pub(crate) fn learn(&mut self, count: u64, slots: u32, seconds: f64) {
         let one = seconds / waves(count, slots);
         self.0 = Some(self.0.map_or(one, |known| one.max(KEPT * known)));
     }
 
-    /// Whether anybody has answered anything.
+    /// Returns whether there has been an answer.
     pub(crate) fn is_known(self) -> bool {
         self.0.is_some()
     }
 
-    /// Time that `count` realizations should take a worker of `slots` slots; `None` while
-    /// nobody has answered anything.
+    /// Returns the expected time of `count` realizations on a worker with `slots` slots; `None`
+    /// before the first answer.
     pub(crate) fn expected(self, count: u64, slots: u32) -> Option<Duration> {
         self.0.map(|one| fairness::slot_time(one * waves(count, slots), 1))
     }
 }
 
-/// How many realizations each slot computes that has something to do, on average.
+/// Returns the average number of realizations per busy slot.
 fn waves(count: u64, slots: u32) -> f64 {
     count as f64 / (slots.max(1) as f64).min(count.max(1) as f64)
 }
@@ -47,7 +49,7 @@ mod tests {
         assert_eq!((pace.expected(8, 2), pace.is_known()), (None, false));
         let expected =
             |pace: Pace, count, slots| pace.expected(count, slots).unwrap().as_secs_f64();
-        // 8 on 2 slots in 2 s: 0.5 s each.
+        // 8 realizations on 2 slots in 2 s: 0.5 s each.
         pace.learn(8, 2, 2.0);
         for (count, slots, seconds) in [(8, 2, 2.0), (1, 1, 0.5), (1, 64, 0.5), (16, 4, 2.0)] {
             assert_eq!(expected(pace, count, slots), seconds, "{count} on {slots}");

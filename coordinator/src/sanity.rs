@@ -1,4 +1,4 @@
-//! Re-derives every cross reference of a state, for tests and simulations.
+//! Checks every cross reference of a state, for tests and simulations.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,57 +14,58 @@ use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
 use crate::state::{BATCHES_IN_FLIGHT_MAX, Banned, SETTLED_MAX, State};
 use crate::worker_name::WorkerName;
 
-/// What does not fit together.
+/// An inconsistency of a state.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Insane {
-    /// A list of jobs does not hold exactly those in the stage it is for.
+    /// A list of jobs does not hold exactly the jobs in the stage that it is for.
     #[error("job {0} is in a list for another stage, or missing in the list of its stage")]
     JobList(JobId),
-    /// A worker and a batch disagree about who holds what.
+    /// A worker and a batch disagree about which worker holds the batch.
     #[error("worker {0} and batch {1} disagree about who holds it")]
     Holding(WorkerId, BatchId),
-    /// A worker holds too much.
+    /// A worker holds more batches than allowed, more than one speculative batch, or another batch
+    /// beside an exclusive one, or too many of its settled batches are remembered.
     #[error("worker {0} holds more than it may")]
     TooMuch(WorkerId),
-    /// The duplicates of a batch do not name each other, or differ in what they are for.
+    /// The duplicates of a batch do not name each other, or differ in their purpose.
     #[error("batch {0} and its duplicates do not match")]
     Duplicates(BatchId),
-    /// What waits for another worker that computes the same is with nobody, is not the newest of
-    /// its copies, or is not waited for.
+    /// A batch that is listed as overdue does not exist, is speculative, or is not the newest of
+    /// its duplicates.
     #[error("batch {0} cannot be overdue")]
     Overdue(BatchId),
-    /// A batch of an evaluation that is not under way.
+    /// A batch belongs to an evaluation that is not under way.
     #[error("batch {0} belongs to no evaluation under way")]
     Stray(BatchId),
-    /// An index is not in exactly one place: filled, queued, in quarantine, or with a worker.
+    /// An index is not in exactly one place: filled, queued, in quarantine, or held by a worker.
     #[error("index {index} of job {job} is in {places} places")]
     Index {
         /// The job.
         job: JobId,
         /// The index.
         index: usize,
-        /// In how many places it is.
+        /// Number of places.
         places: u32,
     },
     /// The count of filled results is wrong.
     #[error("job {0} miscounts its filled results")]
     Filled(JobId),
-    /// A request id does not lead to the job that has it.
+    /// A request id does not lead to its job.
     #[error("the request id of job {0} leads elsewhere")]
     RequestId(JobId),
-    /// A search was told more than the store has.
+    /// A search has received more evaluations than the store has.
     #[error("the search of job {0} was told more evaluations than are stored")]
     Stored(JobId),
-    /// The checks of an evaluation and the batches for them do not match.
+    /// The audits and disputes of an evaluation do not match the batches for them.
     #[error("job {0} miscounts what is being checked")]
     Checks(JobId),
-    /// An answer of a banned worker counts, or it is attached.
+    /// A banned worker is attached, or one of its answers counts.
     #[error("worker {0} is expelled, and still counts")]
     Banned(WorkerName),
-    /// A speculative evaluation is of none of the points that a search may ask for.
+    /// A speculative evaluation is not of one of the candidate points.
     #[error("job {0} is ahead with what its search does not ask for")]
     Speculation(JobId),
-    /// A number that is handed out next is not above all in use.
+    /// The next identifier is not above all that are in use.
     #[error("a number is about to be given twice")]
     Numbers,
 }
@@ -72,7 +73,7 @@ pub enum Insane {
 /// Checks the whole state.
 ///
 /// # Errors
-/// The first thing that does not fit together.
+/// The first inconsistency.
 pub fn sanity_check(state: &State) -> Result<(), Insane> {
     check_jobs(state)?;
     check_workers(state)?;
@@ -131,7 +132,8 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
     }
 }
 
-/// Speculative evaluations are of candidates, of each at most one, while an evaluation is under way.
+/// Checks that speculative evaluations are of candidates, at most one of each, while an evaluation
+/// is under way.
 fn check_ahead(job: &Job) -> Result<(), Insane> {
     let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
@@ -146,12 +148,13 @@ fn check_ahead(job: &Job) -> Result<(), Insane> {
     if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
 }
 
-/// Whether a batch is of this evaluation.
+/// Returns whether a batch belongs to this evaluation.
 fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
     batch.assignment.job == job && batch.assignment.attempt == evaluation.attempt
 }
 
-/// Audits and judges are with workers, and nobody who is banned has a say.
+/// Checks that audits and tie-breakers are held by workers, and that no answer of a banned worker
+/// counts.
 fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
@@ -243,7 +246,7 @@ fn check_batches(state: &State) -> Result<(), Insane> {
     Ok(())
 }
 
-/// Every index is in exactly one place.
+/// Checks that every index is in exactly one place.
 fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
     let mut places: Vec<u32> =
         evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
@@ -252,7 +255,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
     }
     let queued = evaluation.queue.iter().map(|indices| (indices.first, indices.count));
     let quarantine = evaluation.quarantine.iter().map(|index| (*index, 1));
-    // A batch and its copy are one place.
+    // A batch and its duplicates count as one place.
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()

@@ -7,7 +7,7 @@ use tonic::{Code, Status};
 
 use super::*;
 
-/// Every method, and what it asks for.
+/// Every method and its requirement.
 const NEEDS: [(&str, Need); 14] = [
     ("/grpc.health.v1.Health/Check", Need::Nothing),
     ("/osteon.v1.Jobs/Get", Need::Role(Role::Read)),
@@ -31,7 +31,7 @@ fn every_method_asks_for_something() {
         assert_eq!(need(path), expected, "{path}");
     }
     for (path, expected) in [
-        // What is made later asks for the most until it is thought about.
+        // A method that is added later has the strictest requirement until one is chosen for it.
         ("/osteon.v1.Jobs/Later", Need::Role(Role::Admin)),
         ("/osteon.v1.Workers/Later", Need::Worker),
         ("/osteon.v1.Else/Get", Need::Known),
@@ -63,7 +63,7 @@ fn no_method_of_the_services_escaped_the_table() {
     }
 }
 
-/// A list with one token of each role, and the tokens.
+/// Returns a list with one token of each role, and the tokens.
 fn tokens() -> (Tokens, [Token; 3]) {
     let roles = [Role::Read, Role::Submit, Role::Admin];
     let made = roles.map(|_| Token::generate().unwrap());
@@ -79,7 +79,7 @@ fn tokens() -> (Tokens, [Token; 3]) {
     (Tokens::read(&path).unwrap(), made)
 }
 
-/// `Ok` or the code of the refusal.
+/// Returns `Ok`, or the code of the refusal.
 fn code(
     policy: &Policy,
     certificate: Certificate,
@@ -125,7 +125,7 @@ fn who_may_call_what_is_a_table() {
             let found = code(&Policy::Everybody, Certificate::Absent, presented, need);
             assert_eq!(found, Ok(()), "{need:?} {name}");
         }
-        // Without TLS there are no certificates, and a worker is whom an administrator trusts.
+        // Without TLS there are no certificates, and only an administrator is trusted as a worker.
         let found =
             code(&Policy::Tokens(list.clone()), Certificate::Absent, presented, Need::Worker);
         let expected = match name {
@@ -146,7 +146,7 @@ fn a_certificate_makes_a_worker_and_nothing_else() {
         for (certificate, expected) in [
             (Certificate::Worker, Ok(())),
             (Certificate::Other, Err(Code::PermissionDenied)),
-            // No token takes the place of a certificate.
+            // A token does not replace a certificate.
             (Certificate::Absent, Err(Code::Unauthenticated)),
             (faulty, Err(Code::Unauthenticated)),
         ] {
@@ -154,7 +154,7 @@ fn a_certificate_makes_a_worker_and_nothing_else() {
             assert_eq!(found, expected, "{certificate:?} {presented:?}");
         }
     }
-    // Nor does a certificate take the place of a token.
+    // Nor does a certificate replace a token.
     for certificate in [Certificate::Worker, Certificate::Other] {
         for role in [Role::Read, Role::Submit, Role::Admin] {
             let found = code(&policy, certificate, Presented::Nothing, Need::Role(role));
@@ -162,7 +162,7 @@ fn a_certificate_makes_a_worker_and_nothing_else() {
         }
         assert_eq!(code(&policy, certificate, Presented::Nothing, Need::Known), Ok(()));
     }
-    // Whoever shows a certificate that is not in order is told so, whatever the token.
+    // A caller whose certificate is not valid receives that reason, whatever its token.
     let token = Presented::Token(admin.reveal());
     for need in [Need::Known, Need::Role(Role::Read), Need::Role(Role::Admin)] {
         assert_eq!(code(&policy, faulty, token, need), Err(Code::Unauthenticated), "{need:?}");

@@ -1,5 +1,5 @@
-//! A coordinator and its workers in virtual time: realizations, messages and the store take times
-//! that are fixed beforehand. What is measured is a function of the schedule alone.
+//! A coordinator and its workers in virtual time: realizations, messages and the store take fixed
+//! times. What is measured is a function of the schedule alone.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -20,46 +20,46 @@ use osteon_proto::batch::Work;
 
 use crate::fake;
 
-/// One realization on one thread, on average.
+/// Average time of one realization on one thread.
 const REALIZATION: Duration = Duration::from_millis(10);
-/// A message, one way.
+/// Time of a message, one way.
 const MESSAGE: Duration = Duration::from_micros(200);
-/// A record until it is durable.
+/// Time until a record is durable.
 const RECORD: Duration = Duration::from_millis(2);
 const TICK: Duration = Duration::from_millis(100);
-/// No run takes longer than this.
+/// Maximum duration of a run.
 const DAY: Duration = Duration::from_secs(86_400);
 
 enum Happening {
     Tick,
-    /// Something reaches the coordinator.
+    /// An event reaches the coordinator.
     Event(Event),
     /// A batch reaches a worker.
     Batch(WorkerId, BatchId, Work),
-    /// A worker is told to forget a batch.
+    /// The revocation of a batch reaches a worker.
     Revoked(WorkerId, BatchId),
-    /// A thread of a worker ends a realization of a batch.
+    /// A thread of a worker finishes a realization of a batch.
     Realized(WorkerId, BatchId),
     Write(Record),
 }
 
-/// How long realizations take.
+/// Distribution of the times of realizations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Times {
-    /// All as long.
+    /// All equal.
     Equal,
-    /// From half of the average to half as much again, each time the same one.
+    /// Between 0.5 and 1.5 times the average, always the same for the same realization.
     Spread,
 }
 
-/// A worker: batches begin in the order in which they come, one of whose realizations is given up
-/// between two.
+/// A worker: batches begin in the order of their arrival. The remaining realizations of a revoked
+/// batch are dropped; those that have begun run to their end.
 struct Worker {
     idle_threads: u32,
-    /// What is not begun of each batch.
+    /// Number of realizations of each batch that have not begun.
     queue: VecDeque<(BatchId, u32)>,
     batches: BTreeMap<BatchId, Held>,
-    /// It never answers one in so many of its batches.
+    /// It never answers one in this many of the batches; `None`: it answers all.
     swallows: Option<u64>,
 }
 
@@ -69,9 +69,9 @@ struct Held {
     realized: u32,
 }
 
-/// How a job ended.
+/// The end of a job.
 pub(crate) struct Ended {
-    /// When, since all were submitted.
+    /// Time since all jobs were submitted.
     pub(crate) at: Duration,
     pub(crate) result: JobResult,
 }
@@ -87,24 +87,24 @@ pub(crate) struct Clockwork {
     workers: BTreeMap<WorkerId, Worker>,
     unfinished: BTreeSet<JobId>,
     ends: BTreeMap<JobId, (Duration, EndRecord)>,
-    /// Batches that were sent.
+    /// Number of batches that were sent.
     pub(crate) sent: u64,
-    /// Batches that were never answered.
+    /// Number of batches that were never answered.
     pub(crate) swallowed: u64,
 }
 
 impl Clockwork {
-    /// Workers of so many threads.
+    /// Returns workers with these numbers of threads.
     pub(crate) fn new(threads: &[u32], times: Times) -> Self {
         Self::with_config(threads, times, Config::default())
     }
 
-    /// The same at a coordinator with other settings.
+    /// The same with other settings of the coordinator.
     pub(crate) fn with_config(threads: &[u32], times: Times, config: Config) -> Self {
         Self::with(threads, times, REALIZATION, config)
     }
 
-    /// Workers of so many threads, whose realizations take so long on average.
+    /// Returns workers with these numbers of threads, whose realizations take this long on average.
     pub(crate) fn with(
         threads: &[u32],
         times: Times,
@@ -141,12 +141,12 @@ impl Clockwork {
         clockwork
     }
 
-    /// A worker gives signs of life and never answers one in `n` of its batches.
+    /// Makes a worker that sends heartbeats never answer one in `n` of the batches.
     pub(crate) fn swallow(&mut self, worker: u64, n: u64) {
         self.workers.get_mut(&WorkerId(worker)).unwrap().swallows = Some(n);
     }
 
-    /// Runs jobs, each of a client of its own, to their ends.
+    /// Runs jobs to their ends, each for a client of its own.
     pub(crate) fn run(&mut self, specifications: &[JobSpecification]) -> Vec<Ended> {
         for (number, specification) in (1..).zip(specifications) {
             self.unfinished.insert(JobId(number));
@@ -218,7 +218,7 @@ impl Clockwork {
         }
     }
 
-    /// Idle threads begin what waits.
+    /// Begins waiting realizations on idle threads.
     fn begin(&mut self, worker: WorkerId) {
         let known = self.workers.get_mut(&worker).unwrap();
         let mut begun = Vec::new();
@@ -273,7 +273,7 @@ impl Clockwork {
     }
 }
 
-/// How long the realization of a batch takes that has `left` after it.
+/// Returns the time of the realization of a batch that has `left` realizations after it.
 fn time(times: Times, realization: Duration, work: &Work, left: u32) -> Duration {
     let index = work.first + u64::from(work.count - 1 - left);
     let noise = work.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));

@@ -1,4 +1,4 @@
-//! The world around a simulated coordinator.
+//! The simulated environment of a coordinator.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -29,63 +29,64 @@ mod liars;
 pub(crate) use counts::Counts;
 
 const TICK: Duration = Duration::from_millis(100);
-/// No schedule takes longer than this, in its own time.
+/// Maximum simulated time of a schedule.
 const HOUR: Duration = Duration::from_secs(3600);
-/// Nor one without a bad node longer than this: the longest outage of the store, and a few minutes. It
-/// is less than the time after which a worker that does not answer has lost its lease.
+/// Maximum simulated time of a schedule without a bad node: the longest outage of the store, and a
+/// few minutes. It is less than the time after which a worker that does not answer loses its lease.
 const MINUTES: Duration = Duration::from_secs(300);
-/// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
+/// Upper limit for the workers lost over a quarantined realization: a third loss rightly fails the
+/// job.
 const LOST_ALONE_MAX: u32 = 2;
 
-/// Something that will happen.
+/// A scheduled event.
 enum Happening {
     Tick,
-    /// A client submits its job until it hears that it is accepted.
+    /// A client submits its job, and repeats that until the job is accepted.
     Submit(usize),
     /// A worker attaches.
     Arrive,
     /// A process attaches again.
     Return(u32),
-    /// The coordinator stands still.
+    /// The coordinator pauses.
     Pause,
-    /// A worker does not wait for the coordinator any longer.
+    /// A worker no longer waits for the coordinator.
     GiveUp(WorkerId),
-    /// A worker attaches that dies over whatever it gets.
+    /// A worker attaches that is lost over everything it gets.
     ArriveBad,
-    /// A process attaches that gives signs of life, and never answers one in so many batches.
+    /// A process attaches that sends heartbeats, and never answers one in so many batches.
     ArriveSilent(u32, u64),
     /// A worker's message arrives.
     Message(WorkerId, Event),
-    /// A worker answers a batch that is settled again, and differently.
+    /// A worker answers a settled batch again, and differently.
     Lie(WorkerId, BatchId, Work),
     /// A worker's stream breaks.
     Break(WorkerId),
-    /// A record reaches the disk, or does not.
+    /// A record reaches the disk, or fails to.
     Write(Record),
     /// An evaluation is read.
     Read(JobId, u64),
-    /// Ended jobs are forgotten.
+    /// Ended jobs are deleted.
     Forget(Option<Token>, Vec<JobId>),
-    /// Somebody wants ended jobs forgotten.
+    /// A client requests the deletion of ended jobs.
     Prune,
     /// A report of the store arrives.
     Report(Event),
     /// The coordinator is killed and starts again.
     Restart,
-    /// The coordinator is told to stop; when it has, it starts again.
+    /// The coordinator is requested to stop, and is started again when it has.
     Drain,
-    /// A client wants its job ended, until it hears that it has.
+    /// A client cancels its job, and repeats that until it has ended.
     Cancel(usize),
 }
 
 #[derive(Default)]
 struct Worker {
     process: u32,
-    /// It computes nothing and says nothing, but its stream stands.
+    /// It computes and sends nothing, but its stream stays open.
     stalled: bool,
-    /// It dies over whatever it gets.
+    /// It is lost over everything it gets.
     bad: bool,
-    /// It never answers one in so many of its batches; 0: it answers all.
+    /// It never answers one in this many of its batches; 0: it answers all.
     swallows: u64,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
@@ -101,27 +102,27 @@ pub(crate) struct World {
     clients: Vec<Client>,
     submissions: BTreeMap<Token, usize>,
     cancellations: BTreeMap<Token, usize>,
-    /// How long it may take.
+    /// Maximum simulated time.
     most: Duration,
-    /// When the store takes nothing.
+    /// Period in which the store refuses everything.
     outage: Range<Duration>,
-    /// Processes that lie now and then, some of them on second thoughts only.
+    /// Processes that return wrong answers now and then, some only when they answer a second time.
     liars: BTreeSet<u32>,
-    /// Who has lied about realizations of which seed.
+    /// Processes that gave wrong answers, with the seeds of the jobs.
     lies: BTreeSet<(u32, u64)>,
-    /// Who is banned.
+    /// Banned processes.
     banned: BTreeSet<u32>,
-    /// Seed, point and indices of batches that were answered in this life of the coordinator.
+    /// Seed, point and indices of batches that were answered in this run of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
     /// Seed of each job.
     seeds: BTreeMap<JobId, u64>,
-    /// How many evaluations of the job with a seed are durable.
+    /// Number of durable evaluations of the job with each seed.
     durable: BTreeMap<u64, u64>,
-    /// How many were, of each seed, when a point was sent first.
+    /// That number when each point of a seed was sent first.
     first_sent: BTreeMap<(u64, u64), u64>,
     /// Evaluations that were found damaged in the store.
     damaged: BTreeSet<(JobId, u64)>,
-    /// Jobs that end while somebody who lied in them is not found out.
+    /// Jobs that ended before a worker with wrong answers in them was found out.
     deceived: BTreeSet<JobId>,
     /// The last decision on the end of each job.
     ends: BTreeMap<JobId, EndRecord>,
@@ -133,7 +134,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// Runs one schedule to its end and checks what it left.
+    /// Runs one schedule to its end and checks the results.
     pub(crate) fn run(seed: u64) -> Counts {
         let mut world = Self::new(seed);
         while !world.done() {
@@ -170,7 +171,7 @@ impl World {
         let clients = clients::some(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
-        // Long: a client has given up by then, and so have many programs.
+        // Long enough that clients and many programs have given up.
         let outage = (draw(8) == 0).then(|| (draw(1000), 10_000 + draw(60_000)));
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
             Duration::from_millis(from)..Duration::from_millis(from + length)
@@ -304,7 +305,7 @@ impl World {
                 known.heard = self.now;
                 self.react(Event::Heartbeat { worker });
             } else if silent && !self.may_die(worker) {
-                // It comes back to life in the last moment.
+                // It revives at the last moment.
                 let known = self.workers.get_mut(&worker).unwrap();
                 known.stalled = false;
                 known.heard = self.now;
@@ -334,7 +335,7 @@ impl World {
                 *name = format!("client {}", client % 2);
                 *priority = client as u32;
             }
-            // Until it hears of acceptance, a client asks again.
+            // A client repeats its request until the job is accepted.
             self.react(Event::Requested { token, request });
             self.within(2000, Happening::Submit(client));
         }
@@ -373,7 +374,8 @@ impl World {
         self.react(event);
     }
 
-    /// Whether the coordinator may lose this worker without a third lone death of a realization.
+    /// Returns whether the coordinator may lose this worker without a third loss over a quarantined
+    /// realization.
     fn may_die(&mut self, worker: WorkerId) -> bool {
         let holds = &self.workers[&worker].holds;
         let Some(work) = holds.values().next().filter(|work| holds.len() == 1 && work.count == 1)
@@ -386,30 +388,30 @@ impl World {
         *lost <= LOST_ALONE_MAX
     }
 
-    /// A worker is gone; another comes in its place.
+    /// Removes a lost worker; another one replaces it.
     fn bury(&mut self, worker: WorkerId) {
         let gone = self.workers.remove(&worker).unwrap();
         self.counts.lost += 1;
         self.replace(&gone);
     }
 
-    /// Another worker comes in the place of one that is gone.
+    /// Schedules the arrival of a worker that replaces a lost one.
     fn replace(&mut self, gone: &Worker) {
         let other = match gone.swallows {
             0 if gone.bad => Happening::ArriveBad,
             0 => Happening::Arrive,
-            // It comes back, or another process of its host.
+            // It comes back itself, or as another process of its host.
             swallows => Happening::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
         };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
-    /// The coordinator has stopped by itself, and starts again.
+    /// Restarts the coordinator after it has stopped by itself.
     fn stopped(&mut self) {
         self.counts.stops += 1;
         assert!(self.workers.is_empty(), "it stopped with workers attached");
         let unstored = |happening: &Happening| matches!(happening, Happening::Write(_));
-        // Only what the store has refused may be left.
+        // Only records that the store has refused may be left.
         let left = self.agenda.values().any(unstored);
         assert!(!left || self.counts.refusals > 0, "it stopped with a record on its way");
         self.restart();
@@ -427,7 +429,7 @@ impl World {
         self.within(2000, Happening::Cancel(client));
     }
 
-    /// Kills the coordinator: what was on its way to the disk may or may not have reached it.
+    /// Kills the coordinator: records on their way to the disk may or may not have reached it.
     fn restart(&mut self) {
         let agenda = std::mem::take(&mut self.agenda);
         for (at, happening) in agenda {
@@ -508,7 +510,7 @@ impl World {
         }
     }
 
-    /// A worker gets a batch; the dice say what becomes of it.
+    /// Handles a batch sent to a worker; a random number decides its fate.
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
         self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let (seed, point, ..) = key(&work);
@@ -552,7 +554,7 @@ impl World {
     }
 }
 
-/// What a batch is about.
+/// Returns seed, point and indices of a batch.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
     (work.germs.seed, point_key(&work.point), work.first, work.count)
 }

@@ -1,6 +1,7 @@
-//! Replay: stored evaluations of a job are read one by one and told to its search, after a restart, and when
-//! a worker is banned whose answers are in them. An evaluation with answers of a banned
-//! worker is computed again; if it changes, those after it in the store belong to another path.
+//! Replay: the stored evaluations of a job are read one by one and passed to its search, after a
+//! restart and when a worker is banned whose answers are in them. An evaluation with answers of a
+//! banned worker is computed again; if it changes, those after it in the store belong to another
+//! path.
 
 use super::{jobs, records};
 use crate::effect::Effect;
@@ -13,7 +14,7 @@ use crate::reactor::turn::Turn;
 use crate::store::EvaluationRecord;
 use osteon_search::Step;
 
-/// Lets jobs read on that waited for a ban to be durable.
+/// Continues replays that waited for a ban to be durable.
 pub(crate) fn read_on(turn: &mut Turn) {
     if turn.state.ban_pending() {
         return;
@@ -26,7 +27,7 @@ pub(crate) fn read_on(turn: &mut Turn) {
     }
 }
 
-/// Takes what the store has of an evaluation.
+/// Takes in the stored record of an evaluation.
 pub(crate) fn read(
     turn: &mut Turn,
     id: JobId,
@@ -36,7 +37,7 @@ pub(crate) fn read(
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    // Anything else is an answer to a question that was asked twice.
+    // Anything else is the second answer to a repeated request.
     let wanted = matches!(job.stage, Stage::Replaying { asked: true });
     if !wanted || job.search.evaluations() != number {
         return;
@@ -52,8 +53,8 @@ pub(crate) fn read(
     }
 }
 
-/// Has an evaluation computed again whose record is damaged. A point's outcomes are the same each
-/// time, so what is stored after it is on the same path, or is found not to be.
+/// Computes an evaluation again whose record is damaged. A point has the same outcomes each time,
+/// so the stored evaluations after it are on the same path, unless replay finds otherwise.
 fn recompute(turn: &mut Turn, id: JobId) {
     let attempt = turn.state.new_attempt();
     let Some(job) = turn.state.jobs.get_mut(&id) else {
@@ -79,14 +80,15 @@ fn recompute(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// The store cannot be read: it is tried again, for as long as it takes, unless nobody waits for it.
+/// Schedules another read after the store could not be read. Reads are repeated for as long as
+/// necessary, unless the job is cancelled.
 fn read_failed(turn: &mut Turn, id: JobId, error: String) {
     let retry_at = turn.now + turn.state.config.store_retry;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     if job.cancelled {
-        // What is told so far is all that can be known.
+        // No more than the evaluations replayed so far can be known.
         jobs::finish(turn, id, jobs::cancelled());
         return;
     }
@@ -96,7 +98,7 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
     records::despair_if_late(turn, since, error);
 }
 
-/// Tells a search what the store has of an evaluation, or has that computed again.
+/// Passes a stored evaluation to the search, or has it computed again.
 fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
     let doubtful = record.workers.iter().any(|worker| turn.state.ban(worker).is_some());
     let attempt = turn.state.new_attempt();
@@ -107,7 +109,7 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
     job.progressed = turn.now;
     let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
     if job.recomputed && job.search.expects(point).is_err() {
-        // What was damaged had been computed wrongly, and this comes of it.
+        // The damaged record held wrong outcomes, so the stored path ends here.
         job.stored = number;
         jobs::advance(turn, id);
     } else if doubtful && !job.cancelled {
@@ -121,7 +123,7 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
             Err(error) => jobs::fail(turn, id, &error.into()),
         }
     } else if doubtful {
-        // What is told so far is all that is known to be right.
+        // Only the evaluations replayed so far are known to be right.
         jobs::finish(turn, id, jobs::cancelled());
     } else {
         match job.search.retell(point, outcomes, estimated_error) {

@@ -1,5 +1,5 @@
-//! The store for its owner. What it does is done through a shared reference, so that others may use
-//! it between two pieces of a copy.
+//! `Store` for the owner of a `SqliteStore`. Each method calls that of the shared reference, so
+//! that others may use the store between two pieces of a copy.
 
 use std::fs::File;
 
