@@ -72,7 +72,7 @@ pub enum Presented<'a> {
 
 /// Requirement of a method on its caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
+pub enum Requirement {
     /// No requirement.
     Nothing,
     /// Any token or certificate.
@@ -85,7 +85,7 @@ pub enum Need {
 
 /// Reason for refusing a call.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Denied {
+pub enum AccessDenied {
     /// The call has no token.
     #[error("this coordinator wants a token; give --token-file FILE")]
     NoToken,
@@ -124,21 +124,21 @@ pub enum Denied {
 
 /// Returns the requirement of the method at `path`. A method that is not listed has the strictest
 /// one.
-pub fn need(path: &str) -> Need {
+pub fn need(path: &str) -> Requirement {
     let Some((service, method)) = path.strip_prefix('/').and_then(|path| path.split_once('/'))
     else {
-        return Need::Known;
+        return Requirement::Known;
     };
     match (service, method) {
-        ("grpc.health.v1.Health", _) => Need::Nothing,
-        ("osteon.v1.Workers", _) => Need::Worker,
+        ("grpc.health.v1.Health", _) => Requirement::Nothing,
+        ("osteon.v1.Workers", _) => Requirement::Worker,
         ("osteon.v1.Jobs", "Get" | "List" | "ListExpelled" | "ListWorkers" | "Watch" | "Fetch") => {
-            Need::Role(Role::Read)
+            Requirement::Role(Role::Read)
         }
-        ("osteon.v1.Jobs", "Submit" | "Cancel") => Need::Role(Role::Submit),
-        ("osteon.v1.Jobs", _) => Need::Role(Role::Admin),
+        ("osteon.v1.Jobs", "Submit" | "Cancel") => Requirement::Role(Role::Submit),
+        ("osteon.v1.Jobs", _) => Requirement::Role(Role::Admin),
         // Reflection, and services that do not exist.
-        _ => Need::Known,
+        _ => Requirement::Known,
     }
 }
 
@@ -151,38 +151,38 @@ pub fn decide<'a>(
     policy: &'a Policy,
     certificate: Certificate,
     presented: Presented<'_>,
-    need: Need,
-) -> Result<Option<&'a str>, Denied> {
+    need: Requirement,
+) -> Result<Option<&'a str>, AccessDenied> {
     let tokens = match policy {
         Policy::Everybody => return Ok(None),
         Policy::Tokens(tokens) | Policy::Tls(tokens) => tokens,
     };
     let in_order = matches!(certificate, Certificate::Worker | Certificate::Other);
     let needs = match need {
-        Need::Nothing => return Ok(None),
-        Need::Known if in_order => return Ok(None),
-        Need::Known => Role::Read,
-        Need::Role(role) => role,
-        Need::Worker => match (policy, certificate) {
+        Requirement::Nothing => return Ok(None),
+        Requirement::Known if in_order => return Ok(None),
+        Requirement::Known => Role::Read,
+        Requirement::Role(role) => role,
+        Requirement::Worker => match (policy, certificate) {
             (Policy::Tls(_), Certificate::Worker) => return Ok(None),
-            (Policy::Tls(_), Certificate::Other) => return Err(Denied::NotAWorker),
-            (Policy::Tls(_), Certificate::Absent) => return Err(Denied::NoCertificate),
-            (_, Certificate::Faulty(fault)) => return Err(Denied::Faulty(fault)),
+            (Policy::Tls(_), Certificate::Other) => return Err(AccessDenied::NotAWorker),
+            (Policy::Tls(_), Certificate::Absent) => return Err(AccessDenied::NoCertificate),
+            (_, Certificate::Faulty(fault)) => return Err(AccessDenied::Faulty(fault)),
             // Only a certificate proves that a caller is a worker. Without TLS there is none, and
             // only an administrator may answer for results.
             _ => Role::Admin,
         },
     };
     if let Certificate::Faulty(fault) = certificate {
-        return Err(Denied::Faulty(fault));
+        return Err(AccessDenied::Faulty(fault));
     }
     let holder = match presented {
-        Presented::Nothing => return Err(Denied::NoToken),
-        Presented::Unreadable => return Err(Denied::Unreadable),
-        Presented::Token(text) => tokens.holder(text).ok_or(Denied::UnknownToken)?,
+        Presented::Nothing => return Err(AccessDenied::NoToken),
+        Presented::Unreadable => return Err(AccessDenied::Unreadable),
+        Presented::Token(text) => tokens.holder(text).ok_or(AccessDenied::UnknownToken)?,
     };
     if holder.role < needs {
-        return Err(Denied::WeakRole { name: holder.name.clone(), has: holder.role, needs });
+        return Err(AccessDenied::WeakRole { name: holder.name.clone(), has: holder.role, needs });
     }
     Ok(Some(&holder.name))
 }

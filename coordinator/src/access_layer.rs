@@ -16,32 +16,32 @@ use tonic::{Code, Status};
 use tower::Layer;
 
 use crate::accept::Peer;
-use crate::access::{self, Certificate, Denied, Holder, Need, Policy};
+use crate::access::{self, AccessDenied, Certificate, Holder, Policy, Requirement};
+use crate::limiter::{Caller, Limiter};
 use crate::message_body::MessageBody;
-use crate::places::{Caller, Places};
 use crate::tokens::Role;
 
 /// The only method whose message may be large.
 const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
 
-/// Puts a [`Door`] in front of a service.
+/// Puts a [`AccessService`] in front of a service.
 #[derive(Debug, Clone)]
 pub(crate) struct AccessLayer {
     /// Read for each call, because it may be replaced while the coordinator runs.
     policy: watch::Receiver<Arc<Policy>>,
-    submissions: Places,
+    submissions: Limiter,
 }
 
 /// A service behind the access check.
 #[derive(Debug, Clone)]
-pub(crate) struct Door<S> {
+pub(crate) struct AccessService<S> {
     inner: S,
     layer: AccessLayer,
 }
 
 impl AccessLayer {
     pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>) -> Self {
-        let submissions = Places::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
+        let submissions = Limiter::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
         Self { policy, submissions }
     }
 
@@ -57,7 +57,9 @@ impl AccessLayer {
         match access::decide(&policy, certificate, presented, need) {
             Ok(holder) => {
                 // Calls that change something are logged with their holder; reads are not.
-                if let (Some(holder), Need::Role(Role::Submit | Role::Admin)) = (holder, need) {
+                if let (Some(holder), Requirement::Role(Role::Submit | Role::Admin)) =
+                    (holder, need)
+                {
                     tracing::info!(path, holder, "admitted");
                 }
                 Ok(holder.map(|name| Holder(name.to_owned())))
@@ -71,14 +73,14 @@ impl AccessLayer {
 }
 
 impl<S> Layer<S> for AccessLayer {
-    type Service = Door<S>;
+    type Service = AccessService<S>;
 
-    fn layer(&self, inner: S) -> Door<S> {
-        Door { inner, layer: self.clone() }
+    fn layer(&self, inner: S) -> AccessService<S> {
+        AccessService { inner, layer: self.clone() }
     }
 }
 
-impl<S> Service<http::Request<Body>> for Door<S>
+impl<S> Service<http::Request<Body>> for AccessService<S>
 where
     S: Service<http::Request<Body>, Response = http::Response<Body>> + Clone + Send + 'static,
     S::Future: Send,
@@ -128,15 +130,15 @@ where
     }
 }
 
-impl From<Denied> for Status {
-    fn from(denied: Denied) -> Self {
+impl From<AccessDenied> for Status {
+    fn from(denied: AccessDenied) -> Self {
         let code = match denied {
-            Denied::WeakRole { .. } | Denied::NotAWorker => Code::PermissionDenied,
-            Denied::NoToken
-            | Denied::Unreadable
-            | Denied::UnknownToken
-            | Denied::Faulty(_)
-            | Denied::NoCertificate => Code::Unauthenticated,
+            AccessDenied::WeakRole { .. } | AccessDenied::NotAWorker => Code::PermissionDenied,
+            AccessDenied::NoToken
+            | AccessDenied::Unreadable
+            | AccessDenied::UnknownToken
+            | AccessDenied::Faulty(_)
+            | AccessDenied::NoCertificate => Code::Unauthenticated,
         };
         Self::new(code, denied.to_string())
     }

@@ -48,7 +48,7 @@ pub struct Config {
     pub store_retry: Duration,
     /// [`crate::Coordinator::failed`] completes when the store has refused a record for this long;
     /// `None`: never. In either case the write is repeated until it succeeds.
-    pub store_patience: Option<Duration>,
+    pub store_give_up_after: Option<Duration>,
     /// Maximum time from a call to the beginning of its answer.
     pub call_timeout: Duration,
     /// Maximum time that a shutdown waits for streams to end and for the store.
@@ -72,7 +72,7 @@ impl Default for Config {
             active_realizations_max: ACTIVE_REALIZATIONS_MAX,
             jobs_bytes_max: JOBS_BYTES_MAX,
             store_retry: Duration::from_secs(2),
-            store_patience: None,
+            store_give_up_after: None,
             call_timeout: Duration::from_secs(CALL_S_MAX),
             shutdown_timeout: Duration::from_secs(5),
         }

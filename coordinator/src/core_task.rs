@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use crate::close_reason::CloseReason;
 use crate::config::Config;
 use crate::effect::{Answer, Effect, Refusal};
-use crate::event::{Event, Hello, Request, Unread};
+use crate::event::{Event, Hello, ReadFailure, Request};
 use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
 use crate::outbound::{self, Outbound};
@@ -178,7 +178,7 @@ impl Core {
                 }
                 Effect::Read { job, number } => {
                     if let Err(refused) = self.commands.try_send(Command::Read { job, number }) {
-                        let found = Err(Unread::Refused { error: refused.to_string() });
+                        let found = Err(ReadFailure::Refused { error: refused.to_string() });
                         followups.push_back(Event::Read { job, number, found });
                     }
                 }
@@ -197,7 +197,7 @@ impl Core {
                 }
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
-                Effect::Despair { error, waited } => {
+                Effect::GiveUp { error, waited } => {
                     self.failing.tell(Failed::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),

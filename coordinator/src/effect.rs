@@ -89,7 +89,7 @@ pub enum Effect {
     /// Write a notice for the operator into the log.
     Note(Notice),
     /// Give up because the store no longer accepts records.
-    Despair {
+    GiveUp {
         /// Its last error.
         error: String,
         /// Time for which it has refused a record.

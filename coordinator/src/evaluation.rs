@@ -71,7 +71,7 @@ pub struct Evaluation {
     pub(crate) disputes: Vec<Dispute>,
     /// A worker was lost over it. While it is speculative, no further worker is risked for it until
     /// the search asks for it.
-    pub(crate) lost_over: bool,
+    pub(crate) has_crashed_worker: bool,
 }
 
 impl Evaluation {
@@ -93,7 +93,7 @@ impl Evaluation {
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
-            lost_over: false,
+            has_crashed_worker: false,
         }
     }
 

@@ -86,7 +86,7 @@ pub enum Event {
         /// Number of the evaluation.
         number: u64,
         /// The stored evaluation, if there is one, or why it was not read.
-        found: Result<Option<EvaluationRecord>, Unread>,
+        found: Result<Option<EvaluationRecord>, ReadFailure>,
     },
     /// Ended jobs were deleted, or could not be.
     Pruned {
@@ -103,7 +103,7 @@ pub enum Event {
 
 /// Why an evaluation was not read from the store.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unread {
+pub enum ReadFailure {
     /// It may be readable at another time.
     Refused {
         /// Error text for people.

@@ -32,7 +32,7 @@ pub enum Failure {
          it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
          {case}"
     )]
-    LethalRealization {
+    PoisonRealization {
         /// Index of the realization.
         index: u64,
         /// Number of lost workers.
@@ -58,7 +58,7 @@ impl Failure {
     pub fn kind(&self) -> JobFailure {
         match self {
             Self::Contradiction { .. } => JobFailure::IntegrityError,
-            Self::LethalRealization { .. } => JobFailure::LostRealization,
+            Self::PoisonRealization { .. } => JobFailure::LostRealization,
             Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
         }
     }

@@ -19,7 +19,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use crate::ids::JobId;
-use crate::leftover::{Left, ReadError, Reading, Reply};
+use crate::job_output::{Left, ReadError, Reading, Reply};
 use crate::store::EndRecord;
 use crate::store_thread::Command;
 
@@ -254,7 +254,7 @@ mod tests {
     use tonic::Code;
 
     use super::*;
-    use crate::leftover::tests::ended;
+    use crate::job_output::tests::ended;
 
     /// Returns a fetch of `count` parts.
     fn parts(

@@ -10,8 +10,8 @@ use prost::Message as _;
 
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, Token};
-use crate::pace::Pace;
 use crate::rate::Rate;
+use crate::realization_time::RealizationTime;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 use crate::worker_name::WorkerName;
 use osteon_search::Search;
@@ -39,9 +39,9 @@ pub(crate) struct Job {
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
     /// Duration of its realizations.
-    pub(crate) pace: Pace,
+    pub(crate) pace: RealizationTime,
     /// The newest duplicate of one of its overdue batches.
-    pub(crate) scout: Option<BatchId>,
+    pub(crate) newest_overdue_duplicate: Option<BatchId>,
     /// Sequence number of its last published snapshot.
     pub(crate) sequence: u64,
     /// Time of its last answer, its beginning or its acceptance, whichever was last.
@@ -50,7 +50,7 @@ pub(crate) struct Job {
     /// cancellations at the end.
     pub(crate) tokens: Vec<Token>,
     /// The store's refusal of the current record.
-    pub(crate) trouble: Option<Trouble>,
+    pub(crate) store_trouble: Option<StoreRetry>,
 }
 
 impl Job {
@@ -69,12 +69,12 @@ impl Job {
             recomputed: false,
             cancelled: false,
             rate: Rate::default(),
-            pace: Pace::default(),
-            scout: None,
+            pace: RealizationTime::default(),
+            newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,
             tokens: Vec::new(),
-            trouble: None,
+            store_trouble: None,
         }
     }
 
@@ -144,7 +144,7 @@ pub(crate) struct Speculation {
 
 /// A refusal of the store.
 #[derive(Debug)]
-pub(crate) struct Trouble {
+pub(crate) struct StoreRetry {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
     pub(crate) error: String,

@@ -22,11 +22,11 @@ const MEMORY: Duration = Duration::from_secs(600);
 
 /// The workers that are on probation.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Probation(BTreeMap<WorkerName, Trial>);
+pub(crate) struct Probation(BTreeMap<WorkerName, ProbationRecord>);
 
 /// Record of one worker.
 #[derive(Debug, Clone, PartialEq)]
-struct Trial {
+struct ProbationRecord {
     /// Number of consecutive batches that it has not answered since its probation began.
     missed: u32,
     /// It receives no work before this time.
@@ -42,7 +42,7 @@ impl Probation {
     }
 
     /// Returns whether a worker may not receive work yet.
-    pub(crate) fn rests(&self, name: &WorkerName, now: Duration) -> bool {
+    pub(crate) fn is_paused(&self, name: &WorkerName, now: Duration) -> bool {
         self.0.get(name).is_some_and(|trial| now < trial.rests_until)
     }
 
@@ -57,8 +57,11 @@ impl Probation {
         if begins && self.0.len() >= WORKERS_MAX {
             self.0.pop_first();
         }
-        let trial =
-            self.0.entry(name.clone()).or_insert(Trial { missed: 0, rests_until: now, last: now });
+        let trial = self.0.entry(name.clone()).or_insert(ProbationRecord {
+            missed: 0,
+            rests_until: now,
+            last: now,
+        });
         let rest = REST_MIN * 2_u32.saturating_pow(trial.missed.min(31));
         trial.missed = trial.missed.saturating_add(1);
         trial.rests_until = now + rest.min(REST_MAX);
@@ -75,7 +78,7 @@ impl Probation {
         let mut of_host =
             self.0.range(first..).take_while(|(other, _)| other.host() == name.host());
         if of_host.any(|(_, trial)| trial.missed > 0) {
-            let trial = Trial { missed: 0, rests_until: now, last: now };
+            let trial = ProbationRecord { missed: 0, rests_until: now, last: now };
             self.0.insert(name.clone(), trial);
         }
     }
@@ -111,16 +114,16 @@ mod tests {
         let mut probation = Probation::default();
         for (missed, rest) in [3, 6, 12, 24, 48, 60, 60].into_iter().enumerate() {
             assert_eq!(probation.miss(&name, s(0), s(0)), missed == 0);
-            assert!(probation.rests(&name, s(rest) - Duration::from_nanos(1)), "{rest}");
-            assert!(!probation.rests(&name, s(rest)), "{rest}");
+            assert!(probation.is_paused(&name, s(rest) - Duration::from_nanos(1)), "{rest}");
+            assert!(!probation.is_paused(&name, s(rest)), "{rest}");
         }
         for _ in 0..100 {
             probation.miss(&name, s(0), s(0));
         }
-        assert!(!probation.rests(&name, s(60)));
+        assert!(!probation.is_paused(&name, s(60)));
         assert!(probation.end(&name) && !probation.end(&name));
-        assert!(probation.miss(&name, s(0), s(2)) && !probation.rests(&name, s(5)));
-        assert!(!probation.miss(&name, s(1), s(2)) && !probation.rests(&name, s(5)));
+        assert!(probation.miss(&name, s(0), s(2)) && !probation.is_paused(&name, s(5)));
+        assert!(!probation.miss(&name, s(1), s(2)) && !probation.is_paused(&name, s(5)));
     }
 
     #[test]
@@ -133,7 +136,7 @@ mod tests {
         probation.attach(&other, s(1));
         assert_eq!([&bad, &same, &other].map(|name| probation.has(name)), [true, true, false]);
         // It has missed nothing itself, and receives work at once.
-        assert!(!probation.rests(&same, s(1)));
+        assert!(!probation.is_paused(&same, s(1)));
         let silent = [&bad, &same, &other].map(|name| probation.is_silent(name));
         assert_eq!(silent, [true, false, false]);
         // An answer of one worker says nothing about another.

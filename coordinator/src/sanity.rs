@@ -16,7 +16,7 @@ use crate::worker_name::WorkerName;
 
 /// An inconsistency of a state.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Insane {
+pub enum Inconsistency {
     /// A list of jobs does not hold exactly the jobs in the stage that it is for.
     #[error("job {0} is in a list for another stage, or missing in the list of its stage")]
     JobList(JobId),
@@ -74,7 +74,7 @@ pub enum Insane {
 ///
 /// # Errors
 /// The first inconsistency.
-pub fn sanity_check(state: &State) -> Result<(), Insane> {
+pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
     check_jobs(state)?;
     check_workers(state)?;
     check_batches(state)?;
@@ -83,16 +83,16 @@ pub fn sanity_check(state: &State) -> Result<(), Insane> {
             check_evaluation(state, id, evaluation)?;
             check_checks(state, id, evaluation)?;
         }
-        check_ahead(job)?;
+        check_speculation(job)?;
     }
     let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
     let batches = state.batches.last_key_value();
     let batches = batches.is_some_and(|(last, _)| last.0 >= state.next_batch);
     let leases = state.workers.values().any(|worker| worker.lease.0 >= state.next_lease);
-    if jobs || batches || leases { Err(Insane::Numbers) } else { Ok(()) }
+    if jobs || batches || leases { Err(Inconsistency::Numbers) } else { Ok(()) }
 }
 
-fn check_jobs(state: &State) -> Result<(), Insane> {
+fn check_jobs(state: &State) -> Result<(), Inconsistency> {
     for (&id, job) in &state.jobs {
         let waiting = state.waiting.iter().filter(|waiting| **waiting == id).count();
         let active = state.active.contains(&id);
@@ -104,14 +104,14 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
             Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
         };
         if !fits || state.ended.contains_key(&id) {
-            return Err(Insane::JobList(id));
+            return Err(Inconsistency::JobList(id));
         }
         if job.search.evaluations() > job.stored {
-            return Err(Insane::Stored(id));
+            return Err(Inconsistency::Stored(id));
         }
         let request = RequestName::of(&job.record);
         if request.is_some_and(|request| state.requests.get(&request) != Some(&id)) {
-            return Err(Insane::RequestId(id));
+            return Err(Inconsistency::RequestId(id));
         }
     }
     for (id, job) in state.active.iter().filter_map(|id| Some((id, state.jobs.get(id)?))) {
@@ -119,22 +119,22 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         let of_client =
             |id: &&JobId| state.jobs.get(id).is_some_and(|job| job.record.client == *client);
         if state.active.iter().filter(of_client).count() != state.shares.jobs(client) {
-            return Err(Insane::JobList(*id));
+            return Err(Inconsistency::JobList(*id));
         }
     }
     let lost = |id: &&JobId| !state.jobs.contains_key(id);
     if let Some(id) = state.active.iter().chain(&state.waiting).find(lost) {
-        return Err(Insane::JobList(*id));
+        return Err(Inconsistency::JobList(*id));
     }
     match state.requests.values().find(|id| lost(id) && !state.ended.contains_key(id)) {
-        Some(id) => Err(Insane::JobList(*id)),
+        Some(id) => Err(Inconsistency::JobList(*id)),
         None => Ok(()),
     }
 }
 
 /// Checks that speculative evaluations are of candidates, at most one of each, while an evaluation
 /// is under way.
-fn check_ahead(job: &Job) -> Result<(), Insane> {
+fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
@@ -145,7 +145,7 @@ fn check_ahead(job: &Job) -> Result<(), Insane> {
         && candidates.len() <= CANDIDATES_MAX
         && (under_way || candidates.is_empty())
         && evaluations.iter().all(|it| it.audits_out == 0);
-    if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
+    if fits { Ok(()) } else { Err(Inconsistency::Speculation(job.record.job)) }
 }
 
 /// Returns whether a batch belongs to this evaluation.
@@ -155,7 +155,7 @@ fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
 
 /// Checks that audits and tie-breakers are held by workers, and that no answer of a banned worker
 /// counts.
-fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Inconsistency> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
@@ -174,7 +174,7 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
         || with(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
         || !disputes.iter().all(judged)
     {
-        return Err(Insane::Checks(job));
+        return Err(Inconsistency::Checks(job));
     }
     for Banned { record, .. } in &state.banned {
         let name = &record.worker;
@@ -182,13 +182,13 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
         let disputes = disputes.iter().any(|dispute| dispute.involves(name));
         let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
         if attached || disputes || told || evaluation.workers.contains(name) {
-            return Err(Insane::Banned(name.clone()));
+            return Err(Inconsistency::Banned(name.clone()));
         }
     }
     Ok(())
 }
 
-fn check_workers(state: &State) -> Result<(), Insane> {
+fn check_workers(state: &State) -> Result<(), Inconsistency> {
     for (&id, worker) in &state.workers {
         let held = worker.in_flight.len();
         let count = |purpose| state.held_for(worker, purpose).count();
@@ -196,18 +196,18 @@ fn check_workers(state: &State) -> Result<(), Insane> {
         let speculative = count(Purpose::Speculative);
         let remembered = worker.settled.len();
         if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
-            return Err(Insane::TooMuch(id));
+            return Err(Inconsistency::TooMuch(id));
         }
         for batch in &worker.in_flight {
             if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
-                return Err(Insane::Holding(id, *batch));
+                return Err(Inconsistency::Holding(id, *batch));
             }
         }
     }
     Ok(())
 }
 
-fn check_batches(state: &State) -> Result<(), Insane> {
+fn check_batches(state: &State) -> Result<(), Inconsistency> {
     let overdue = |id: &&BatchId| {
         let batch = state.batches.get(id);
         batch.is_some_and(|batch| {
@@ -215,13 +215,13 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         })
     };
     if let Some(id) = state.overdue.iter().find(|id| !overdue(id)) {
-        return Err(Insane::Overdue(*id));
+        return Err(Inconsistency::Overdue(*id));
     }
     for (&id, batch) in &state.batches {
         let worker = state.workers.get(&batch.worker);
         let held = worker.map_or(0, |w| w.in_flight.iter().filter(|held| **held == id).count());
         if held != 1 {
-            return Err(Insane::Holding(batch.worker, id));
+            return Err(Inconsistency::Holding(batch.worker, id));
         }
         let matches = |other: &BatchId| {
             state.batches.get(other).is_some_and(|other| {
@@ -232,7 +232,7 @@ fn check_batches(state: &State) -> Result<(), Insane> {
             })
         };
         if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= DUPLICATES_MAX {
-            return Err(Insane::Duplicates(id));
+            return Err(Inconsistency::Duplicates(id));
         }
         let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
@@ -240,18 +240,22 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {
-            return Err(Insane::Stray(id));
+            return Err(Inconsistency::Stray(id));
         }
     }
     Ok(())
 }
 
 /// Checks that every index is in exactly one place.
-fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+fn check_evaluation(
+    state: &State,
+    job: JobId,
+    evaluation: &Evaluation,
+) -> Result<(), Inconsistency> {
     let mut places: Vec<u32> =
         evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
     if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
-        return Err(Insane::Filled(job));
+        return Err(Inconsistency::Filled(job));
     }
     let queued = evaluation.queue.iter().map(|indices| (indices.first, indices.count));
     let quarantine = evaluation.quarantine.iter().map(|index| (*index, 1));
@@ -270,7 +274,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
         }
     }
     match places.iter().position(|places| *places != 1) {
-        Some(index) => Err(Insane::Index { job, index, places: places[index] }),
+        Some(index) => Err(Inconsistency::Index { job, index, places: places[index] }),
         None => Ok(()),
     }
 }

@@ -31,8 +31,8 @@ use crate::effect::{Answer, Refusal};
 use crate::event::{self, Retention};
 use crate::fetching;
 use crate::ids::{JobId, WorkerId};
+use crate::limiter::{Caller, Limiter};
 use crate::observers;
-use crate::places::{Caller, Places};
 use crate::store::EndRecord;
 use crate::store_thread::Command;
 
@@ -51,7 +51,7 @@ pub(crate) struct JobsService {
     store: mpsc::Sender<Command>,
     /// Permits of fetches: the output of a job may be large, so that of only a few is held in
     /// memory at a time.
-    fetches: Places,
+    fetches: Limiter,
     /// Permit of backups: a copy of the store takes space on its disk, so only one is made at a
     /// time.
     backups: Arc<Semaphore>,
@@ -61,7 +61,7 @@ type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        let fetches = Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
+        let fetches = Limiter::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
         Self { messages, store, fetches, backups: Arc::new(Semaphore::new(1)) }
     }
 

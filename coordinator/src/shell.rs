@@ -169,7 +169,7 @@ impl Coordinator {
     }
 
     /// Waits until a part of the coordinator has ended unexpectedly, or the store has refused a
-    /// record for [`Config::store_patience`]; otherwise the future never completes. The coordinator
+    /// record for [`Config::store_give_up_after`]; otherwise the future never completes. The coordinator
     /// cannot continue then: shut it down and report the reason.
     pub fn failed(&self) -> impl Future<Output = Failed> + Send + use<> {
         self.failing.first()

@@ -9,7 +9,7 @@ use osteon_proto::v1::{JobSnapshot, JobState};
 use crate::batch::Purpose;
 use crate::ids::JobId;
 use crate::job::{EndedJob, Job, Stage};
-use crate::state::{LostInARow, State};
+use crate::state::{HostLosses, State};
 
 /// Without an answer for this long, a snapshot says what the job waits for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -106,15 +106,15 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
 /// Describes what a job that has not ended waits for; empty if it does not wait.
 fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
-    if let Some(trouble) = &job.trouble {
+    if let Some(store_trouble) = &job.store_trouble {
         let does = match job.stage {
             Stage::Replaying { .. } => "give",
             _ => "take",
         };
         return format!(
             "the store does not {does} a record, it is tried again: {} {}",
-            trouble.error,
-            since(trouble.since)
+            store_trouble.error,
+            since(store_trouble.since)
         );
     }
     if state.draining {
@@ -188,7 +188,7 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
 /// answer; empty if there are none.
 fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
-    let named = |(host, lost): (&String, &LostInARow)| {
+    let named = |(host, lost): (&String, &HostLosses)| {
         format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
     };
     // A worker that holds nothing or has departed is not waited for.

@@ -70,7 +70,7 @@ pub struct State {
     pub(crate) banned: Vec<Banned>,
     /// The workers of each host that were lost in a row while they held batches, without an answer
     /// in between.
-    pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
+    pub(crate) lost_in_a_row: BTreeMap<String, HostLosses>,
     /// Workers that accept batches and do not answer them.
     pub(crate) probation: Probation,
     /// Time since which no worker has been attached; meaningless while there is one.
@@ -100,7 +100,7 @@ pub(crate) struct Banned {
 
 /// Lost workers of one host.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct LostInARow {
+pub(crate) struct HostLosses {
     /// Their names, newest last.
     pub(crate) workers: VecDeque<WorkerName>,
     /// Time of the last loss.
@@ -134,7 +134,7 @@ pub(crate) struct Worker {
     /// It has answered at least one batch in this stay.
     pub(crate) has_answered: bool,
     /// Batches that others answered in its place since its last answer to a batch that it held.
-    pub(crate) missed: Missed,
+    pub(crate) missed: MissedBatches,
     /// Time when the last heartbeat was sent to it.
     pub(crate) heartbeat_sent: Duration,
     /// Batches that it holds, in the order they were sent.
@@ -151,7 +151,7 @@ pub(crate) struct Worker {
 
 /// Consecutive batches of a worker that others answered, long after it should have.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Missed {
+pub(crate) struct MissedBatches {
     /// Their number.
     pub(crate) count: u32,
     /// Time when the worker could begin the first of them; meaningless while there is none.
@@ -205,7 +205,8 @@ impl State {
     pub(crate) fn unstored(&self) -> usize {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
         let banned = self.banned.iter().filter(on_its_way).count();
-        let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
+        let jobs =
+            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_trouble.is_none());
         jobs.count() + banned
     }
 

@@ -428,7 +428,7 @@ pub trait Store {
     ///
     /// # Errors
     /// When that is not durable.
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError>;
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError>;
 
     /// Makes a job durable.
     ///
@@ -464,7 +464,7 @@ pub trait Store {
     ///
     /// # Errors
     /// When that is not durable.
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
 
     /// Returns the highest identifier of a deleted job. It is never assigned again, since a client
     /// may still ask for that job.

@@ -11,10 +11,10 @@ use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::effect::Record;
-use crate::event::{Event, Unread};
+use crate::event::{Event, ReadFailure};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
-use crate::leftover::Reading;
+use crate::job_output::Reading;
 use crate::store::{BanRecord, Store, StoreError};
 
 /// Maximum number of waiting commands: a record for every job, and some reads.
@@ -60,7 +60,7 @@ pub(crate) fn serve(
     commands: &mut mpsc::Receiver<Command>,
     events: &mpsc::Sender<Event>,
 ) {
-    let mut desk = Desk { events, readings: VecDeque::new(), copies: VecDeque::new() };
+    let mut desk = PendingWork { events, readings: VecDeque::new(), copies: VecDeque::new() };
     loop {
         let command = if desk.readings.is_empty() && desk.copies.is_empty() {
             match commands.blocking_recv() {
@@ -88,7 +88,7 @@ pub(crate) fn serve(
 pub(crate) type CopyReply = oneshot::Sender<Result<Option<File>, StoreError>>;
 
 /// Work that is done piece by piece, between commands.
-struct Desk<'a> {
+struct PendingWork<'a> {
     events: &'a mpsc::Sender<Event>,
     /// As many as there are fetches under way.
     readings: VecDeque<Reading>,
@@ -96,7 +96,7 @@ struct Desk<'a> {
     copies: VecDeque<CopyReply>,
 }
 
-impl Desk<'_> {
+impl PendingWork<'_> {
     fn run(&mut self, store: &mut dyn Store, command: Command) {
         match command {
             // The receiver is gone when the coordinator has stopped.
@@ -106,7 +106,7 @@ impl Desk<'_> {
                 drop(self.events.blocking_send(Event::Read { job, number, found }));
             }
             Command::Prune { token, jobs } => {
-                let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
+                let outcome = store.delete_jobs(&jobs).map_err(|error| error.to_string());
                 drop(self.events.blocking_send(Event::Pruned { token, jobs, outcome }));
             }
             Command::Fetch(reading) => self.readings.push_back(reading),
@@ -146,15 +146,15 @@ impl Desk<'_> {
 }
 
 /// Returns the reason why an evaluation was not read: a damaged one is permanently unreadable.
-fn unread(job: JobId, error: StoreError) -> Unread {
+fn unread(job: JobId, error: StoreError) -> ReadFailure {
     match error {
         StoreError::Damaged { .. } | StoreError::Corrupt { .. } => {
             tracing::error!(%job, %error, "a stored evaluation is damaged; it is computed again");
-            Unread::Damaged
+            ReadFailure::Damaged
         }
         _ => {
             tracing::warn!(%job, %error, "a stored evaluation cannot be read; it is tried again");
-            Unread::Refused { error: error.to_string() }
+            ReadFailure::Refused { error: error.to_string() }
         }
     }
 }

@@ -15,7 +15,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Answer, Effect};
 use osteon_coordinator::event::{Event, Request};
 use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::Store as _;
@@ -83,7 +83,7 @@ fn check(clocks: [Duration; 3]) {
         assert_eq!(seen.state() == JobState::Ended, now == clocks[2], "{clocks:?}: {seen:?}");
     }
     let jobs = store.jobs().unwrap();
-    let result = leftover::read(&mut store, jobs[0].end.as_ref().unwrap()).unwrap().result;
+    let result = job_output::read(&mut store, jobs[0].end.as_ref().unwrap()).unwrap().result;
     assert_eq!(result, fake::plain_run(&specification), "{clocks:?}");
 }
 

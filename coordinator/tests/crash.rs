@@ -18,7 +18,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::Effect;
 use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
@@ -64,7 +64,7 @@ fn evaluations_of_other_numerics_are_computed_again() {
     let directory = tempfile::tempdir().unwrap();
     assert!(!live(directory.path(), &specification, Some(Death::After(4))));
     let mut store = SqliteStore::open(directory.path()).unwrap();
-    store.begin_again(JobId(1), "osteon 0.0.0 numerics 0").unwrap();
+    store.reset_job(JobId(1), "osteon 0.0.0 numerics 0").unwrap();
     let mut search = Search::new(Arc::new(specification.clone()));
     for number in 0..3 {
         let Step::Evaluate(point) = search.ask() else { panic!("done") };
@@ -171,7 +171,7 @@ fn lives_of_a_store() -> (TempDir, SqliteStore, Vec<(u64, Image)>) {
         store.put_job(&record(job)).unwrap();
         images.push((job, image(directory.path())));
         if job == 3 {
-            store.forget_jobs(&[JobId(2)]).unwrap();
+            store.delete_jobs(&[JobId(2)]).unwrap();
             images.push((job, image(directory.path())));
         }
     }
@@ -347,6 +347,6 @@ fn result(directory: &Path) -> String {
     let mut store = SqliteStore::open(directory).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!(jobs.len(), 1);
-    let left = leftover::read(&mut store, jobs[0].end.as_ref().unwrap());
+    let left = job_output::read(&mut store, jobs[0].end.as_ref().unwrap());
     format!("{:?}", left.unwrap().result)
 }

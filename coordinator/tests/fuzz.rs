@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
-use osteon_coordinator::access::{self, Need, Presented};
+use osteon_coordinator::access::{self, Presented, Requirement};
 use osteon_coordinator::ids::JobId;
 use osteon_coordinator::tokens::{self, Role, TokensError};
 use osteon_coordinator::{ListenAddress, Tokens};
@@ -53,7 +53,7 @@ fn check_header(bytes: &[u8]) {
 }
 
 fn check_path(path: &str) {
-    let open = bounded(path.len(), || access::need(path)) == Need::Nothing;
+    let open = bounded(path.len(), || access::need(path)) == Requirement::Nothing;
     assert_eq!(open, path.starts_with("/grpc.health.v1.Health/"), "{path}");
 }
 

@@ -34,11 +34,11 @@ fn next(store: &mut dyn Store) -> JobId {
 fn check(mut open: impl FnMut() -> Box<dyn Store>) {
     assert_eq!(next(&mut *open()), JobId(1));
     assert_eq!(next(&mut *open()), JobId(2));
-    open().forget_jobs(&[JobId(2)]).unwrap();
+    open().delete_jobs(&[JobId(2)]).unwrap();
     assert_eq!(next(&mut *open()), JobId(3));
     // Deleting an older job does not lower it.
-    open().forget_jobs(&[JobId(3)]).unwrap();
-    open().forget_jobs(&[JobId(1)]).unwrap();
+    open().delete_jobs(&[JobId(3)]).unwrap();
+    open().delete_jobs(&[JobId(1)]).unwrap();
     assert_eq!(open().last_forgotten().unwrap(), Some(JobId(3)));
     assert_eq!(next(&mut *open()), JobId(4));
 }

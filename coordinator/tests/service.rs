@@ -296,8 +296,8 @@ impl Store for BrokenStore {
         self.sound.evaluation(job, number)
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
-        self.sound.begin_again(job, fingerprint)
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        self.sound.reset_job(job, fingerprint)
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -318,8 +318,8 @@ impl Store for BrokenStore {
         self.sound.summary(job)
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
-        self.sound.forget_jobs(jobs)
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        self.sound.delete_jobs(jobs)
     }
 
     fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
@@ -351,7 +351,7 @@ async fn failed(dies: bool) -> (Coordinator, MemoryStore, String, Failed) {
     let config = Config {
         tick: Duration::from_millis(10),
         store_retry: Duration::from_millis(10),
-        store_patience: Some(Duration::from_millis(50)),
+        store_give_up_after: Some(Duration::from_millis(50)),
         shutdown_timeout: Duration::from_millis(200),
         ..Config::default()
     };

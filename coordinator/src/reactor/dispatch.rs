@@ -73,7 +73,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     };
     let size = if turn.state.is_sound(attached) {
         sizing::batch_size(turn.state, attached, job, evaluation.queued())
-    } else if !turn.state.probation.rests(&attached.name, turn.now)
+    } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)
     {
         1

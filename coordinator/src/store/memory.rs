@@ -56,7 +56,7 @@ impl Store for MemoryStore {
         Ok(self.content().evaluations.get(&(job, number)).cloned())
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
         let mut content = self.content();
         content.evaluations.retain(|(of, _), _| *of != job);
         if let Some(stored) = content.jobs.get_mut(&job) {
@@ -98,7 +98,7 @@ impl Store for MemoryStore {
         Ok(self.content().summaries.get(&job).cloned())
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         let mut content = self.content();
         content.last_forgotten = content.last_forgotten.max(jobs.iter().max().copied());
         content.jobs.retain(|job, _| !jobs.contains(job));

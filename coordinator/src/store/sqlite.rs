@@ -260,11 +260,11 @@ impl Store for &SqliteStore {
         }
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
         let Some(record) = self.job(job)? else {
             return Ok(());
         };
-        let begin_again = || -> rusqlite::Result<()> {
+        let reset_job = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
             transaction.execute("DELETE FROM evaluation WHERE job = ?1", params![job.0])?;
             let encoded: Vec<u8> = transaction.query_row(
@@ -279,7 +279,7 @@ impl Store for &SqliteStore {
             )?;
             transaction.commit()
         };
-        begin_again().map_err(|source| self.refused(source))
+        reset_job().map_err(|source| self.refused(source))
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -374,7 +374,7 @@ impl Store for &SqliteStore {
         }
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         self.remove_jobs(jobs).map_err(|source| self.refused(source))?;
         if let Err(error) = self.give_back() {
             tracing::warn!(%error, "the room of removed jobs is not given back yet");

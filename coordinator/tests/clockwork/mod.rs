@@ -10,7 +10,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::react;
 use osteon_coordinator::sanity::sanity_check;
 use osteon_coordinator::state::State;
@@ -30,7 +30,7 @@ const TICK: Duration = Duration::from_millis(100);
 /// Maximum duration of a run.
 const DAY: Duration = Duration::from_secs(86_400);
 
-enum Happening {
+enum Occurrence {
     Tick,
     /// An event reaches the coordinator.
     Event(Event),
@@ -81,7 +81,7 @@ pub(crate) struct Clockwork {
     realization: Duration,
     now: Duration,
     number: u64,
-    agenda: BTreeMap<(Duration, u64), Happening>,
+    agenda: BTreeMap<(Duration, u64), Occurrence>,
     state: State,
     store: MemoryStore,
     workers: BTreeMap<WorkerId, Worker>,
@@ -137,7 +137,7 @@ impl Clockwork {
             let hello = Hello { slots: threads, ..fake::hello(process) };
             clockwork.react(Event::Hello { worker, hello });
         }
-        clockwork.after(TICK, Happening::Tick);
+        clockwork.after(TICK, Occurrence::Tick);
         clockwork
     }
 
@@ -164,29 +164,29 @@ impl Clockwork {
         }
         let mut ended = Vec::new();
         for (at, end) in std::mem::take(&mut self.ends).into_values() {
-            let result = leftover::read(&mut self.store, &end).unwrap().result;
+            let result = job_output::read(&mut self.store, &end).unwrap().result;
             ended.push(Ended { at, result });
         }
         ended
     }
 
-    fn after(&mut self, time: Duration, happening: Happening) {
+    fn after(&mut self, time: Duration, happening: Occurrence) {
         self.number += 1;
         self.agenda.insert((self.now + time, self.number), happening);
     }
 
-    fn happen(&mut self, happening: Happening) {
+    fn happen(&mut self, happening: Occurrence) {
         match happening {
-            Happening::Tick => {
-                self.after(TICK, Happening::Tick);
+            Occurrence::Tick => {
+                self.after(TICK, Occurrence::Tick);
                 let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
                 for worker in workers {
                     self.react(Event::Heartbeat { worker });
                 }
                 self.react(Event::Tick);
             }
-            Happening::Event(event) => self.react(event),
-            Happening::Batch(worker, batch, work) => {
+            Occurrence::Event(event) => self.react(event),
+            Occurrence::Batch(worker, batch, work) => {
                 self.sent += 1;
                 let known = self.workers.get_mut(&worker).unwrap();
                 if known.swallows.is_some_and(|n| self.sent.is_multiple_of(n)) {
@@ -197,17 +197,17 @@ impl Clockwork {
                 known.batches.insert(batch, Held { work, begun: Duration::MAX, realized: 0 });
                 self.begin(worker);
             }
-            Happening::Revoked(worker, batch) => {
+            Occurrence::Revoked(worker, batch) => {
                 let known = self.workers.get_mut(&worker).unwrap();
                 known.queue.retain(|(queued, _)| *queued != batch);
                 known.batches.remove(&batch);
             }
-            Happening::Realized(worker, batch) => {
+            Occurrence::Realized(worker, batch) => {
                 self.workers.get_mut(&worker).unwrap().idle_threads += 1;
                 self.realized(worker, batch);
                 self.begin(worker);
             }
-            Happening::Write(record) => {
+            Occurrence::Write(record) => {
                 let event = fake::written(&mut self.store, &record);
                 if let Record::End { end, .. } = record {
                     self.unfinished.remove(&end.job);
@@ -235,7 +235,7 @@ impl Clockwork {
             }
         }
         for (batch, time) in begun {
-            self.after(time, Happening::Realized(worker, batch));
+            self.after(time, Occurrence::Realized(worker, batch));
         }
     }
 
@@ -250,7 +250,7 @@ impl Clockwork {
             let solved = fake::solved(&held.work);
             known.batches.remove(&batch);
             let answer = Event::Answered { worker, batch, solved, elapsed_s };
-            self.after(MESSAGE, Happening::Event(answer));
+            self.after(MESSAGE, Occurrence::Event(answer));
         }
     }
 
@@ -260,12 +260,12 @@ impl Clockwork {
         for effect in effects {
             match effect {
                 Effect::Send { worker, batch, work } => {
-                    self.after(MESSAGE, Happening::Batch(worker, batch, work));
+                    self.after(MESSAGE, Occurrence::Batch(worker, batch, work));
                 }
                 Effect::Revoke { worker, batch } => {
-                    self.after(MESSAGE, Happening::Revoked(worker, batch));
+                    self.after(MESSAGE, Occurrence::Revoked(worker, batch));
                 }
-                Effect::Store(record) => self.after(RECORD, Happening::Write(record)),
+                Effect::Store(record) => self.after(RECORD, Occurrence::Write(record)),
                 Effect::Close { worker, reason } => panic!("{worker} is closed: {reason}"),
                 _ => {}
             }

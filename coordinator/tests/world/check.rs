@@ -7,7 +7,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
 use osteon_coordinator::effect::Answer;
 use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
 use osteon_search::{Ending, Search, Step};
@@ -51,7 +51,7 @@ impl World {
     }
 
     pub(super) fn check_result(&mut self, record: &JobRecord, end: &EndRecord) {
-        let left = leftover::read(&mut self.store, end).unwrap();
+        let left = job_output::read(&mut self.store, end).unwrap();
         let seed = record.specification.monte_carlo.seed;
         let lied = self.lies.iter().any(|(_, of)| *of == seed);
         let expected = if end.ending.status == Status::Cancelled {

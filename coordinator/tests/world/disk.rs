@@ -1,11 +1,11 @@
 //! The store: writes that are late, fail, or are lost with the coordinator.
 
 use osteon_coordinator::effect::Record;
-use osteon_coordinator::event::{Event, Request, Retention, Unread};
+use osteon_coordinator::event::{Event, ReadFailure, Request, Retention};
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::store::Store as _;
 
-use super::{Happening, World};
+use super::{Occurrence, World};
 use crate::fake;
 
 impl World {
@@ -57,7 +57,7 @@ impl World {
         } else {
             self.written(record)
         };
-        self.within(5, Happening::Report(event));
+        self.within(5, Occurrence::Report(event));
     }
 
     /// Handles a record that has become durable.
@@ -81,16 +81,16 @@ impl World {
 
     pub(super) fn read(&mut self, job: JobId, number: u64) {
         let event = if self.refuses() {
-            let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+            let found = Err(ReadFailure::Refused { error: "the cable is out".to_owned() });
             Event::Read { job, number, found }
         } else if self.draw(10) == 0 {
             self.counts.damaged += 1;
             self.damaged.insert((job, number));
-            Event::Read { job, number, found: Err(Unread::Damaged) }
+            Event::Read { job, number, found: Err(ReadFailure::Damaged) }
         } else {
             fake::read(&mut self.store, job, number)
         };
-        self.within(5, Happening::Report(event));
+        self.within(5, Occurrence::Report(event));
     }
 
     /// Requests the deletion of ended jobs, once every client has been answered.
@@ -100,7 +100,7 @@ impl World {
             let retention = Retention::default();
             self.react(Event::Requested { token, request: Request::Prune(retention) });
         }
-        self.within(3000, Happening::Prune);
+        self.within(3000, Occurrence::Prune);
     }
 
     pub(super) fn forget(&mut self, token: Option<Token>, jobs: Vec<JobId>) {
@@ -110,7 +110,7 @@ impl World {
             self.forget_now(&jobs);
             Ok(())
         };
-        self.within(5, Happening::Report(Event::Pruned { token, jobs, outcome }));
+        self.within(5, Occurrence::Report(Event::Pruned { token, jobs, outcome }));
     }
 
     /// Checks the output of ended jobs, and deletes it.
@@ -129,7 +129,7 @@ impl World {
                 }
             }
         }
-        self.store.forget_jobs(jobs).unwrap();
+        self.store.delete_jobs(jobs).unwrap();
     }
 
     fn refuses(&mut self) -> bool {

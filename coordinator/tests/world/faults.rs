@@ -5,7 +5,7 @@ use std::time::Duration;
 use osteon_coordinator::event::{Event, Hello};
 use osteon_coordinator::ids::{BatchId, WorkerId};
 
-use super::{HOUR, Happening, Worker, World};
+use super::{HOUR, Occurrence, Worker, World};
 use crate::fake;
 
 /// Process numbers of the bad node are above this one.
@@ -17,19 +17,19 @@ impl World {
     /// Decides whether there is a bad node, and when the coordinator is stopped or pauses.
     pub(super) fn plan_faults(&mut self) {
         if self.draw(4) == 0 {
-            self.within(500, Happening::ArriveBad);
+            self.within(500, Occurrence::ArriveBad);
             self.most = HOUR;
         }
         if self.draw(3) == 0 {
             // Half of them never answer.
             let swallows = [1, 1, 2, 5][self.draw(4) as usize];
-            self.within(500, Happening::ArriveSilent(SILENT_PROCESSES, swallows));
+            self.within(500, Occurrence::ArriveSilent(SILENT_PROCESSES, swallows));
         }
         if self.draw(3) == 0 {
-            self.within(3000, Happening::Drain);
+            self.within(3000, Occurrence::Drain);
         }
         for _ in 0..self.draw(4) {
-            self.within(3000, Happening::Pause);
+            self.within(3000, Occurrence::Pause);
         }
     }
 
@@ -40,7 +40,7 @@ impl World {
         let until = self.now + self.config.expiry + Duration::from_millis(1 + self.draw(3000));
         let later = self.agenda.split_off(&(until, 0));
         for ((_, number), happening) in std::mem::replace(&mut self.agenda, later) {
-            let number = if matches!(happening, Happening::Tick) { 0 } else { number };
+            let number = if matches!(happening, Occurrence::Tick) { 0 } else { number };
             self.agenda.insert((until, number), happening);
         }
         self.now = until;
@@ -54,7 +54,7 @@ impl World {
                 && !self.banned.contains(&process)
                 && self.draw(2) == 0
             {
-                self.after(1, Happening::GiveUp(worker));
+                self.after(1, Occurrence::GiveUp(worker));
             }
         }
     }
@@ -63,7 +63,7 @@ impl World {
     pub(super) fn give_up(&mut self, worker: WorkerId) {
         if let Some(gone) = self.workers.remove(&worker) {
             self.react(Event::StreamEnded { worker });
-            self.within(400, Happening::Return(gone.process));
+            self.within(400, Occurrence::Return(gone.process));
         }
     }
 

@@ -39,7 +39,7 @@ const MINUTES: Duration = Duration::from_secs(300);
 const LOST_ALONE_MAX: u32 = 2;
 
 /// A scheduled event.
-enum Happening {
+enum Occurrence {
     Tick,
     /// A client submits its job, and repeats that until the job is accepted.
     Submit(usize),
@@ -95,7 +95,7 @@ struct Worker {
 pub(crate) struct World {
     random: u64,
     now: Duration,
-    agenda: BTreeMap<(Duration, u64), Happening>,
+    agenda: BTreeMap<(Duration, u64), Occurrence>,
     state: State,
     config: Config,
     store: MemoryStore,
@@ -206,20 +206,20 @@ impl World {
             lost_alone: BTreeMap::new(),
             number: 1,
         };
-        world.agenda.insert((TICK, 0), Happening::Tick);
+        world.agenda.insert((TICK, 0), Occurrence::Tick);
         for client in 0..world.clients.len() {
-            world.within(500, Happening::Submit(client));
+            world.within(500, Occurrence::Submit(client));
             if world.clients[client].cancels {
-                world.within(3000, Happening::Cancel(client));
+                world.within(3000, Occurrence::Cancel(client));
             }
         }
         for _ in 0..workers {
-            world.within(500, Happening::Arrive);
+            world.within(500, Occurrence::Arrive);
         }
-        restarts.into_iter().for_each(|at| world.after(at, Happening::Restart));
+        restarts.into_iter().for_each(|at| world.after(at, Occurrence::Restart));
         world.plan_faults();
         if let Some(at) = prune {
-            world.after(at, Happening::Prune);
+            world.after(at, Occurrence::Prune);
         }
         world
     }
@@ -234,12 +234,12 @@ impl World {
         self.number
     }
 
-    fn after(&mut self, ms: u64, happening: Happening) {
+    fn after(&mut self, ms: u64, happening: Occurrence) {
         let number = self.number();
         self.agenda.insert((self.now + Duration::from_millis(ms), number), happening);
     }
 
-    fn within(&mut self, ms: u64, happening: Happening) {
+    fn within(&mut self, ms: u64, happening: Occurrence) {
         let ms = 1 + self.draw(ms);
         self.after(ms, happening);
     }
@@ -250,53 +250,53 @@ impl World {
             return false;
         }
         let jobs = self.store.clone().jobs().unwrap();
-        let on_its_way = |happening: &Happening| matches!(happening, Happening::Forget(..));
+        let on_its_way = |happening: &Occurrence| matches!(happening, Occurrence::Forget(..));
         jobs.iter().all(|job| job.end.is_some()) && !self.agenda.values().any(on_its_way)
     }
 
-    fn happen(&mut self, happening: Happening) {
+    fn happen(&mut self, happening: Occurrence) {
         match happening {
-            Happening::Tick => self.tick(),
-            Happening::Submit(client) => self.submit(client),
-            Happening::Arrive => self.arrive(),
-            Happening::ArriveBad => self.arrive_bad(),
-            Happening::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
-            Happening::Return(process) => self.attach(process),
-            Happening::Pause => self.pause(),
-            Happening::GiveUp(worker) => self.give_up(worker),
-            Happening::Message(worker, event) => {
+            Occurrence::Tick => self.tick(),
+            Occurrence::Submit(client) => self.submit(client),
+            Occurrence::Arrive => self.arrive(),
+            Occurrence::ArriveBad => self.arrive_bad(),
+            Occurrence::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
+            Occurrence::Return(process) => self.attach(process),
+            Occurrence::Pause => self.pause(),
+            Occurrence::GiveUp(worker) => self.give_up(worker),
+            Occurrence::Message(worker, event) => {
                 if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
                     self.message(worker, event);
                 }
             }
-            Happening::Break(worker) => {
+            Occurrence::Break(worker) => {
                 let bad = self.workers.get(&worker).map(|worker| worker.bad);
                 self.counts.bad_deaths += u64::from(bad == Some(true));
                 if bad.is_none() {
                 } else if bad == Some(true) || self.may_die(worker) {
-                    self.bury(worker);
+                    self.remove_lost(worker);
                     self.react(Event::StreamEnded { worker });
                 } else {
                     self.answer_all(worker);
                 }
             }
-            Happening::Write(record) => self.write(&record),
-            Happening::Report(event) => self.react(event),
-            Happening::Restart => {
+            Occurrence::Write(record) => self.write(&record),
+            Occurrence::Report(event) => self.react(event),
+            Occurrence::Restart => {
                 self.counts.restarts += 1;
                 self.restart();
             }
-            Happening::Drain => self.react(Event::Drain),
-            Happening::Lie(worker, batch, work) => self.lie(worker, batch, &work),
-            Happening::Cancel(client) => self.cancel(client),
-            Happening::Read(job, number) => self.read(job, number),
-            Happening::Forget(token, jobs) => self.forget(token, jobs),
-            Happening::Prune => self.prune(),
+            Occurrence::Drain => self.react(Event::Drain),
+            Occurrence::Lie(worker, batch, work) => self.lie(worker, batch, &work),
+            Occurrence::Cancel(client) => self.cancel(client),
+            Occurrence::Read(job, number) => self.read(job, number),
+            Occurrence::Forget(token, jobs) => self.forget(token, jobs),
+            Occurrence::Prune => self.prune(),
         }
     }
 
     fn tick(&mut self) {
-        self.after(TICK.as_millis() as u64, Happening::Tick);
+        self.after(TICK.as_millis() as u64, Occurrence::Tick);
         let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
         for worker in workers {
             let silent = self.now - self.workers[&worker].heard > self.config.expiry;
@@ -321,7 +321,7 @@ impl World {
         let holds: Vec<_> = known.holds.iter().map(|(batch, work)| (*batch, *work)).collect();
         for (batch, work) in holds {
             let answer = self.answer(worker, batch, &work);
-            self.within(50, Happening::Message(worker, answer));
+            self.within(50, Occurrence::Message(worker, answer));
         }
     }
 
@@ -337,7 +337,7 @@ impl World {
             }
             // A client repeats its request until the job is accepted.
             self.react(Event::Requested { token, request });
-            self.within(2000, Happening::Submit(client));
+            self.within(2000, Occurrence::Submit(client));
         }
     }
 
@@ -389,7 +389,7 @@ impl World {
     }
 
     /// Removes a lost worker; another one replaces it.
-    fn bury(&mut self, worker: WorkerId) {
+    fn remove_lost(&mut self, worker: WorkerId) {
         let gone = self.workers.remove(&worker).unwrap();
         self.counts.lost += 1;
         self.replace(&gone);
@@ -398,10 +398,10 @@ impl World {
     /// Schedules the arrival of a worker that replaces a lost one.
     fn replace(&mut self, gone: &Worker) {
         let other = match gone.swallows {
-            0 if gone.bad => Happening::ArriveBad,
-            0 => Happening::Arrive,
+            0 if gone.bad => Occurrence::ArriveBad,
+            0 => Occurrence::Arrive,
             // It comes back itself, or as another process of its host.
-            swallows => Happening::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
+            swallows => Occurrence::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
         };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
@@ -410,7 +410,7 @@ impl World {
     fn stopped(&mut self) {
         self.counts.stops += 1;
         assert!(self.workers.is_empty(), "it stopped with workers attached");
-        let unstored = |happening: &Happening| matches!(happening, Happening::Write(_));
+        let unstored = |happening: &Occurrence| matches!(happening, Occurrence::Write(_));
         // Only records that the store has refused may be left.
         let left = self.agenda.values().any(unstored);
         assert!(!left || self.counts.refusals > 0, "it stopped with a record on its way");
@@ -426,7 +426,7 @@ impl World {
             self.cancellations.insert(token, client);
             self.react(Event::Requested { token, request: Request::Cancel(job) });
         }
-        self.within(2000, Happening::Cancel(client));
+        self.within(2000, Occurrence::Cancel(client));
     }
 
     /// Kills the coordinator: records on their way to the disk may or may not have reached it.
@@ -434,22 +434,22 @@ impl World {
         let agenda = std::mem::take(&mut self.agenda);
         for (at, happening) in agenda {
             match happening {
-                Happening::Write(record) => {
+                Occurrence::Write(record) => {
                     if self.draw(2) == 0 {
                         self.written(&record);
                     }
                 }
-                Happening::Forget(_, jobs) => {
+                Occurrence::Forget(_, jobs) => {
                     if self.draw(2) == 0 {
                         self.forget_now(&jobs);
                     }
                 }
-                Happening::Message(..)
-                | Happening::Lie(..)
-                | Happening::Break(_)
-                | Happening::GiveUp(_)
-                | Happening::Read(..)
-                | Happening::Report(_) => {}
+                Occurrence::Message(..)
+                | Occurrence::Lie(..)
+                | Occurrence::Break(_)
+                | Occurrence::GiveUp(_)
+                | Occurrence::Read(..)
+                | Occurrence::Report(_) => {}
                 stays => {
                     self.agenda.insert(at, stays);
                 }
@@ -494,17 +494,17 @@ impl World {
                 }
                 Effect::Close { worker, .. } => {
                     self.counts.closed += 1;
-                    self.bury(worker);
+                    self.remove_lost(worker);
                 }
                 Effect::Store(record) => {
                     self.look_at(&record);
-                    self.within(20, Happening::Write(record));
+                    self.within(20, Occurrence::Write(record));
                 }
-                Effect::Read { job, number } => self.within(10, Happening::Read(job, number)),
-                Effect::Prune { token, jobs } => self.within(20, Happening::Forget(token, jobs)),
+                Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
+                Effect::Prune { token, jobs } => self.within(20, Occurrence::Forget(token, jobs)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
-                Effect::Despair { .. } => panic!("nobody lacks patience"),
+                Effect::GiveUp { .. } => panic!("nobody lacks patience"),
                 Effect::Stop => self.stopped(),
             }
         }
@@ -521,7 +521,7 @@ impl World {
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
         if bad {
-            self.within(50, Happening::Break(worker));
+            self.within(50, Occurrence::Break(worker));
             return;
         }
         if self.swallows(worker, batch) {
@@ -529,27 +529,27 @@ impl World {
         }
         let right = self.answer(worker, batch, &work);
         match self.draw(100) {
-            0..3 => self.within(100, Happening::Break(worker)),
+            0..3 => self.within(100, Occurrence::Break(worker)),
             3..5 => self.workers.get_mut(&worker).unwrap().stalled = true,
-            5..10 => self.within(4000, Happening::Message(worker, right)),
+            5..10 => self.within(4000, Occurrence::Message(worker, right)),
             10..13 => {
-                self.within(100, Happening::Message(worker, right.clone()));
-                self.within(300, Happening::Message(worker, right));
+                self.within(100, Occurrence::Message(worker, right.clone()));
+                self.within(300, Occurrence::Message(worker, right));
             }
             13 => {
                 let wrong = Work { count: work.count + 1, ..work };
                 let event = self.answer(worker, batch, &wrong);
-                self.within(100, Happening::Message(worker, event));
+                self.within(100, Occurrence::Message(worker, event));
             }
             14 => {
-                self.within(50, Happening::Message(worker, Event::WorkerDrains { worker }));
-                self.within(100, Happening::Message(worker, right));
+                self.within(50, Occurrence::Message(worker, Event::WorkerDrains { worker }));
+                self.within(100, Occurrence::Message(worker, right));
             }
             15..17 if self.has_second_thoughts(worker) => {
-                self.within(100, Happening::Message(worker, right));
-                self.within(300, Happening::Lie(worker, batch, work));
+                self.within(100, Occurrence::Message(worker, right));
+                self.within(300, Occurrence::Lie(worker, batch, work));
             }
-            _ => self.within(150, Happening::Message(worker, right)),
+            _ => self.within(150, Occurrence::Message(worker, right)),
         }
     }
 }

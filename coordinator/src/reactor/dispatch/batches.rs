@@ -103,7 +103,7 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWor
         return;
     };
     let indices = assignment.indices;
-    evaluation.lost_over |= loss.cause != Cause::Announced;
+    evaluation.has_crashed_worker |= loss.cause != Cause::Announced;
     if !duplicates.is_empty() {
         if purpose == Purpose::Exclusive {
             evaluation.count_crash(indices.first, loss);

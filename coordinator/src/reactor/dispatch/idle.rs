@@ -59,7 +59,7 @@ fn next(state: &State) -> Option<(JobId, Point)> {
         };
         let place =
             job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
-                Some(begun) => !begun.queue.is_empty() && !begun.lost_over,
+                Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
                 None => has_room(),
             })?;
         let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });

@@ -46,7 +46,7 @@ pub(crate) fn tick(turn: &mut Turn) {
     let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
     let late: Vec<BatchId> = late.copied().collect();
     for id in &late {
-        accuse(turn.state, *id, turn.now);
+        suspect_silent(turn.state, *id, turn.now);
     }
     let waits = |id: &BatchId| {
         turn.state.batches.get(id).is_some_and(|batch| {
@@ -96,7 +96,7 @@ fn expected(state: &State, id: BatchId) -> Option<Duration> {
 }
 
 /// Puts a worker on probation that has held an overdue batch for too long.
-fn accuse(state: &mut State, id: BatchId, now: Duration) {
+fn suspect_silent(state: &mut State, id: BatchId, now: Duration) {
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
@@ -152,18 +152,18 @@ pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
         {
             continue;
         }
-        let Some(taker) = (if alone {
+        let Some(choose_worker) = (if alone {
             taker_alone(turn.state, id, turn.now)
         } else {
-            taker(turn.state, id, &free, turn.now)
+            choose_worker(turn.state, id, &free, turn.now)
         }) else {
             continue;
         };
-        if alone && holds_anything(turn.state, taker) {
-            kept.insert(taker);
+        if alone && holds_anything(turn.state, choose_worker) {
+            kept.insert(choose_worker);
         } else {
-            send(turn, id, taker);
-            free.retain(|free| *free != taker);
+            send(turn, id, choose_worker);
+            free.retain(|free| *free != choose_worker);
             sent += 1;
         }
     }
@@ -171,8 +171,12 @@ pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
 
 /// Returns whether a job has a duplicate of an overdue batch out that is not overdue itself.
 fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
-    let scout = state.jobs.get(&job).and_then(|job| job.scout);
-    scout.is_some_and(|scout| state.batches.contains_key(&scout) && !is_overdue(state, scout, now))
+    let newest_overdue_duplicate =
+        state.jobs.get(&job).and_then(|job| job.newest_overdue_duplicate);
+    newest_overdue_duplicate.is_some_and(|newest_overdue_duplicate| {
+        state.batches.contains_key(&newest_overdue_duplicate)
+            && !is_overdue(state, newest_overdue_duplicate, now)
+    })
 }
 
 fn holds_anything(state: &State, worker: WorkerId) -> bool {
@@ -180,16 +184,16 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 }
 
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
-fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
-    let rank = |(worker, taker): &(&Worker, WorkerId)| {
+fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
+    let rank = |(worker, choose_worker): &(&Worker, WorkerId)| {
         let doubtful = worker.missed.count > 0 || !worker.has_answered;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
-        (on_probation, doubtful, of_holder, schedule::held(state, worker), *taker)
+        (on_probation, doubtful, of_holder, schedule::held(state, worker), *choose_worker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
-    fit.min_by_key(rank).map(|(_, taker)| taker)
+    fit.min_by_key(rank).map(|(_, choose_worker)| choose_worker)
 }
 
 /// Chooses the worker that gets a duplicate of an exclusive batch, whether it is busy or not.
@@ -202,14 +206,20 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     if poison::crash_limit_reached(state, crashes, |_| true) {
         return None;
     }
-    let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
-        let reputation = poison::reputation(state, worker, crashes);
-        (reputation, is_of_holder(state, id, worker), schedule::held(state, worker), **taker)
-    };
+    let rank =
+        |(choose_worker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
+            let reputation = poison::reputation(state, worker, crashes);
+            (
+                reputation,
+                is_of_holder(state, id, worker),
+                schedule::held(state, worker),
+                **choose_worker,
+            )
+        };
     let fit =
         |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
-    fit.min_by_key(rank).map(|(taker, _)| *taker)
+    fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
 }
 
 /// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue
@@ -226,7 +236,7 @@ fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool 
     let purpose = state.batches.get(&id).map(|batch| batch.purpose);
     !worker.draining
         && worker.in_flight.is_empty()
-        && !state.probation.rests(&worker.name, now)
+        && !state.probation.is_paused(&worker.name, now)
         && matches!(purpose, Some(Purpose::Fill | Purpose::Exclusive | Purpose::TieBreak))
 }
 
@@ -295,7 +305,7 @@ fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
         }
     }
     if let Some(job) = turn.state.jobs.get_mut(&assignment.job) {
-        job.scout = Some(duplicate);
+        job.newest_overdue_duplicate = Some(duplicate);
     }
 }
 

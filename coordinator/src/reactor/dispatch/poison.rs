@@ -63,12 +63,12 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let index = evaluation.quarantine.iter().find(open)?;
     let nobody = Crashes::default();
     let crashes = crashes(index).unwrap_or(&nobody);
-    Some((*index, taker(state, crashes, now)?))
+    Some((*index, choose_worker(state, crashes, now)?))
 }
 
 /// Chooses the worker of a realization over which `crashes` happened, if there is one. A worker
 /// that has not answered anything yet must first answer other work, if there is any.
-fn taker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
+fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
         let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
@@ -118,7 +118,7 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failur
     let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
     let specification = &state.jobs.get(&job)?.record.specification;
     let case = case_file(specification, &evaluation.point, index);
-    Some(Failure::LethalRealization { index, workers: crashes.count(), hosts, case })
+    Some(Failure::PoisonRealization { index, workers: crashes.count(), hosts, case })
 }
 
 /// Returns a realization as a complete case file, or an empty text if its germs give no elasticity:

@@ -79,7 +79,8 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
         Stage::Finishing(_) if contributed => {
             // An end on its way to the store may be durable already; only a refused one can be
             // taken back.
-            let on_its_way = job.trouble.as_ref().is_none_or(|trouble| trouble.on_its_way);
+            let on_its_way =
+                job.store_trouble.as_ref().is_none_or(|store_trouble| store_trouble.on_its_way);
             job.restart_pending = true;
             if !on_its_way {
                 jobs::reopen(turn, id);
@@ -119,7 +120,7 @@ pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
     if let Some(banned) = found {
         banned.refused = true;
         let since = banned.record.at;
-        records::despair_if_late(turn, since, error);
+        records::give_up_if_late(turn, since, error);
     }
 }
 

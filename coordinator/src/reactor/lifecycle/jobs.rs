@@ -66,7 +66,7 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
         }
         Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
         // The store cannot read the evaluations that would still belong to its output.
-        Stage::Replaying { .. } if job.trouble.is_some() => {
+        Stage::Replaying { .. } if job.store_trouble.is_some() => {
             finish(turn, id, cancelled());
         }
         Stage::Accepting
@@ -163,7 +163,7 @@ pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
     let summary = Arc::new(search.summary());
     turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
-    job.trouble = None;
+    job.store_trouble = None;
     leave(turn, id);
 }
 
@@ -173,7 +173,7 @@ pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.trouble = None;
+    job.store_trouble = None;
     job.restart_pending = false;
     job.workers.clear();
     job.search = Search::new(job.record.specification.clone());

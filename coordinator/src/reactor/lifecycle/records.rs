@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::jobs;
 use crate::effect::{Answer, Effect, Record, RecordKey, Refusal};
 use crate::ids::JobId;
-use crate::job::{EndedJob, Job, RequestName, Stage, Trouble};
+use crate::job::{EndedJob, Job, RequestName, Stage, StoreRetry};
 use crate::notice::Notice;
 use crate::reactor::turn::Turn;
 use crate::snapshot;
@@ -20,7 +20,7 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
     match (key, &mut job.stage) {
         (RecordKey::Job, Stage::Accepting) => {
             job.stage = Stage::Waiting;
-            job.trouble = None;
+            job.store_trouble = None;
             turn.state.waiting.push_back(id);
             turn.effects.push(Effect::Note(accepted(&job.record)));
             for token in std::mem::take(&mut job.tokens) {
@@ -36,7 +36,7 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
             job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
             job.workers.append(&mut record.workers);
-            job.trouble = None;
+            job.store_trouble = None;
             job.search.tell(outcomes, estimated_error);
             if job.restart_pending {
                 jobs::restart(turn, id);
@@ -73,20 +73,21 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
         turn.state.jobs.remove(&id);
         return;
     }
-    let since = job.trouble.as_ref().map_or(turn.now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
+    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
+    job.store_trouble =
+        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
     turn.state.changed.insert(id);
     if job.restart_pending && matches!(job.stage, Stage::Finishing(_)) {
         jobs::reopen(turn, id);
     }
-    despair_if_late(turn, since, error);
+    give_up_if_late(turn, since, error);
 }
 
 /// Reports that the store no longer works, once it has refused for too long.
-pub(crate) fn despair_if_late(turn: &mut Turn, since: Duration, error: String) {
+pub(crate) fn give_up_if_late(turn: &mut Turn, since: Duration, error: String) {
     let waited = turn.now.saturating_sub(since);
-    if turn.state.config.store_patience.is_some_and(|patience| waited >= patience) {
-        turn.effects.push(Effect::Despair { error, waited });
+    if turn.state.config.store_give_up_after.is_some_and(|patience| waited >= patience) {
+        turn.effects.push(Effect::GiveUp { error, waited });
     }
 }
 

@@ -6,10 +6,10 @@
 use super::{jobs, records};
 use crate::effect::Effect;
 use crate::evaluation::{Before, Evaluation};
-use crate::event::Unread;
+use crate::event::ReadFailure;
 use crate::failure::Failure;
 use crate::ids::JobId;
-use crate::job::{Stage, Trouble};
+use crate::job::{Stage, StoreRetry};
 use crate::reactor::turn::Turn;
 use crate::store::EvaluationRecord;
 use osteon_search::Step;
@@ -32,7 +32,7 @@ pub(crate) fn read(
     turn: &mut Turn,
     id: JobId,
     number: u64,
-    found: Result<Option<EvaluationRecord>, Unread>,
+    found: Result<Option<EvaluationRecord>, ReadFailure>,
 ) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -44,12 +44,12 @@ pub(crate) fn read(
     }
     match found {
         Ok(Some(record)) => {
-            job.trouble = None;
+            job.store_trouble = None;
             replay(turn, id, record);
         }
         Ok(None) => jobs::fail(turn, id, &Failure::Missing { number }),
-        Err(Unread::Refused { error }) => read_failed(turn, id, error),
-        Err(Unread::Damaged) => recompute(turn, id),
+        Err(ReadFailure::Refused { error }) => read_failed(turn, id, error),
+        Err(ReadFailure::Damaged) => recompute(turn, id),
     }
 }
 
@@ -60,7 +60,7 @@ fn recompute(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.trouble = None;
+    job.store_trouble = None;
     job.progressed = turn.now;
     turn.state.changed.insert(id);
     if job.cancelled {
@@ -92,10 +92,11 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
         jobs::finish(turn, id, jobs::cancelled());
         return;
     }
-    let since = job.trouble.as_ref().map_or(turn.now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
+    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
+    job.store_trouble =
+        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
     turn.state.changed.insert(id);
-    records::despair_if_late(turn, since, error);
+    records::give_up_if_late(turn, since, error);
 }
 
 /// Passes a stored evaluation to the search, or has it computed again.
@@ -126,7 +127,7 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
         // Only the evaluations replayed so far are known to be right.
         jobs::finish(turn, id, jobs::cancelled());
     } else {
-        match job.search.retell(point, outcomes, estimated_error) {
+        match job.search.replay(point, outcomes, estimated_error) {
             Ok(()) => {
                 job.workers.extend(workers);
                 jobs::advance(turn, id);

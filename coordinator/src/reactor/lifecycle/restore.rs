@@ -67,7 +67,7 @@ fn keep_numerics(
             now = %fingerprint,
             "the job was begun with other numerics; its evaluations are computed again"
         );
-        store.begin_again(record.job, &fingerprint)?;
+        store.reset_job(record.job, &fingerprint)?;
         record.fingerprint = fingerprint;
         *evaluations = 0;
     }

@@ -93,11 +93,11 @@ pub(crate) fn fail_poisoned(turn: &mut Turn) {
 /// Repeats the writes of refused records that are due.
 pub(crate) fn store_again(turn: &mut Turn) {
     for job in turn.state.jobs.values_mut() {
-        let Some(trouble) = &mut job.trouble else {
+        let Some(store_trouble) = &mut job.store_trouble else {
             continue;
         };
-        if turn.now >= trouble.retry_at && !trouble.on_its_way {
-            trouble.on_its_way = true;
+        if turn.now >= store_trouble.retry_at && !store_trouble.on_its_way {
+            store_trouble.on_its_way = true;
             records::store_again(job, &mut turn.effects);
         }
     }

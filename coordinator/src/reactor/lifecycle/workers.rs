@@ -15,7 +15,7 @@ use crate::notice::{Departure, Notice};
 use crate::rate::Rate;
 use crate::reactor::dispatch::{batches, departures, overdue, poison};
 use crate::reactor::turn::Turn;
-use crate::state::{Missed, State, Worker};
+use crate::state::{MissedBatches, State, Worker};
 use crate::worker_name::WorkerName;
 
 pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
@@ -53,7 +53,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             last_seen: turn.now,
             answered: turn.now,
             has_answered: false,
-            missed: Missed::default(),
+            missed: MissedBatches::default(),
             heartbeat_sent: turn.now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),

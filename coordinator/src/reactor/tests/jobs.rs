@@ -128,13 +128,13 @@ fn an_end_that_is_not_durable_is_none() {
 #[test]
 fn a_store_that_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let mut rig = Rig::with(8, &[]);
-    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    rig.state.config.store_give_up_after = Some(Duration::from_secs(4));
     rig.event(request(7, Request::Cancel(JobId(1))));
     for _ in 0..2 {
         rig.check(store_failed(1, RecordKey::End), &[]);
         rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     }
-    rig.check(store_failed(1, RecordKey::End), &["despair after 4s: the disk is full"]);
+    rig.check(store_failed(1, RecordKey::End), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }

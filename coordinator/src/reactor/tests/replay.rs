@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::event::Unread;
+use crate::event::ReadFailure;
 use crate::notice::Notice;
 use crate::reactor::Restored;
 use crate::store::memory::MemoryStore;
@@ -91,13 +91,13 @@ fn a_store_that_cannot_be_read_is_asked_again() {
 
 /// Returns the event that the store could not be read.
 fn refused(number: u64) -> Event {
-    let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+    let found = Err(ReadFailure::Refused { error: "the cable is out".to_owned() });
     Event::Read { job: JobId(1), number, found }
 }
 
 /// Returns the event that the stored record is damaged.
 fn damaged(number: u64) -> Event {
-    Event::Read { job: JobId(1), number, found: Err(Unread::Damaged) }
+    Event::Read { job: JobId(1), number, found: Err(ReadFailure::Damaged) }
 }
 
 /// Returns a restarted coordinator with worker 1, about to read the first evaluation of a job.
@@ -229,7 +229,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
 #[test]
 fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let (mut rig, _) = rig(&[2], 1);
-    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    rig.state.config.store_give_up_after = Some(Duration::from_secs(4));
     let banned = expose(&mut rig, 2).swap_remove(0);
     let failed = || Event::StoreFailed {
         job: JobId(2),
@@ -240,7 +240,7 @@ fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
         rig.check(failed(), &[]);
         rig.check_after(Duration::from_secs(2), &[&banned]);
     }
-    rig.check(failed(), &["despair after 4s: the disk is full"]);
+    rig.check(failed(), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &[&banned]);
     rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
 }

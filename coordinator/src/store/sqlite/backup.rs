@@ -119,7 +119,7 @@ mod tests {
                 pieces += 1;
                 if pieces == 1 {
                     // Into pages that have been copied already, and after the last one.
-                    store.forget_jobs(&[crate::ids::JobId(7)]).unwrap();
+                    store.delete_jobs(&[crate::ids::JobId(7)]).unwrap();
                     store.put_job(&job(2)).unwrap();
                     store.put_evaluation(&evaluation(1, 0), false).unwrap();
                     store.put_evaluation(&evaluation(1, 100), false).unwrap();

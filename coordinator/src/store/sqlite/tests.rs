@@ -265,7 +265,7 @@ fn forgotten_jobs_are_gone_and_their_room_is_given_back() {
     }
     store.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).unwrap();
     let before = size();
-    store.forget_jobs(&[JobId(1), JobId(9)]).unwrap();
+    store.delete_jobs(&[JobId(1), JobId(9)]).unwrap();
     assert!(size() < before * 6 / 10, "{} of {before} bytes are left", size());
     let ids: Vec<JobId> = store.jobs().unwrap().iter().map(|job| job.record.job).collect();
     assert_eq!(ids, [JobId(2)]);
@@ -390,7 +390,7 @@ fn a_job_that_begins_again_has_no_evaluation_and_new_numerics() {
         store.put_job(&job(id)).unwrap();
         store.put_evaluation(&evaluation(id, 0), false).unwrap();
     }
-    store.begin_again(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
+    store.reset_job(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
     let again = JobRecord { fingerprint: "osteon 2.0.0 numerics 5".to_owned(), ..job(1) };

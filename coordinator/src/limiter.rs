@@ -30,16 +30,16 @@ pub(crate) enum Caller {
 
 /// A pool of permits.
 #[derive(Debug, Clone)]
-pub(crate) struct Places {
+pub(crate) struct Limiter {
     all: Arc<Semaphore>,
-    of_one: usize,
+    per_caller: usize,
     /// Semaphores of the callers that hold or await a permit.
     own: Arc<Mutex<BTreeMap<Caller, Weak<Semaphore>>>>,
 }
 
 /// A permit, held until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct Permit {
     _own: OwnedSemaphorePermit,
     _of_all: OwnedSemaphorePermit,
 }
@@ -56,23 +56,23 @@ impl Caller {
     }
 }
 
-impl Places {
-    /// Returns a pool of `all` permits, of which one caller can hold `of_one`.
-    pub(crate) fn new(all: usize, of_one: usize) -> Self {
-        Self { all: Arc::new(Semaphore::new(all)), of_one, own: Arc::default() }
+impl Limiter {
+    /// Returns a pool of `all` permits, of which one caller can hold `per_caller`.
+    pub(crate) fn new(all: usize, per_caller: usize) -> Self {
+        Self { all: Arc::new(Semaphore::new(all)), per_caller, own: Arc::default() }
     }
 
     /// Waits for a permit.
     ///
     /// # Errors
     /// `RESOURCE_EXHAUSTED` when there is no permit within the time limit.
-    pub(crate) async fn take(&self, caller: Caller) -> Result<Place, Status> {
+    pub(crate) async fn take(&self, caller: Caller) -> Result<Permit, Status> {
         let own = self.own(caller);
         let both = async {
             // The caller's own permit comes first: whoever waits for it blocks nobody else.
             let own = own.acquire_owned().await.ok()?;
             let of_all = Arc::clone(&self.all).acquire_owned().await.ok()?;
-            Some(Place { _own: own, _of_all: of_all })
+            Some(Permit { _own: own, _of_all: of_all })
         };
         // Semaphores are never closed.
         timeout(PATIENCE, both).await.ok().flatten().ok_or_else(full)
@@ -85,7 +85,7 @@ impl Places {
         if let Some(places) = own.get(&caller).and_then(Weak::upgrade) {
             return places;
         }
-        let places = Arc::new(Semaphore::new(self.of_one));
+        let places = Arc::new(Semaphore::new(self.per_caller));
         own.insert(caller, Arc::downgrade(&places));
         places
     }
@@ -107,20 +107,20 @@ mod tests {
 
     use super::*;
 
-    async fn take(places: &Places, connection: u64) -> Result<Place, Code> {
+    async fn take(places: &Limiter, connection: u64) -> Result<Permit, Code> {
         places.take(Caller::Connection(connection)).await.map_err(|status| status.code())
     }
 
     #[tokio::test(start_paused = true)]
     async fn nobody_takes_all_and_nobody_waits_for_ever() {
-        let places = Places::new(3, 2);
+        let places = Limiter::new(3, 2);
         let mut held = vec![take(&places, 1).await.unwrap(), take(&places, 1).await.unwrap()];
         assert_eq!(take(&places, 1).await.unwrap_err(), Code::ResourceExhausted);
         held.push(take(&places, 2).await.unwrap());
         assert_eq!(take(&places, 3).await.unwrap_err(), Code::ResourceExhausted);
         drop(held.remove(0));
-        let of_one = take(&places, 1).await.unwrap();
-        drop((of_one, held));
+        let per_caller = take(&places, 1).await.unwrap();
+        drop((per_caller, held));
         // Callers that have gone are not remembered.
         drop(take(&places, 4).await.unwrap());
         let known: Vec<Caller> = places.own.lock().unwrap().keys().cloned().collect();
@@ -129,7 +129,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_waits_for_an_own_place_is_in_nobodys_way() {
-        let places = Places::new(2, 1);
+        let places = Limiter::new(2, 1);
         let _held = take(&places, 1).await.unwrap();
         let waiting = tokio::spawn({
             let places = places.clone();

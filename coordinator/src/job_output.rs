@@ -16,7 +16,7 @@ use crate::store::{EndRecord, JobRecord, Store, StoreError};
 
 /// Output of an ended job.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Leftover {
+pub struct JobOutput {
     /// The specification.
     pub specification: JobSpecification,
     /// The result, with the outcomes of every best point.
@@ -57,7 +57,7 @@ pub enum ReadError {
 ///
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
-pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadError> {
+pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<JobOutput, ReadError> {
     let job = end.job;
     let JobRecord { specification, .. } = job_record(store, job)?;
     let left = Left { end: end.clone(), specification, summary: summary(store, job)? };
@@ -69,7 +69,7 @@ pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadErro
     result.groups = groups.into_iter().flatten().collect();
     let Left { specification, summary, .. } = left;
     let specification = Arc::unwrap_or_clone(specification);
-    Ok(Leftover { specification, result, history: summary.history })
+    Ok(JobOutput { specification, result, history: summary.history })
 }
 
 /// Output of an ended job without its outcomes, which may need more memory than there is.

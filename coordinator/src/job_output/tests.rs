@@ -147,7 +147,7 @@ fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
     let left = Left { end, specification: record.specification, summary };
     assert_eq!(left.result(Some(outcomes)), read(&mut store, &left.end).unwrap().result);
 
-    store.forget_jobs(&[JOB]).unwrap();
+    store.delete_jobs(&[JOB]).unwrap();
     let errors = [
         served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap_err(),
         served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap_err(),

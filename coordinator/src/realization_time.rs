@@ -12,13 +12,13 @@ const KEPT: f64 = 0.5;
 /// hundred times as long, and sending duplicates of those too early is worse than waiting a little
 /// too long for the fast ones.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Pace(Option<f64>);
+pub(crate) struct RealizationTime(Option<f64>);
 
-impl Pace {
+impl RealizationTime {
     /// Takes an answer into account: `count` realizations in `seconds` from a worker with `slots`
     /// slots.
     pub(crate) fn learn(&mut self, count: u64, slots: u32, seconds: f64) {
-        let one = seconds / waves(count, slots);
+        let one = seconds / rounds_per_slot(count, slots);
         self.0 = Some(self.0.map_or(one, |known| one.max(KEPT * known)));
     }
 
@@ -30,12 +30,12 @@ impl Pace {
     /// Returns the expected time of `count` realizations on a worker with `slots` slots; `None`
     /// before the first answer.
     pub(crate) fn expected(self, count: u64, slots: u32) -> Option<Duration> {
-        self.0.map(|one| fairness::slot_time(one * waves(count, slots), 1))
+        self.0.map(|one| fairness::slot_time(one * rounds_per_slot(count, slots), 1))
     }
 }
 
 /// Returns the average number of realizations per busy slot.
-fn waves(count: u64, slots: u32) -> f64 {
+fn rounds_per_slot(count: u64, slots: u32) -> f64 {
     count as f64 / (slots.max(1) as f64).min(count.max(1) as f64)
 }
 
@@ -45,10 +45,11 @@ mod tests {
 
     #[test]
     fn slow_answers_count_at_once_and_fast_ones_by_and_by() {
-        let mut pace = Pace::default();
+        let mut pace = RealizationTime::default();
         assert_eq!((pace.expected(8, 2), pace.is_known()), (None, false));
-        let expected =
-            |pace: Pace, count, slots| pace.expected(count, slots).unwrap().as_secs_f64();
+        let expected = |pace: RealizationTime, count, slots| {
+            pace.expected(count, slots).unwrap().as_secs_f64()
+        };
         // 8 realizations on 2 slots in 2 s: 0.5 s each.
         pace.learn(8, 2, 2.0);
         for (count, slots, seconds) in [(8, 2, 2.0), (1, 1, 0.5), (1, 64, 0.5), (16, 4, 2.0)] {
