@@ -87,14 +87,14 @@ pub enum Requirement {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum AccessDenied {
     /// The call has no token.
-    #[error("this coordinator wants a token; give --token-file FILE")]
+    #[error("this coordinator requires a token; give --token-file FILE")]
     NoToken,
     /// The header is not that of a bearer token.
     #[error("the header `authorization` must be `Bearer` and a token")]
     Unreadable,
     /// The token is not in the list.
     #[error(
-        "this coordinator does not know the token; it was withdrawn, or is meant for another one"
+        "this coordinator does not accept the token: it was revoked, or belongs to another coordinator"
     )]
     UnknownToken,
     /// The role of the token is not sufficient.
@@ -109,7 +109,7 @@ pub enum AccessDenied {
     },
     /// A worker called without a certificate.
     #[error(
-        "this coordinator takes workers with a certificate only; give --tls-cert and --tls-key"
+        "this coordinator accepts only workers with a certificate; give --tls-cert and --tls-key"
     )]
     NoCertificate,
     /// The certificate is not valid.

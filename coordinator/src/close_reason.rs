@@ -54,14 +54,14 @@ pub enum CloseReason {
         limit: usize,
     },
     /// It sent nothing until its lease expired.
-    #[error("nothing was heard of this worker for {silent:?}; its lease has ended, attach again")]
+    #[error("no message came from this worker for {silent:?}; its lease has ended, attach again")]
     Expired {
         /// Time since its last message.
         silent: Duration,
     },
     /// It is alive, but does not answer its batches.
     #[error(
-        "this worker has not answered anything it holds for {waited:?}; its lease has ended, \
+        "this worker has not answered any of its batches for {waited:?}; its lease has ended, \
          attach again"
     )]
     Unanswering {
@@ -85,7 +85,7 @@ pub enum CloseReason {
         expected: u64,
     },
     /// It sent a second hello message.
-    #[error("this worker said hello twice on one stream")]
+    #[error("this worker sent a second hello on one stream")]
     SecondHello,
     /// It was draining and has answered everything.
     #[error("this worker has drained")]

@@ -235,7 +235,7 @@ pub enum Refusal {
     #[error("the coordinator is shutting down; try again when it is back")]
     Draining,
     /// The store could not delete the jobs.
-    #[error("the store does not forget ended jobs, none is removed: {error}")]
+    #[error("the store cannot delete the ended jobs; none was deleted: {error}")]
     NotPruned {
         /// Error of the store.
         error: String,

@@ -9,13 +9,13 @@ use tokio::sync::watch;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Failed {
     /// The core task ended unexpectedly.
-    #[error("the coordinator's core ended unasked; {START_AGAIN}")]
+    #[error("the coordinator's core ended unexpectedly; {START_AGAIN}")]
     Core,
     /// The server of its port ended unexpectedly.
-    #[error("the coordinator's server ended unasked; {START_AGAIN}")]
+    #[error("the coordinator's server ended unexpectedly; {START_AGAIN}")]
     Server,
     /// The thread of the store ended unexpectedly.
-    #[error("the thread of the coordinator's store ended unasked; {START_AGAIN}")]
+    #[error("the thread of the coordinator's store ended unexpectedly; {START_AGAIN}")]
     Store,
     /// The store no longer accepts records.
     #[error(

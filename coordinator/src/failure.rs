@@ -28,7 +28,7 @@ pub enum Failure {
     },
     /// Workers are lost over one realization.
     #[error(
-        "realization {index} was alone on {workers} workers that vanished ({hosts}); to reproduce \
+        "realization {index} was alone on {workers} workers that were lost ({hosts}); to reproduce \
          it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
          {case}"
     )]

@@ -58,7 +58,7 @@ pub enum StartError {
         source: std::io::Error,
     },
     /// The thread that reads the store ended unexpectedly.
-    #[error("the store could not be read: its thread ended unasked")]
+    #[error("the store could not be read: its thread ended unexpectedly")]
     Interrupted {
         /// The cause.
         source: tokio::task::JoinError,

@@ -108,11 +108,11 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(store_trouble) = &job.store_trouble {
         let does = match job.stage {
-            Stage::Replaying { .. } => "give",
-            _ => "take",
+            Stage::Replaying { .. } => "read",
+            _ => "write",
         };
         return format!(
-            "the store does not {does} a record, it is tried again: {} {}",
+            "the store cannot {does} a record; retrying: {} {}",
             store_trouble.error,
             since(store_trouble.since)
         );
@@ -124,7 +124,9 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     match &job.stage {
         Stage::Computing(evaluation) if !evaluation.quarantine.is_empty() && !unfit.is_empty() => {
             let count = evaluation.quarantine.len();
-            format!("a sound worker for {count} realizations over which others vanished; {unfit}")
+            format!(
+                "a reliable worker for {count} realizations over which others were lost; {unfit}"
+            )
         }
         Stage::Waiting => format!(
             "its turn: {} jobs run and {} wait {}",
@@ -189,12 +191,12 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
 fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
     let named = |(host, lost): (&String, &HostLosses)| {
-        format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
+        format!("the last {} workers of {host} were lost with their batches", lost.workers.len())
     };
     // A worker that holds nothing or has departed is not waited for.
     let holding = state.workers.values().filter(|worker| !worker.in_flight.is_empty());
     let silent = holding.filter(|worker| state.probation.is_silent(&worker.name));
-    let silent = silent.map(|worker| format!("{} does not answer what it holds", worker.name));
+    let silent = silent.map(|worker| format!("{} does not answer its batches", worker.name));
     let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")
 }

@@ -286,7 +286,7 @@ impl State {
             lost.workers.pop_front();
         }
         if lost.workers.len() == LOST_IN_A_ROW_MAX {
-            tracing::warn!(%host, "the workers of this host vanish with whatever they hold");
+            tracing::warn!(%host, "workers on this host keep disappearing with the batches they hold");
         }
     }
 

@@ -297,7 +297,7 @@ pub enum StoreError {
     },
     /// The mark of acknowledged jobs is damaged.
     #[error(
-        "{} is damaged: whether acknowledged jobs are missing cannot be told; look at the disk, \
+        "{} is damaged: it cannot be determined whether acknowledged jobs are missing; look at the disk, \
          restore the store from a copy, or start with --accept-lost-jobs",
         path.display()
     )]

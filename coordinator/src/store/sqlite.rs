@@ -377,7 +377,7 @@ impl Store for &SqliteStore {
     fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         self.remove_jobs(jobs).map_err(|source| self.refused(source))?;
         if let Err(error) = self.give_back() {
-            tracing::warn!(%error, "the room of removed jobs is not given back yet");
+            tracing::warn!(%error, "the disk space of deleted jobs is not released yet");
         }
         Ok(())
     }

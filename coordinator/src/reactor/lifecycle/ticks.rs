@@ -22,7 +22,7 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     if gap <= state.config.heartbeat {
         return;
     }
-    tracing::warn!(?gap, "the coordinator stood still; nobody is blamed for it");
+    tracing::warn!(?gap, "the coordinator was paused; all leases are extended by the gap");
     let excused = |since: &mut Duration| *since = (*since + gap).min(now);
     for worker in state.workers.values_mut() {
         excused(&mut worker.last_seen);

@@ -99,7 +99,7 @@ fn another_record_is_written_again_until_it_is_durable() {
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(
         snapshot.waiting_for,
-        "the store does not take a record, it is tried again: the disk is full (since 1 s)"
+        "the store cannot write a record; retrying: the disk is full (since 1 s)"
     );
     rig.check_after(retry / 2, &["store job 1 evaluation 0"]);
     rig.check_after(Duration::ZERO, &[]);

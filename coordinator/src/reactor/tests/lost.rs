@@ -89,10 +89,10 @@ fn check_deaths(hosts: &[&str], expected: Option<&str>) {
 #[test]
 fn a_realization_that_was_alone_on_three_lost_workers_fails_its_job() {
     check_deaths(&["a", "b", "c"], None);
-    let expected = "realization 0 was alone on 3 workers that vanished (b, c, d)";
+    let expected = "realization 0 was alone on 3 workers that were lost (b, c, d)";
     check_deaths(&["a", "b", "c", "d"], Some(expected));
     // With one host only, three processes that had answered something are enough.
-    let expected = "realization 0 was alone on 3 workers that vanished (a)";
+    let expected = "realization 0 was alone on 3 workers that were lost (a)";
     check_deaths(&["a"; 4], Some(expected));
 }
 
@@ -210,8 +210,8 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
         let effects = [wait(&mut rig, Duration::from_secs(1)), rig.event(end_of_stream(worker))];
         if process == 5 {
             let waits = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap().waiting_for;
-            let expected = "a sound worker for 1 realizations over which others vanished; the \
-                            last 3 workers of bad vanished with what they held";
+            let expected = "a reliable worker for 1 realizations over which others were lost; \
+                            the last 3 workers of bad were lost with their batches";
             assert_eq!(waits, expected);
         }
         let ended = effects.concat().into_iter().find(|it| it.starts_with("store job 1 end"));
@@ -219,7 +219,7 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
             break reason;
         }
     };
-    assert!(reason.contains("was alone on 10 workers that vanished (bad)"), "{reason}");
+    assert!(reason.contains("was alone on 10 workers that were lost (bad)"), "{reason}");
     // Ten losses in a row take longer than a few seconds.
     assert!(rig.now > 5 * EXPIRY, "{:?}", rig.now);
     // The case file is complete, and has the realization to the bit.

@@ -346,7 +346,7 @@ fn who_does_not_answer_gets_one_realization_at_a_time_and_less_and_less_often() 
     // While it gets no work, no job waits for it.
     assert_eq!(waiting(&mut rig), "");
     rig.live(60 * SECOND);
-    let says = "host 1 (process 1) does not answer what it holds";
+    let says = "host 1 (process 1) does not answer its batches";
     assert!(waiting(&mut rig).contains(says), "{}", waiting(&mut rig));
 }
 
@@ -428,7 +428,7 @@ fn without_another_worker_the_lease_ends_after_ten_minutes_and_the_next_begins_o
                  answered yet";
     assert_eq!(rig.waits_for(), waits);
     let effects = rig.live(600 * SECOND);
-    let closed = "close 1: this worker has not answered anything it holds for 600.1s";
+    let closed = "close 1: this worker has not answered any of its batches for 600.1s";
     assert!(effects[0].starts_with(closed) && effects.len() == 1, "{effects:?}");
     rig.check(on_its_own(1), &["welcome 1, lease 2", "send 1: batch 3 = 2+1"]);
     rig.event(on_its_own(2));

@@ -50,7 +50,7 @@ fn a_job_is_there_until_the_store_has_forgotten_it() {
     let mut rig = rig();
     rig.check(prune(None, Some(1)), &["prune 1 2"]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
-    let refusal = "answer 7: the store does not forget ended jobs, none is removed: it is full";
+    let refusal = "answer 7: the store cannot delete the ended jobs; none was deleted: it is full";
     rig.check(pruned(&[1, 2], Err("it is full".to_owned())), &[refusal]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
     rig.check(pruned(&[1, 2], Ok(())), &["answer 7: pruned 2"]);

@@ -82,7 +82,7 @@ fn a_store_that_cannot_be_read_is_asked_again() {
     let mut rig = Rig { state, now: Duration::ZERO };
     rig.check(refused(0), &[]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
-    let waits = "the store does not give a record, it is tried again: the cable is out (since 0 s)";
+    let waits = "the store cannot read a record; retrying: the cable is out (since 0 s)";
     assert_eq!(snapshot.waiting_for, waits);
     rig.check_after(Duration::from_secs(2), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);

@@ -51,7 +51,7 @@ fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
 fn a_second_hello_ends_the_stream() {
     let mut rig = Rig::new();
     rig.check(hello(1, 1), &["welcome 1, lease 1"]);
-    rig.check(hello(1, 1), &["close 1: this worker said hello twice on one stream"]);
+    rig.check(hello(1, 1), &["close 1: this worker sent a second hello on one stream"]);
     rig.check(hello(2, 1), &["welcome 2, lease 2"]);
 }
 
@@ -61,7 +61,7 @@ fn a_silent_worker_loses_its_lease() {
     rig.check_after(Duration::from_secs(9), &[]);
     rig.hear(1);
     rig.check_after(Duration::from_secs(10), &[]);
-    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+    let expired = "close 1: no message came from this worker for 10.001s; its lease has ended, \
                    attach again";
     rig.check_after(Duration::from_millis(1), &[expired]);
     // Its later messages are ignored, and its batches go to the next worker.
@@ -83,7 +83,7 @@ fn while_the_coordinator_stands_still_nobody_is_silent() {
     }
     // It was silent for nine seconds before, and still is.
     rig.check_after(Duration::from_secs(1), &[]);
-    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+    let expired = "close 1: no message came from this worker for 10.001s; its lease has ended, \
                    attach again";
     rig.check_after(Duration::from_millis(1), &[expired]);
 }
@@ -107,7 +107,7 @@ fn a_worker_that_lives_but_never_answers_loses_its_lease() {
         rig.check_after(Duration::from_secs(6), &[]);
     }
     rig.hear(1);
-    let closed = "close 1: this worker has not answered anything it holds for 600.1s; its lease \
+    let closed = "close 1: this worker has not answered any of its batches for 600.1s; its lease \
                   has ended, attach again";
     rig.check_after(Duration::from_millis(100), &[closed]);
 }
@@ -119,7 +119,7 @@ fn a_malformed_answer_ends_the_stream_and_its_batches_return() {
     rig.check(answer(1, 1, 0, 3), &[closed]);
     let mut rig = Rig::with(8, &[1]);
     let reason = CloseReason::SecondHello;
-    let closed = "close 1: this worker said hello twice on one stream";
+    let closed = "close 1: this worker sent a second hello on one stream";
     rig.check(Event::Misbehaved { worker: WorkerId(1), reason }, &[closed]);
     rig.check(
         hello(2, 1),

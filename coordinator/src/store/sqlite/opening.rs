@@ -224,7 +224,7 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
             return Err(StoreError::InUse { path: store.to_owned(), holder });
         }
         Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {
-            tracing::warn!(path = %path.display(), "this file system knows no locks of whole files");
+            tracing::warn!(path = %path.display(), "this file system does not support file locks");
         }
         Err(TryLockError::Error(error)) => return Err(failed(error)),
     }
