@@ -181,12 +181,7 @@ impl Context<'_> {
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
-    let searched = history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none());
+    let searched = history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)
-}
-
-/// Whether an evaluation is for this set of data.
-fn is_of(row: &Evaluation, set: usize) -> bool {
-    row.role.group as usize == set
 }

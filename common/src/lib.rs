@@ -26,6 +26,7 @@ pub mod job_file;
 pub mod layers;
 pub mod limits;
 pub mod moments;
+mod origin;
 pub mod outcome;
 pub mod parameters;
 pub mod plausible;

@@ -116,6 +116,13 @@ pub struct Evaluation {
     pub estimated_error: Option<EstimatedError>,
 }
 
+impl Evaluation {
+    /// Whether it belongs to a search for this set of data.
+    pub fn is_for(&self, set: usize) -> bool {
+        self.role.group as usize == set
+    }
+}
+
 /// What the best point of a search is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PointMeaning {

@@ -143,7 +143,7 @@ impl Search {
     ///
     /// # Errors
     /// When it is at another point than the search asks for; nothing is changed then.
-    pub fn retell(
+    pub fn replay(
         &mut self,
         point: Point,
         outcomes: Arc<[Outcome]>,

@@ -20,7 +20,7 @@ use crate::signals;
 /// Signs of life while a lease lasts: some may come late.
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
-/// Serves until SIGINT or SIGTERM, or until a part of it has ended unasked. The URL in use is
+/// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
 /// printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;

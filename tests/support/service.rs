@@ -97,7 +97,7 @@ impl Service {
 
     /// Leases that ended because nothing was heard of their workers.
     pub(crate) fn expirations(&self) -> usize {
-        self.log().matches("nothing was heard of this worker").count()
+        self.log().matches("no message came from this worker").count()
     }
 
     /// Batches that were taken from lost workers and given to others.

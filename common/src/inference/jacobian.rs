@@ -1,6 +1,5 @@
 //! Derivatives of the logarithms of both moments, from differences on common germs.
 
-use super::is_of;
 use crate::conclusions::Sensitivity;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
@@ -29,7 +28,7 @@ pub fn jacobian(
         if matches!(range, Range::Fixed(_)) {
             continue;
         }
-        let varied = |row: &&Evaluation| is_of(row, set) && row.role.varied == Some(parameter);
+        let varied = |row: &&Evaluation| row.is_for(set) && row.role.varied == Some(parameter);
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;

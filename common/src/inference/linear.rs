@@ -1,6 +1,6 @@
 //! The singular value decomposition of a Jacobian of two rows, and what follows from it.
 
-use super::Jacobian;
+use super::jacobian::Jacobian;
 use crate::conclusions::Direction;
 
 /// A singular value below this part of the largest is one of rounding.

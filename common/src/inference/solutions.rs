@@ -1,6 +1,5 @@
 //! The answers of searches from several starts: a sample of what matches the data equally well.
 
-use super::is_of;
 use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::{Parameter, Point};
@@ -9,7 +8,7 @@ use crate::results::Evaluation;
 /// The best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
-    for row in history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none()) {
+    for row in history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none()) {
         let cost = row.cost.unwrap_or(f64::INFINITY);
         let here = Solution { start: row.role.start, point: row.point, cost, evaluations: 1 };
         match solutions.last_mut().filter(|last| last.start == row.role.start) {
