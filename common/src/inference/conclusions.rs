@@ -1,4 +1,4 @@
-//! All that is concluded from one set of data, as results carry it.
+//! All conclusions from one set of data, as they are contained in results.
 
 use super::{
     Inference, Profile, Solution, Spreads, first_below_noise, inference, profiles, solutions,
@@ -8,31 +8,35 @@ use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
 use crate::parameters::Point;
 use crate::results::{BestPoint, Evaluation, PointMeaning};
 
-/// What one set of data says, and which points match it.
+/// Conclusions from one set of data: the parameters that it determines, and the points that match
+/// it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conclusions {
-    /// What is identified; `None` where the derivatives were not measured, or cannot be told.
+    /// Identified quantities; `None` if the derivatives were not measured, or cannot be computed.
     pub inference: Option<Inference>,
-    /// Profiles of the cost, one for each free parameter; none of a likelihood, and none with priors.
+    /// Profiles of the cost, one for each free parameter; empty for a likelihood, and if there are
+    /// priors.
     pub profiles: Vec<Profile>,
-    /// The answers from all starts; `None` of a single start.
+    /// The solutions from all starts; `None` for a single start.
     pub solutions: Option<Solutions>,
 }
 
-/// The answers of searches from several starts.
+/// The solutions of searches from several starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solutions {
     /// The best point of each start that found a feasible one.
     pub points: Vec<Solution>,
-    /// How many of them match the data as well as the best one, or to the tolerance of the search.
+    /// Number of them that match the data as well as the best one, or within the tolerance of the
+    /// search.
     pub matching: u64,
-    /// Spreads over these; `None` if there are none.
+    /// Spreads over these points; `None` if there are none.
     pub spread: Option<Spreads>,
 }
 
 impl Conclusions {
-    /// From set number `set` of the data, given the best evaluation of its search, if one was feasible,
-    /// and all evaluations of the job. Nothing of a propagation.
+    /// Draws the conclusions from set number `set` of the data, given the best evaluation of its
+    /// search, if one was feasible, and all evaluations of the job. For a propagation there are
+    /// none.
     pub fn of(
         specification: &JobSpecification,
         set: usize,
@@ -51,7 +55,8 @@ impl Conclusions {
     }
 }
 
-/// The profiles of a cost that is of the moments alone; those of others would be another matter.
+/// Returns the profiles, if the cost depends on the moments alone; they do not apply to other
+/// costs.
 fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
     match (best.velocity, &specification.data) {
         (Some(velocity), Some(data)) if is_of_moments(specification) => {
@@ -75,7 +80,7 @@ fn all_starts(
     Solutions { points, matching: matching.len() as u64, spread: spread(&matching) }
 }
 
-/// What the best point of a search with this cost is.
+/// Returns the meaning of the best point of a search with this cost.
 pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
     match specification.search.method {
         _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
@@ -86,7 +91,7 @@ pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
     }
 }
 
-/// [`first_below_noise`] of a cost that is of the moments alone.
+/// Returns [`first_below_noise`] if the cost depends on the moments alone.
 pub fn below_noise_from(
     specification: &JobSpecification,
     set: usize,
@@ -100,7 +105,7 @@ fn is_of_moments(specification: &JobSpecification) -> bool {
     specification.objective == Objective::Moments && !specification.has_priors()
 }
 
-/// The cost that is low enough; a likelihood has none.
+/// Returns the cost that is low enough to stop; `None` for a likelihood.
 fn tolerance(specification: &JobSpecification) -> Option<f64> {
     let by_moments = specification.objective == Objective::Moments;
     by_moments.then_some(specification.search.cost_tolerance)

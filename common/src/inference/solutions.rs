@@ -1,4 +1,5 @@
-//! The answers of searches from several starts: a sample of what matches the data equally well.
+//! Solutions of searches from several starts: a sample of the points that match the data equally
+//! well.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,32 +18,32 @@ pub struct Solution {
     pub point: Point,
     /// Its cost.
     pub cost: f64,
-    /// Evaluations of this search.
+    /// Number of evaluations of this search.
     pub evaluations: u64,
 }
 
-/// Smallest, largest and mean value of something over solutions.
+/// Smallest, largest and mean value of a quantity over several solutions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spread {
-    /// Smallest.
+    /// Smallest value.
     pub smallest: f64,
-    /// Largest.
+    /// Largest value.
     pub largest: f64,
-    /// Mean.
+    /// Mean value.
     pub mean: f64,
 }
 
 /// Spreads over a set of points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spreads {
-    /// Of each parameter.
+    /// Spread of each parameter.
     pub parameters: [Spread; 7],
-    /// Of the entries of the elasticity matrix in and above the diagonal, row by row, with row and
-    /// column from 0 (Pa, Kelvin-Mandel).
+    /// Spreads of the entries of the elasticity matrix on and above the diagonal, row by row, with
+    /// row and column from 0 (Pa, Kelvin-Mandel).
     pub entries: Vec<(usize, usize, Spread)>,
 }
 
-/// The best point of each start of set number `set` that found a feasible one.
+/// Returns the best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
     for row in history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none()) {
@@ -60,7 +61,7 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     solutions
 }
 
-/// The spreads over points; `None` of none.
+/// Returns the spreads over points; `None` if there are none.
 pub fn spread(points: &[Point]) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
@@ -76,7 +77,7 @@ pub fn spread(points: &[Point]) -> Option<Spreads> {
     }
     let parameters =
         Parameter::ALL.map(|parameter| of(&mut points.iter().map(|point| point.get(parameter))));
-    // Points that were evaluated are admissible.
+    // Points that were evaluated are always admissible.
     let matrices: Vec<Elasticity> =
         points.iter().filter_map(|point| point.constants().elasticity().ok()).collect();
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
