@@ -155,7 +155,7 @@ impl<'a> Sample<'a> {
     }
 
     /// Returns the influence of each realization on N times mean and coefficient of variation, to
-    /// first order, in index order; failed realizations are omitted.
+    /// first order, in index order; zero for failed realizations.
     fn influences(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
         let influence = |outcome: &Outcome| match outcome {
             Ok(velocity) => self.central.influence(*velocity),

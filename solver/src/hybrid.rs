@@ -73,26 +73,26 @@ pub struct HybridWorkspace {
 }
 
 impl Hybrid {
-    /// A solver for cases of `setup`, which has passed validation.
+    /// Creates a solver for cases of `setup`, which has passed validation.
     pub fn new(setup: &Setup) -> Self {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// The same, computing on one instruction set. The bits do not depend on it.
+    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         Self { setup: *setup, distances: sampling::distances(setup).collect(), isa }
     }
 
-    /// The setup.
+    /// Returns the setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// The first arrival of one bone.
+    /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure when the case has no velocity; `NoConvergence` also when the time step is
-    /// above the stability limit, or the computation above its bounds.
+    /// A typed failure if the case has no velocity; `NoConvergence` also if the time step is above
+    /// the stability limit, or the computation exceeds its limits.
     pub fn arrival(
         &self,
         bone: &Bone,
@@ -118,7 +118,7 @@ impl Hybrid {
         .arrival()
     }
 
-    /// The same, reduced to what a job keeps.
+    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
     pub fn outcome(&self, bone: &Bone, workspace: &mut HybridWorkspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)
