@@ -1,4 +1,4 @@
-//! to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for independent germs.
+//! The specification of a job: everything that its result depends on.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -209,7 +209,8 @@ pub struct MonteCarlo {
     /// Method of drawing the germs.
     pub sampling: Sampling,
     /// Number of independent scrambles of the Sobol' points, among which the realizations are
-    /// divided evenly:
+    /// divided evenly: 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for
+    /// independent germs.
     pub scrambles: u64,
     /// Whether the moments are corrected by the control variate √(c1111/ρ), whose moments under the
     /// law are known.

@@ -39,7 +39,7 @@ use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_fin
 use crate::vector::Vector;
 
 /// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough rises
-/// from
+/// from 0 to 1.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
 /// The same for every other doubt.
 const LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
