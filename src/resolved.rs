@@ -39,7 +39,7 @@ pub(crate) enum Resolved {
     Run(Run),
     /// `simulate`.
     Simulate {
-        /// What, and what of it is wanted.
+        /// The case and the requested output.
         arguments: SimulateArguments,
         /// The instruction set to compute on.
         isa: Isa,

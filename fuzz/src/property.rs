@@ -21,7 +21,7 @@ const SEED_VARIABLE: &str = "OSTEON_TEST_SEED";
 /// Extension of the files, beside the sources, with cases that are tried first.
 const KEPT: &str = "regressions";
 
-/// Declares tests, each of a property that holds for whatever its strategies make.
+/// Declares tests, each of a property that must hold for all values of its strategies.
 ///
 /// ```text
 /// properties! {
@@ -34,9 +34,9 @@ const KEPT: &str = "regressions";
 /// }
 /// ```
 ///
-/// It stands in for `proptest!`, in which variables of the environment have the last word. Without
-/// `cases` there are [`CASES`]. The test is `sums_have_no_order::on_random_cases`: by the last part
-/// `cargo xtask random` finds all of them.
+/// It replaces `proptest!`, where environment variables override the settings. Without `cases`
+/// there are [`CASES`]. The test is called `sums_have_no_order::on_random_cases`; by the last part
+/// of this name `cargo xtask random` finds all of them.
 #[macro_export]
 macro_rules! properties {
     (@run $cases:expr; $(

@@ -43,7 +43,7 @@ pub enum Step {
     Done(Ending),
 }
 
-/// How a job ended.
+/// Ending of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
     /// Final status of the job.

@@ -25,7 +25,7 @@ use crate::pulse::Pulse;
 const PULSE_PERIODS: f64 = 3.4;
 /// Points of interpolation between samples.
 const POINTS: usize = 6;
-/// Most images of the source.
+/// Maximum number of images of the source.
 const IMAGES_MAX: usize = 64;
 
 /// An image of the source: its height above the bone's face, m, and its sign.

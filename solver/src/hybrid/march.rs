@@ -186,7 +186,7 @@ mod tests {
         let mesh = Mesh::with_sizes(&setup, &Scope::whole(&setup, 5000.0), 8, [0.4e-3; 3]);
         let operator = Operator::<1>::new(&setup, &bone, &mesh);
         let step = 5e-9;
-        // What returns from the coupling's outer face after 13 µs is weaker by e^-25.
+        // Echoes from the coupling's outer face after 13 µs are weakened by e^-25.
         let (damping, samples) = (1.9e6, 2600);
         let times = Times { step, ratio: 1, samples };
         let k = Lanes(std::array::from_fn(|lane| 600.0 * lane as f64));

@@ -1,16 +1,16 @@
-//! The bone's share of the operator.
+//! The contribution of the bone to the operator.
 //!
 //! Displacements are taken along the principal axes of A33, where it is diagonal; masses are the
 //! same along all axes. With W the weights of integration, E = W⁻¹ Dᵀ W / J, and at the nodes of
-//! Gauss and Lobatto a sum by parts is exact: Dᵀ W = B - W D, where B is -1 at the lower end, 1 at
-//! the upper one and 0 elsewhere. So
+//! Gauss and Lobatto summation by parts is exact: Dᵀ W = B - W D, where B is -1 at the lower end, 1
+//! at the upper one and 0 elsewhere. So
 //!
 //! ```text
 //! u_tt = (-A33 E y + ik (A31 + A13) y - k² A11 u - ik A31 W⁻¹ B u / J) / ρ,
 //! ```
 //!
-//! and the last term is the same, but for its sign, in two elements that share a node: it remains on
-//! the faces of the bone only.
+//! and the last term is the same, except for its sign, in two elements that share a node: it
+//! remains only on the faces of the bone.
 
 use osteon_common::case::Bone;
 
