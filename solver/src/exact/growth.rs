@@ -26,7 +26,7 @@ const SQUARINGS: usize = 5;
 pub(crate) struct Growth {
     /// √(ρ / stiffness), s/m.
     slowness: f64,
-    /// λ| divided by |s| √(ρ / stiffness), at slownesses 0, STEP, 2 STEP, …
+    /// |λ| divided by |s| √(ρ / stiffness), at slownesses 0, STEP, 2 STEP, …
     table: [f64; POINTS],
 }
 
