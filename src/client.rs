@@ -51,13 +51,13 @@ pub(crate) enum ClientError {
     /// The coordinator did not answer in time.
     #[error("the coordinator at {endpoint} did not answer within {ANSWER_S_MAX} s")]
     Unanswered {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
     },
     /// The connection was lost.
     #[error("lost the coordinator at {endpoint}: {reason}")]
     Lost {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The transport's error.
         reason: String,
@@ -65,7 +65,7 @@ pub(crate) enum ClientError {
     /// The coordinator cannot serve the request now.
     #[error("the coordinator at {endpoint} is unavailable: {reason}")]
     Unavailable {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The coordinator's explanation.
         reason: String,
@@ -76,7 +76,7 @@ pub(crate) enum ClientError {
     /// The coordinator refuses the request.
     #[error("{reason}{hint} (coordinator {endpoint})")]
     Refused {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The gRPC status code.
         code: Code,
@@ -108,7 +108,7 @@ pub(crate) enum ClientError {
     /// The coordinator sent a message that cannot be read.
     #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The defect of the message.
         source: Malformed,
@@ -167,7 +167,7 @@ pub(crate) struct Fetched {
 pub(crate) struct Remote {
     /// Address of the coordinator.
     pub(crate) endpoint: Endpoint,
-    /// Files of certificates and a token.
+    /// The credential files.
     pub(crate) files: CredentialFiles,
     /// Whether the address comes from the environment and not from the command line.
     pub(crate) from_environment: bool,

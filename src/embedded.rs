@@ -93,8 +93,8 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
             Box::new(store.map_err(Failure::failed)?)
         }
     };
-    let store_patience = Some(Duration::from_secs(STORE_PATIENCE_S));
-    let config = Config { store_patience, commit: program::COMMIT, ..Config::default() };
+    let store_give_up_after = Some(Duration::from_secs(STORE_PATIENCE_S));
+    let config = Config { store_give_up_after, commit: program::COMMIT, ..Config::default() };
     osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
 }
 

@@ -107,7 +107,7 @@ pub(crate) enum Resolved {
     DrainWorker {
         /// Number of the worker.
         worker: u64,
-        /// The coordinator of the worker.
+        /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
         format: Format,
@@ -125,7 +125,7 @@ pub(crate) enum Resolved {
     Backup {
         /// Directory for the copy.
         directory: PathBuf,
-        /// The coordinator whose store is copied.
+        /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
         format: Format,
@@ -134,21 +134,21 @@ pub(crate) enum Resolved {
     Watch {
         /// Id of the job.
         job: String,
-        /// The coordinator of the job.
+        /// The coordinator to ask.
         coordinator: Remote,
     },
     /// `cancel`.
     Cancel {
         /// Id of the job.
         job: String,
-        /// The coordinator of the job.
+        /// The coordinator to ask.
         coordinator: Remote,
     },
     /// `fetch`.
     Fetch {
         /// Id of the job.
         job: String,
-        /// The coordinator of the job.
+        /// The coordinator to ask.
         coordinator: Remote,
         /// Directory for the results.
         out: PathBuf,

@@ -70,7 +70,7 @@ impl ResultsDirectory {
             Some(stored) => same_job(&job, &stored, specification)?,
             None if result.is_some() && !path.join(CASE).exists() => {
                 return Err(Failure::bad_input(anyhow!(
-                    "{} has a {RESULT} but no {JOB}: whose result it is cannot be told; \
+                    "{} has a {RESULT} but no {JOB}: its job is unknown; \
                      choose another --out directory",
                     visible::path(path)
                 )));

@@ -77,9 +77,7 @@ impl Simulated<'_> {
             None => match [TRACES, RESULT].into_iter().find(|name| there(name)) {
                 None => return Ok(()),
                 Some(name) => {
-                    format!(
-                        "{shown} has a {name} but no {CASE}: of which case it is cannot be told"
-                    )
+                    format!("{shown} has a {name} but no {CASE}: its case is unknown")
                 }
             },
         };

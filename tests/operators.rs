@@ -395,7 +395,11 @@ fn files_of_the_environment_are_not_used_for_another_coordinator() {
     check(&jobs, 2, &["needs --tls-ca FILE", every, why]);
     check(&["health", "--coordinator", &secure.url], 2, &["needs --tls-ca FILE", every, why]);
     let with_ca = [&jobs[..], &["--tls-ca", text(&ca)]].concat();
-    check(&with_ca, 1, &["wants a token", "OSTEON_TOKEN_FILE were not used", "--token-file FILE"]);
+    check(
+        &with_ca,
+        1,
+        &["requires a token", "OSTEON_TOKEN_FILE were not used", "--token-file FILE"],
+    );
     let worker = ["worker", "--coordinator", &secure.url, "--tls-ca", text(&ca)];
     check(&worker, 1, &["give --tls-cert and --tls-key", "OSTEON_TLS_KEY", why]);
     let with_token = [&with_ca[..], &["--token-file", text(&token)]].concat();

@@ -22,7 +22,7 @@ pub struct Setup {
 /// The bone's material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
-    /// Mass density ρ, kg/m³.
+    /// Returns the mass density ρ, kg/m³.
     pub density: f64,
     /// Elasticity, Pa.
     pub elasticity: Elasticity,

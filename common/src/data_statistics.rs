@@ -3,13 +3,12 @@
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::job::Sampling;
+use crate::job::{Data, Sampling};
+use crate::moments::{Interval, KolmogorovTest, MomentIntervals, Moments};
 use crate::outcome::Outcome;
 use crate::quantile::quantile;
-use crate::results::Moments;
+use crate::results::DataSummary;
 use crate::special::standard_normal_quantile;
 use crate::statistics::{Sum, moments};
 
@@ -27,36 +26,6 @@ const RESAMPLED_MAX: usize = 5_000;
 const SOBOL_WORTH: f64 = 10.0;
 /// Terms of Kolmogorov's series; the next one is smaller than rounding errors.
 const SERIES_TERMS: usize = 12;
-
-/// An interval that contains a value with some probability.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
-/// Confidence intervals of the moments of the law from which velocities were drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MomentIntervals {
-    /// Interval of the mean, m/s.
-    pub mean: Interval,
-    /// Interval of the coefficient of variation.
-    pub coefficient_of_variation: Interval,
-    /// Probability with which each interval contains its moment.
-    pub level: f64,
-}
-
-/// Result of the two-sample Kolmogorov-Smirnov test.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct KolmogorovTest {
-    /// Largest difference of the empirical distribution functions, 0 to 1.
-    pub distance: f64,
-    /// Probability of at least this distance if both samples come from one law. If the model was
-    /// fitted to the data it is too large: a small value is conclusive, a large one is not.
-    pub p_value: f64,
-}
 
 /// Returns confidence intervals by the bootstrap, bias-corrected and accelerated (B. Efron, J. Am.
 /// Stat. Assoc. 82 (1987)): skewed laws and small samples get intervals that are not symmetric.
@@ -82,6 +51,19 @@ pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
         )?,
         level: CONFIDENCE,
     })
+}
+
+impl DataSummary {
+    /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
+    /// of a second.
+    pub fn of(data: &Data, set: usize) -> Self {
+        let velocities = data.velocities(set);
+        Self {
+            moments: data.moments(set),
+            count: velocities.map(|velocities| velocities.len() as u64),
+            intervals: velocities.and_then(moment_intervals),
+        }
+    }
 }
 
 /// Tests by Kolmogorov and Smirnov whether the data come from the law of the model's velocities,

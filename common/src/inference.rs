@@ -34,68 +34,16 @@ use crate::results::{BestPoint, Evaluation};
 use self::jacobian::log_ratios;
 use self::linear::{Linear, Response};
 
-pub use self::conclusions::{Conclusions, Solutions, below_noise_from, meaning};
-pub use self::jacobian::{Jacobian, Sensitivity, jacobian};
-pub use self::noise::{Noise, NoiseErrors, noise};
-pub use self::profile::{PROFILE_POINTS, Profile, profiles};
-pub use self::solutions::{Solution, Spread, Spreads, solutions, spread};
+pub use self::conclusions::{below_noise_from, meaning};
+pub use self::jacobian::{Jacobian, jacobian};
+pub use self::noise::{Noise, noise};
+pub use self::profile::{PROFILE_POINTS, profiles};
+pub use self::solutions::{solutions, spread};
+pub use crate::conclusions::{
+    Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
+    Solution, Solutions, Spread, Spreads,
+};
 pub use crate::data_statistics::CONFIDENCE;
-
-/// A direction of the box that the data determine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Direction {
-    /// Singular value: change of ln v and ln Δ, together, for a step across the box.
-    pub singular_value: f64,
-    /// Unit vector with a component for each free parameter, in units of the box.
-    pub components: Vec<f64>,
-}
-
-/// A quantity derived from the parameters.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity {
-    /// Its value at the best point, in its unit.
-    pub value: f64,
-    /// Its uncertainty; `None` if the data do not determine it.
-    pub known: Option<Known>,
-}
-
-/// Uncertainty of a quantity, as far as the data determine it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
-    /// Standard error.
-    pub standard_error: f64,
-    /// Confidence interval.
-    pub interval: [f64; 2],
-    /// Fraction of its gradient, in units of the box, that lies in directions which the data leave
-    /// free: sine of the angle between the gradient and the directions that they determine.
-    pub free_share: f64,
-}
-
-/// Conclusions from the data about the parameters.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Inference {
-    /// Whether the model matches the data within the noise.
-    pub matched: bool,
-    /// Confidence level of all intervals.
-    pub level: f64,
-    /// Errors of both moments.
-    pub noise: NoiseErrors,
-    /// The free parameters, in the order of the directions' components.
-    pub free: Vec<Parameter>,
-    /// Derivatives of both moments.
-    pub sensitivities: Vec<Sensitivity>,
-    /// Directions that the data determine, by decreasing singular value.
-    pub fixed: Vec<Direction>,
-    /// Orthonormal directions that the data leave free.
-    pub undetermined: Vec<Vec<f64>>,
-    /// √(c1111/ρ), m/s.
-    pub bulk_velocity: Quantity,
-    /// The dispersion.
-    pub dispersion: Quantity,
-    /// The free parameters themselves; their uncertainty is known only if no direction is left
-    /// free.
-    pub parameters: Vec<(Parameter, Quantity)>,
-}
 
 /// Returns the conclusions from set number `set` of the data, given the best evaluation of its
 /// search and all evaluations of the job. `None` if the derivatives were not measured, or cannot be
@@ -237,12 +185,7 @@ impl Context<'_> {
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
-    let searched = history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none());
+    let searched = history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)
-}
-
-/// Returns whether an evaluation belongs to this set of data.
-fn is_of(row: &Evaluation, set: usize) -> bool {
-    row.role.group as usize == set
 }

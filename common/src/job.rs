@@ -7,8 +7,6 @@ use thiserror::Error;
 use crate::case::Setup;
 use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
-use crate::results::Moments;
-use crate::statistics;
 
 /// Kind of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,17 +120,9 @@ impl Data {
             Self::Moments { .. } => None,
         }
     }
-
-    /// Returns the moments of a set, by its number; NaN if there is no such set.
-    pub fn moments(&self, set: usize) -> Moments {
-        if let Self::Moments { mean, coefficient_of_variation } = *self {
-            return Moments { mean, coefficient_of_variation };
-        }
-        self.velocities(set).and_then(statistics::moments).unwrap_or(Moments::UNKNOWN)
-    }
 }
 
-/// Range of one parameter.
+/// Returns the range of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// Held at a value.

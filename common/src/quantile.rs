@@ -1,6 +1,6 @@
 //! Quantiles of a sample.
 
-use crate::results::EstimatedError;
+use crate::moments::EstimatedError;
 
 /// Returns the quantile of probability `p` (0 to 1) of numbers in ascending order, linear between
 /// neighbours (Hyndman and Fan's definition 7: the median of an even count is the mean of the two

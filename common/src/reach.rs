@@ -7,9 +7,9 @@
 use crate::bulk_velocity::bulk_velocity;
 use crate::case::Setup;
 use crate::job::{Data, JobKind, JobSpecification, Range};
+use crate::moments::Moments;
 use crate::parameters::{Parameter, Point};
 use crate::plausible::short;
-use crate::results::Moments;
 use crate::sampling;
 
 /// Ratio of mean velocities to √(e_L/ρ) of the slowest and √(c1111/ρ) of the fastest point.

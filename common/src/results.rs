@@ -3,14 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data_statistics::{KolmogorovTest, MomentIntervals, moment_intervals};
-use crate::inference::Conclusions;
-use crate::job::{Data, Objective, Sampling, Search};
+use crate::conclusions::Conclusions;
+use crate::job::{Objective, Sampling, Search};
+use crate::moments::{KolmogorovTest, MomentIntervals};
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
+
+pub use crate::moments::{Estimate, EstimatedError, Moments};
 
 /// Final status of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -82,51 +84,6 @@ impl JobFailure {
     }
 }
 
-/// Mean and coefficient of variation of a set of velocities (the paper's Secs. 2 and 5).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moments {
-    /// v = (1/N) Σ V_k, m/s.
-    pub mean: f64,
-    /// Δ = √((1/N) Σ (V_k - v)²) / v.
-    pub coefficient_of_variation: f64,
-}
-
-impl Moments {
-    /// Moments that are not known.
-    pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
-}
-
-/// Moments of a Monte Carlo sample with their standard errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The moments.
-    pub moments: Moments,
-    /// Their standard errors: that of the mean in m/s, that of the coefficient of variation.
-    pub standard_error: Moments,
-    /// Whether they were computed with the control variate.
-    pub controlled: bool,
-}
-
-impl Estimate {
-    /// Returns the relative standard errors: of the mean, of the coefficient of variation.
-    pub fn relative_errors(&self) -> [f64; 2] {
-        let (moments, error) = (self.moments, self.standard_error);
-        [
-            error.mean / moments.mean,
-            error.coefficient_of_variation / moments.coefficient_of_variation,
-        ]
-    }
-}
-
-/// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EstimatedError {
-    /// Median of the errors.
-    pub median: f64,
-    /// Largest error.
-    pub largest: f64,
-}
-
 /// Purpose of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Role {
@@ -159,6 +116,13 @@ pub struct Evaluation {
     pub estimated_error: Option<EstimatedError>,
 }
 
+impl Evaluation {
+    /// Whether it belongs to a search for this set of data.
+    pub fn is_for(&self, set: usize) -> bool {
+        self.role.group as usize == set
+    }
+}
+
 /// Meaning of the best point of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PointMeaning {
@@ -188,19 +152,6 @@ pub struct DataSummary {
     /// Confidence intervals of the moments of their law; `None` if only the moments are known, or
     /// if the velocities give no interval.
     pub intervals: Option<MomentIntervals>,
-}
-
-impl DataSummary {
-    /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
-    /// of a second.
-    pub fn of(data: &Data, set: usize) -> Self {
-        let velocities = data.velocities(set);
-        Self {
-            moments: data.moments(set),
-            count: velocities.map(|velocities| velocities.len() as u64),
-            intervals: velocities.and_then(moment_intervals),
-        }
-    }
 }
 
 /// Ending of the search for one group.
@@ -280,7 +231,7 @@ pub struct JobResult {
 /// The best point of a job, with its realizations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestPoint {
-    /// The point.
+    /// The evaluated point.
     pub point: Point,
     /// Meaning of the point; `None` for a propagation.
     pub meaning: Option<PointMeaning>,

@@ -3,9 +3,9 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::data_statistics::Interval;
 use crate::inference::{Known, Quantity};
 use crate::job::{Data, JobSpecification, Range};
+use crate::moments::Interval;
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
 use crate::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};

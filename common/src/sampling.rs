@@ -139,7 +139,7 @@ pub struct NominalSampling {
     pub band: f64,
     /// Period, s.
     pub period: f64,
-    /// Number of (frequency, wavenumber) pairs.
+    /// Returns the number of (frequency, wavenumber) pairs.
     pub pairs: u64,
 }
 

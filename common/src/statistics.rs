@@ -12,10 +12,10 @@ mod kernel_density;
 mod likelihood;
 mod sum;
 
-use crate::job::{MonteCarlo, Sampling};
+use crate::job::{Data, MonteCarlo, Sampling};
+use crate::moments::{Estimate, Moments};
 use crate::outcome::Outcome;
 use crate::parameters::Point;
-use crate::results::{Estimate, Moments};
 
 use self::blocks::Doubled;
 use self::central::{Central, central};
@@ -32,6 +32,16 @@ pub(crate) use self::sum::Sum;
 /// that of the set (division by N, as in the paper).
 pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
+}
+
+impl Data {
+    /// Returns the moments of a set, by its number; NaN if there is no such set.
+    pub fn moments(&self, set: usize) -> Moments {
+        if let Self::Moments { mean, coefficient_of_variation } = *self {
+            return Moments { mean, coefficient_of_variation };
+        }
+        self.velocities(set).and_then(moments).unwrap_or(Moments::UNKNOWN)
+    }
 }
 
 /// Returns the covariance of the logarithms of mean and coefficient of variation of independent

@@ -14,6 +14,7 @@ use thiserror::Error;
 use crate::check::{VELOCITIES_MIN, VELOCITY};
 use crate::file_error::without_byte_order_mark;
 use crate::job::Group;
+use crate::origin::Origin;
 use crate::{limits, user_file, visible};
 
 /// The column of the velocities.
@@ -28,36 +29,6 @@ pub(crate) struct Measured<T> {
     pub(crate) data: T,
     /// Their positions in the file.
     pub(crate) origin: Origin,
-}
-
-/// File and lines of a job's velocities.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Origin {
-    path: PathBuf,
-    /// Line of each velocity of each set, from 1.
-    lines: Vec<Vec<u32>>,
-}
-
-impl Origin {
-    /// Returns the path of the file.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Returns the line of a velocity of a set.
-    pub(crate) fn line(&self, set: usize, index: usize) -> Option<u32> {
-        self.lines.get(set)?.get(index).copied()
-    }
-
-    /// Returns file and line of a velocity as the beginning of a message; empty if there is no
-    /// file.
-    pub(crate) fn place(origin: Option<&Self>, set: usize, index: usize) -> String {
-        let place = origin.and_then(|origin| {
-            let line = origin.line(set, index)?;
-            Some(format!("{}, line {line}: velocity ", origin.path.display()))
-        });
-        place.unwrap_or_default()
-    }
 }
 
 /// One error in a CSV file of velocities.

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use osteon_common::case::Setup;
-use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
 use osteon_common::inference::{Conclusions, Inference, Known, NoiseErrors, Quantity, meaning};
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
+use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::report::{MeanModel, ReadError, ResultFile, Solver};

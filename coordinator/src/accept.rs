@@ -1,4 +1,4 @@
-//! Accepting connections: bounded in number, each with a bounded time to say who it is.
+//! Accepts connections: limited in number, each with limited time for its handshake.
 
 use std::io;
 use std::pin::Pin;
@@ -22,11 +22,12 @@ use crate::access::Certificate;
 use crate::open_files;
 use crate::tls::Tls;
 
-/// A peer must complete its handshake, and then send its first bytes, within this time each.
+/// Time limit for a peer's handshake, and again for its first bytes.
 pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
-/// Wait after the operating system gave no connection, e.g. because too many files are open.
+/// Pause after the operating system failed to accept a connection, e.g. because too many files are
+/// open.
 const REFUSED_WAIT: Duration = Duration::from_millis(100);
-/// Shortest time between two lines about that.
+/// Minimum time between two log lines about such failures.
 const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A bound socket.
@@ -36,33 +37,33 @@ pub(crate) enum Bound {
     Unix(UnixListener),
 }
 
-/// A connection whose handshake is over.
+/// A connection that has completed its handshake.
 #[derive(Debug)]
 pub(crate) struct Connection {
     number: u64,
     io: Io,
     certificate: Certificate,
-    /// Until the first byte has come: when to give up.
+    /// Time limit for the first byte; `None` once it has arrived.
     patience: Option<Pin<Box<Sleep>>>,
-    /// One of [`open_files::connections_max`].
+    /// Permit, one of [`open_files::connections_max`].
     _place: OwnedSemaphorePermit,
 }
 
-/// What is known of the peer of a call.
+/// Facts about the peer of a call.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
     /// Number of its connection, from 1.
     pub(crate) connection: u64,
-    /// What its certificate says.
+    /// Result of the check of its certificate.
     pub(crate) certificate: Certificate,
 }
 
-/// Bytes to and from a peer.
+/// Byte stream to and from a peer.
 type Io = Either<Box<TlsStream<TcpStream>>, Plain>;
 type Plain = Either<TcpStream, UnixStream>;
 
-/// Connections as they come, with TLS if there is any. A peer that does not complete its handshake
-/// is dropped without a word.
+/// Returns the connections as they arrive, with TLS if configured. A peer that does not complete
+/// its handshake is dropped silently.
 pub(crate) fn connections(
     bound: Bound,
     tls: Option<watch::Receiver<Tls>>,
@@ -82,11 +83,11 @@ pub(crate) fn connections(
 
 struct Acceptor {
     bound: Bound,
-    /// Read for each connection: it may be replaced while the coordinator runs.
+    /// Read for each connection, because it may be replaced while the coordinator runs.
     tls: Option<watch::Receiver<Tls>>,
     places: Arc<Semaphore>,
     handshakes: JoinSet<Option<Connection>>,
-    /// When it was last said that the operating system gives no connection.
+    /// Time of the last log line about failures to accept connections.
     complaint: Option<Instant>,
 }
 
@@ -127,7 +128,7 @@ impl Acceptor {
 }
 
 impl Acceptor {
-    /// Says now and then that there is no connection.
+    /// Logs a failure to accept a connection, at most once per interval.
     fn complain(&mut self, error: &io::Error) {
         if self.complaint.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
             self.complaint = Some(Instant::now());
@@ -144,7 +145,7 @@ async fn accept(
     let io = match bound {
         Bound::Tcp(listener) => {
             let (stream, _) = listener.accept().await?;
-            // Small messages shall not wait for more; without it they are only slower.
+            // Avoids delays of small messages; if it fails, they are only slower.
             drop(stream.set_nodelay(true));
             Either::Left(stream)
         }

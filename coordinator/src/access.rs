@@ -1,24 +1,24 @@
-//! Who may call what. Decided from the listener's policy, the caller's certificate and token;
-//! knows no socket, and nothing waits here.
+//! Access control: decides which caller may call which method, from the listener's policy and the
+//! caller's certificate and token. It uses no socket and never waits.
 
 use osteon_proto::token::Token;
 use thiserror::Error;
 
 use crate::tokens::{Role, Tokens};
 
-/// The name that a token is registered for, in the extensions of a call.
+/// Name of the token's holder, stored in the extensions of a call.
 #[derive(Debug, Clone)]
 pub(crate) struct Holder(pub(crate) String);
 
-/// The name in a worker's certificate (a URI among its subject's alternative names).
+/// The name that marks a worker's certificate (a URI among its subject alternative names).
 pub const WORKER_NAME: &str = "urn:osteon:worker";
-/// The name in a client's certificate (a URI among its subject's alternative names).
+/// The name that marks a client's certificate (a URI among its subject alternative names).
 pub const CLIENT_NAME: &str = "urn:osteon:client";
 
-/// Whom a listener lets in.
+/// Callers that a listener admits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Policy {
-    /// Everybody who reaches it.
+    /// Everybody who can connect.
     Everybody,
     /// On a listener without TLS: holders of tokens, workers among them.
     Tokens(Tokens),
@@ -26,166 +26,168 @@ pub enum Policy {
     Tls(Tokens),
 }
 
-/// What a peer's certificate says.
+/// Result of the check of a peer's certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certificate {
-    /// There is none.
+    /// The peer sent none.
     Absent,
-    /// It is in order, and a worker's.
+    /// Valid, for a worker.
     Worker,
-    /// It is in order, and for anything else.
+    /// Valid, for another purpose.
     Other,
-    /// It is not in order, and says nothing.
+    /// Not valid, so nothing in it counts.
     Faulty(Fault),
 }
 
-/// Why a certificate is not in order.
+/// Reason why a certificate is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Fault {
-    /// Somebody else signed it.
+    /// An unknown authority signed it.
     #[error("the coordinator's authority (its --tls-ca) has not signed it; make one with that")]
     UnknownAuthority,
-    /// It is too old.
+    /// It has expired.
     #[error("it has expired; make a new one")]
     Expired,
-    /// It is too young.
+    /// It is not valid yet.
     #[error("it is not valid yet; are the clocks right?")]
     NotYetValid,
-    /// It is for coordinators, say.
+    /// Its usage is another one, for example that of a coordinator.
     #[error("it is not for clients or workers; make one with `osteon certs`")]
     OtherUsage,
-    /// It cannot be understood.
+    /// It cannot be read.
     #[error("it cannot be used; make one with `osteon certs`")]
     Unusable,
 }
 
-/// What a call says of its token.
+/// Credentials in the header of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presented<'a> {
-    /// Nothing.
+    /// There are none.
     Nothing,
-    /// A text that should be one.
+    /// The text of a bearer token, unchecked.
     Token(&'a str),
-    /// Something that is no bearer token.
+    /// The header is not that of a bearer token.
     Unreadable,
 }
 
-/// What a method asks of its caller.
+/// Requirement of a method on its caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
-    /// Nothing at all.
+pub enum Requirement {
+    /// No requirement.
     Nothing,
     /// Any token or certificate.
     Known,
     /// A token with this role, or one above it.
     Role(Role),
-    /// To be a worker.
+    /// The caller is a worker.
     Worker,
 }
 
-/// Why a call is refused.
+/// Reason for refusing a call.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Denied {
-    /// No token.
-    #[error("this coordinator wants a token; give --token-file FILE")]
+pub enum AccessDenied {
+    /// The call has no token.
+    #[error("this coordinator requires a token; give --token-file FILE")]
     NoToken,
-    /// The header is not one of bearer tokens.
+    /// The header is not that of a bearer token.
     #[error("the header `authorization` must be `Bearer` and a token")]
     Unreadable,
-    /// A token that is not in the list.
+    /// The token is not in the list.
     #[error(
-        "this coordinator does not know the token; it was withdrawn, or is meant for another one"
+        "this coordinator does not accept the token: it was revoked, or belongs to another coordinator"
     )]
     UnknownToken,
-    /// A token that allows less.
+    /// The role of the token is not sufficient.
     #[error("the token of `{name}` has role {}, and this needs role {}", has.name(), needs.name())]
     WeakRole {
-        /// The token's name.
+        /// Name of the token's holder.
         name: String,
-        /// What it allows.
+        /// Role of the token.
         has: Role,
-        /// What is needed.
+        /// Required role.
         needs: Role,
     },
-    /// A worker without a certificate.
+    /// A worker called without a certificate.
     #[error(
-        "this coordinator takes workers with a certificate only; give --tls-cert and --tls-key"
+        "this coordinator accepts only workers with a certificate; give --tls-cert and --tls-key"
     )]
     NoCertificate,
-    /// A certificate that is not in order.
+    /// The certificate is not valid.
     #[error("the certificate in --tls-cert is refused: {0}")]
     Faulty(Fault),
-    /// A certificate that is for something else.
+    /// The certificate is for another purpose.
     #[error(
         "the certificate is not a worker's: it lacks the name `{WORKER_NAME}`; make one with `osteon certs`"
     )]
     NotAWorker,
 }
 
-/// What the method at `path` asks of its caller. A method that is not listed asks for the most.
-pub fn need(path: &str) -> Need {
+/// Returns the requirement of the method at `path`. A method that is not listed has the strictest
+/// one.
+pub fn need(path: &str) -> Requirement {
     let Some((service, method)) = path.strip_prefix('/').and_then(|path| path.split_once('/'))
     else {
-        return Need::Known;
+        return Requirement::Known;
     };
     match (service, method) {
-        ("grpc.health.v1.Health", _) => Need::Nothing,
-        ("osteon.v1.Workers", _) => Need::Worker,
+        ("grpc.health.v1.Health", _) => Requirement::Nothing,
+        ("osteon.v1.Workers", _) => Requirement::Worker,
         ("osteon.v1.Jobs", "Get" | "List" | "ListExpelled" | "ListWorkers" | "Watch" | "Fetch") => {
-            Need::Role(Role::Read)
+            Requirement::Role(Role::Read)
         }
-        ("osteon.v1.Jobs", "Submit" | "Cancel") => Need::Role(Role::Submit),
-        ("osteon.v1.Jobs", _) => Need::Role(Role::Admin),
-        // Reflection, and what does not exist.
-        _ => Need::Known,
+        ("osteon.v1.Jobs", "Submit" | "Cancel") => Requirement::Role(Role::Submit),
+        ("osteon.v1.Jobs", _) => Requirement::Role(Role::Admin),
+        // Reflection, and services that do not exist.
+        _ => Requirement::Known,
     }
 }
 
-/// Whether the call may go on; the name of the token's holder, if a token decided it.
+/// Decides whether a call is admitted. Returns the name of the token's holder if a token decided
+/// it.
 ///
 /// # Errors
-/// When it may not, with the reason for the caller.
+/// The reason for a refusal, to be sent to the caller.
 pub fn decide<'a>(
     policy: &'a Policy,
     certificate: Certificate,
     presented: Presented<'_>,
-    need: Need,
-) -> Result<Option<&'a str>, Denied> {
+    need: Requirement,
+) -> Result<Option<&'a str>, AccessDenied> {
     let tokens = match policy {
         Policy::Everybody => return Ok(None),
         Policy::Tokens(tokens) | Policy::Tls(tokens) => tokens,
     };
     let in_order = matches!(certificate, Certificate::Worker | Certificate::Other);
     let needs = match need {
-        Need::Nothing => return Ok(None),
-        Need::Known if in_order => return Ok(None),
-        Need::Known => Role::Read,
-        Need::Role(role) => role,
-        Need::Worker => match (policy, certificate) {
+        Requirement::Nothing => return Ok(None),
+        Requirement::Known if in_order => return Ok(None),
+        Requirement::Known => Role::Read,
+        Requirement::Role(role) => role,
+        Requirement::Worker => match (policy, certificate) {
             (Policy::Tls(_), Certificate::Worker) => return Ok(None),
-            (Policy::Tls(_), Certificate::Other) => return Err(Denied::NotAWorker),
-            (Policy::Tls(_), Certificate::Absent) => return Err(Denied::NoCertificate),
-            (_, Certificate::Faulty(fault)) => return Err(Denied::Faulty(fault)),
-            // A certificate is the one proof of a worker; without TLS there is none, and only
-            // who may do everything may answer for results.
+            (Policy::Tls(_), Certificate::Other) => return Err(AccessDenied::NotAWorker),
+            (Policy::Tls(_), Certificate::Absent) => return Err(AccessDenied::NoCertificate),
+            (_, Certificate::Faulty(fault)) => return Err(AccessDenied::Faulty(fault)),
+            // Only a certificate proves that a caller is a worker. Without TLS there is none, and
+            // only an administrator may answer for results.
             _ => Role::Admin,
         },
     };
     if let Certificate::Faulty(fault) = certificate {
-        return Err(Denied::Faulty(fault));
+        return Err(AccessDenied::Faulty(fault));
     }
     let holder = match presented {
-        Presented::Nothing => return Err(Denied::NoToken),
-        Presented::Unreadable => return Err(Denied::Unreadable),
-        Presented::Token(text) => tokens.holder(text).ok_or(Denied::UnknownToken)?,
+        Presented::Nothing => return Err(AccessDenied::NoToken),
+        Presented::Unreadable => return Err(AccessDenied::Unreadable),
+        Presented::Token(text) => tokens.holder(text).ok_or(AccessDenied::UnknownToken)?,
     };
     if holder.role < needs {
-        return Err(Denied::WeakRole { name: holder.name.clone(), has: holder.role, needs });
+        return Err(AccessDenied::WeakRole { name: holder.name.clone(), has: holder.role, needs });
     }
     Ok(Some(&holder.name))
 }
 
-/// The token in the value of the header `authorization`.
+/// Returns the token in the value of the header `authorization`.
 pub fn presented(header: Option<&[u8]>) -> Presented<'_> {
     let Some(header) = header else { return Presented::Nothing };
     let Ok(text) = std::str::from_utf8(header) else { return Presented::Unreadable };

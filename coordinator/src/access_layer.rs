@@ -1,4 +1,5 @@
-//! The door of every call: what it says of itself goes to [`crate::access`], whose answer counts.
+//! Access layer in front of every call: it passes the caller's credentials to [`crate::access`] and
+//! enforces the decision.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -15,36 +16,36 @@ use tonic::{Code, Status};
 use tower::Layer;
 
 use crate::accept::Peer;
-use crate::access::{self, Certificate, Denied, Holder, Need, Policy};
+use crate::access::{self, AccessDenied, Certificate, Holder, Policy, Requirement};
+use crate::limiter::{Caller, Limiter};
 use crate::message_body::MessageBody;
-use crate::places::{Caller, Places};
 use crate::tokens::Role;
 
-/// The one method whose message may be large.
+/// The only method whose message may be large.
 const SUBMIT: &str = "/osteon.v1.Jobs/Submit";
 
-/// Puts a [`Door`] before a service.
+/// Puts a [`AccessService`] in front of a service.
 #[derive(Debug, Clone)]
 pub(crate) struct AccessLayer {
-    /// Read for each call: it may be replaced while the coordinator runs.
+    /// Read for each call, because it may be replaced while the coordinator runs.
     policy: watch::Receiver<Arc<Policy>>,
-    submissions: Places,
+    submissions: Limiter,
 }
 
-/// A service that only those may call whom the policy lets in.
+/// A service behind the access check.
 #[derive(Debug, Clone)]
-pub(crate) struct Door<S> {
+pub(crate) struct AccessService<S> {
     inner: S,
     layer: AccessLayer,
 }
 
 impl AccessLayer {
     pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>) -> Self {
-        let submissions = Places::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
+        let submissions = Limiter::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
         Self { policy, submissions }
     }
 
-    /// The holder of the call's token, if tokens are asked for.
+    /// Returns the holder of the call's token, if the policy requires tokens.
     fn decide<B>(&self, request: &http::Request<B>) -> Result<Option<Holder>, Status> {
         let path = request.uri().path();
         let peer = request.extensions().get::<Peer>();
@@ -55,8 +56,10 @@ impl AccessLayer {
         let policy = Arc::clone(&self.policy.borrow());
         match access::decide(&policy, certificate, presented, need) {
             Ok(holder) => {
-                // Who changed something shall be found in the log; who looks is no news.
-                if let (Some(holder), Need::Role(Role::Submit | Role::Admin)) = (holder, need) {
+                // Calls that change something are logged with their holder; reads are not.
+                if let (Some(holder), Requirement::Role(Role::Submit | Role::Admin)) =
+                    (holder, need)
+                {
                     tracing::info!(path, holder, "admitted");
                 }
                 Ok(holder.map(|name| Holder(name.to_owned())))
@@ -70,14 +73,14 @@ impl AccessLayer {
 }
 
 impl<S> Layer<S> for AccessLayer {
-    type Service = Door<S>;
+    type Service = AccessService<S>;
 
-    fn layer(&self, inner: S) -> Door<S> {
-        Door { inner, layer: self.clone() }
+    fn layer(&self, inner: S) -> AccessService<S> {
+        AccessService { inner, layer: self.clone() }
     }
 }
 
-impl<S> Service<http::Request<Body>> for Door<S>
+impl<S> Service<http::Request<Body>> for AccessService<S>
 where
     S: Service<http::Request<Body>, Response = http::Response<Body>> + Clone + Send + 'static,
     S::Future: Send,
@@ -93,7 +96,7 @@ where
 
     fn call(&mut self, mut request: http::Request<Body>) -> Self::Future {
         match self.layer.decide(&request) {
-            // Before a byte of the message is read.
+            // Refused before a byte of the message is read.
             Err(status) => return Box::pin(async move { Ok(status.into_http()) }),
             Ok(Some(holder)) => {
                 request.extensions_mut().insert(holder);
@@ -103,7 +106,7 @@ where
         if request.uri().path() != SUBMIT {
             return Box::pin(self.inner.call(request));
         }
-        // The service that is ready is this one; its clone may not be.
+        // `self.inner` is the instance that was polled ready; its clone may not be.
         let fresh = self.inner.clone();
         let mut inner = std::mem::replace(&mut self.inner, fresh);
         let submissions = self.layer.submissions.clone();
@@ -116,7 +119,7 @@ where
             if message.length() <= SMALL_SUBMISSION_BYTES_MAX {
                 return inner.call(http::Request::from_parts(head, Body::new(message))).await;
             }
-            // Large messages are held in memory a few at a time, and not for long.
+            // Only a few large messages are held in memory at a time, and not for long.
             let _place = match submissions.take(Caller::of(&head.extensions)).await {
                 Ok(place) => place,
                 Err(status) => return Ok(status.into_http()),
@@ -127,15 +130,15 @@ where
     }
 }
 
-impl From<Denied> for Status {
-    fn from(denied: Denied) -> Self {
+impl From<AccessDenied> for Status {
+    fn from(denied: AccessDenied) -> Self {
         let code = match denied {
-            Denied::WeakRole { .. } | Denied::NotAWorker => Code::PermissionDenied,
-            Denied::NoToken
-            | Denied::Unreadable
-            | Denied::UnknownToken
-            | Denied::Faulty(_)
-            | Denied::NoCertificate => Code::Unauthenticated,
+            AccessDenied::WeakRole { .. } | AccessDenied::NotAWorker => Code::PermissionDenied,
+            AccessDenied::NoToken
+            | AccessDenied::Unreadable
+            | AccessDenied::UnknownToken
+            | AccessDenied::Faulty(_)
+            | AccessDenied::NoCertificate => Code::Unauthenticated,
         };
         Self::new(code, denied.to_string())
     }

@@ -1,4 +1,4 @@
-//! Which batches are computed twice, by different workers.
+//! Audits: decides which batches are computed a second time by another worker.
 
 use std::fmt;
 
@@ -6,16 +6,16 @@ use osteon_proto::identity::{self, NoRandomness};
 
 use crate::ids::JobId;
 
-/// What decides which batches are computed twice: a secret of a running coordinator, since a worker
-/// that knew it could lie where nobody looks. It changes no result.
+/// Key that decides which batches are audited. It is a secret of a running coordinator, since a
+/// worker that knew it could return wrong answers where they are not checked. It changes no result.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct AuditKey([u8; 32]);
 
 impl AuditKey {
-    /// A key that nobody knows.
+    /// Returns a random key.
     ///
     /// # Errors
-    /// When the operating system gives no random numbers.
+    /// When the operating system provides no random numbers.
     pub(crate) fn random() -> Result<Self, NoRandomness> {
         identity::random_bytes().map(Self)
     }
@@ -27,8 +27,8 @@ impl fmt::Debug for AuditKey {
     }
 }
 
-/// Whether a batch of `job` is audited that begins at index `first` of evaluation `number`: a
-/// function of these and the key.
+/// Returns whether the batch of `job` that begins at index `first` of evaluation `number` is
+/// audited: a function of these and the key.
 pub(crate) fn is_chosen(
     key: &AuditKey,
     job: JobId,
@@ -61,7 +61,7 @@ mod tests {
         }
     }
 
-    /// Which of many batches are chosen.
+    /// Returns which of many batches are chosen.
     fn chosen(key: &AuditKey, fraction: f64) -> Vec<u64> {
         let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
         (0..10_000).filter(of).collect()

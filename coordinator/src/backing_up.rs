@@ -1,4 +1,4 @@
-//! Sending a copy of the store: one at a time, as fast as it is read.
+//! Sends a copy of the store: one at a time, as fast as the client reads it.
 
 use std::fs::File;
 use std::time::Duration;
@@ -15,18 +15,18 @@ use tonic::Status;
 
 use crate::store::StoreError;
 
-/// Messages that are made before they are read.
+/// Number of messages that are prepared before they are read.
 const AHEAD: usize = 2;
 /// Bytes of the file in one message.
 const PART_BYTES: usize = 256 << 10;
-/// While the copy is made an empty part comes this often.
+/// Interval of empty parts, sent as heartbeats while the copy is made.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
 
-/// What the store's thread makes of the wish for a copy.
+/// Result of a copy by the store's thread; `None` if it was stopped.
 pub(crate) type Copied = Result<Option<File>, StoreError>;
 
-/// The copy as a stream. `place` is held until it ends: whoever takes nothing for a while, or takes
-/// too long for all, gets nothing more.
+/// Streams the copy. The permit `place` is held until the stream ends; a client that reads nothing
+/// for a while, or takes too long in all, receives no more parts.
 pub(crate) fn streamed(
     copied: oneshot::Receiver<Copied>,
     place: impl Send + 'static,
@@ -44,7 +44,7 @@ pub(crate) fn streamed(
             Err(Unsent::Gone) => tracing::warn!("backup ended: its client has gone"),
             Err(Unsent::Refused(status)) => {
                 tracing::warn!(reason = status.message(), "backup failed");
-                // A client that takes nothing sees the stream end.
+                // A client that does not read sees the stream end.
                 drop(outgoing.sender.try_send(Err(status)));
             }
         }
@@ -52,18 +52,18 @@ pub(crate) fn streamed(
     ReceiverStream::new(sent)
 }
 
-/// Why a copy was not sent to its end.
+/// Reason why a copy was not sent completely.
 enum Unsent {
-    /// Nobody wants it any more.
+    /// The client has gone.
     Gone,
-    /// With this status.
+    /// The client receives this status.
     Refused(Status),
 }
 
-/// Where the parts go.
+/// Destination of the parts.
 struct Outgoing {
     sender: mpsc::Sender<Result<BackupResponse, Status>>,
-    /// When the client has had long enough.
+    /// Time limit of the whole copy.
     until: Instant,
 }
 
@@ -83,7 +83,7 @@ impl Outgoing {
     }
 }
 
-/// Waits for the copy and sends it; its length.
+/// Waits for the copy and sends it; returns its length.
 async fn send(copied: oneshot::Receiver<Copied>, outgoing: &Outgoing) -> Result<u64, Unsent> {
     let file = finished(copied, outgoing).await?;
     let unread = |error: std::io::Error| {
@@ -107,7 +107,7 @@ async fn send(copied: oneshot::Receiver<Copied>, outgoing: &Outgoing) -> Result<
     Ok(length)
 }
 
-/// The file of the copy, when it is made.
+/// Returns the file of the copy when it is complete.
 async fn finished(
     mut copied: oneshot::Receiver<Copied>,
     outgoing: &Outgoing,
@@ -158,7 +158,7 @@ mod tests {
             assert_eq!(part, Some(Part::Data(Vec::new())));
         }
         assert!(begun.elapsed() >= 4 * SIGN_OF_LIFE, "{:?}", begun.elapsed());
-        // The store's thread sees it, and the next one gets the place.
+        // The store's thread notices, and the next client gets the permit.
         drop(stream);
         drop(places.acquire().await);
         assert!(reply.is_closed());

@@ -1,4 +1,4 @@
-//! A batch that a worker holds, and why it is computed.
+//! A batch that a worker holds, and the purpose for which it is computed.
 
 use std::time::Duration;
 
@@ -12,37 +12,38 @@ pub(crate) struct Batch {
     pub(crate) purpose: Purpose,
     pub(crate) worker: WorkerId,
     pub(crate) sent: Duration,
-    /// When its worker could begin it: when it was sent, or when the worker answered what it had
-    /// been sent before.
+    /// Time when its worker could begin it: when it was sent, or when the worker answered the batch
+    /// that it had been sent before, whichever was later.
     pub(crate) begun: Duration,
-    /// Computing time that its client was charged for it.
+    /// Computing time that was charged to its client.
     pub(crate) charged: Duration,
     /// The other batches with the same indices and purpose, held by other workers.
     pub(crate) duplicates: Vec<BatchId>,
-    /// How many of them were sent before it because those before them were overdue.
+    /// Number of duplicates that were sent before this one, each because its predecessor was
+    /// overdue.
     pub(crate) retries: u32,
 }
 
 impl Batch {
-    /// Whether an idle worker may have a duplicate of it before it is overdue.
+    /// Returns whether an idle worker may receive a duplicate of it before it is overdue.
     pub(crate) fn may_be_duplicated(&self) -> bool {
         self.purpose == Purpose::Fill && self.duplicates.is_empty()
     }
 }
 
-/// Why a batch is computed. Its duplicates have the same purpose: which batch was first decides
-/// nothing, so being a duplicate is a relation between batches and no purpose.
+/// Why a batch is computed. Duplicates have the same purpose. Being a duplicate is a relation
+/// between batches, not a purpose, because the order in which they were sent decides nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// It fills indices of the evaluation that the search asked for.
     Fill,
-    /// It fills an index over which workers crashed. Its worker holds nothing else meanwhile.
+    /// It fills an index over which workers crashed. Its worker holds no other batch meanwhile.
     Exclusive,
-    /// It fills indices of a point that the search has not asked for.
+    /// It fills indices of a point that the search has not asked for yet.
     Speculative,
     /// Its answer is compared with the answer of another worker.
     Audit {
-        /// How many workers were lost over it.
+        /// Number of workers that were lost over it.
         lost: u32,
     },
     /// Its answer decides between answers that differ.
@@ -50,17 +51,17 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
-    /// Whether the answer fills indices of an evaluation.
+    /// Returns whether the answer fills indices of an evaluation.
     pub(crate) fn fills(self) -> bool {
         matches!(self, Self::Fill | Self::Exclusive | Self::Speculative)
     }
 }
 
-/// What a batch is about.
+/// The indices that a batch computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Assignment {
     pub(crate) job: JobId,
-    /// Attempt at an evaluation.
+    /// Number of the attempt at an evaluation.
     pub(crate) attempt: u64,
     pub(crate) indices: Indices,
 }

@@ -1,4 +1,4 @@
-//! Why the stream of a worker is closed.
+//! Reasons for closing a worker's stream.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::ids::BatchId;
 
-/// Why a worker's stream is closed.
+/// Reason for closing a worker's stream.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CloseReason {
     /// Its numerics differ from the coordinator's.
@@ -22,72 +22,72 @@ pub enum CloseReason {
         /// Fingerprint of the coordinator.
         coordinator: String,
     },
-    /// It was found to compute wrongly.
+    /// It was banned for wrong answers.
     #[error(
         "this worker is expelled: it {reason}; check its machine, and start it again when it is \
          repaired"
     )]
     Banned {
-        /// What was found.
+        /// The finding, which completes "it …".
         reason: String,
     },
-    /// An impossible number of slots.
+    /// It announced an invalid number of slots.
     #[error("this worker announces {slots} threads; 1 to {max} are allowed")]
     Slots {
-        /// What it announced.
+        /// Announced number of slots.
         slots: u32,
-        /// Most slots allowed.
+        /// Maximum number of slots.
         max: u32,
     },
-    /// A name of its introduction is too long.
+    /// A text in its hello message is too long.
     #[error("a name in this worker's hello has {bytes} bytes; at most {max} are allowed")]
     NameTooLong {
-        /// Its length.
+        /// Length of the text, bytes.
         bytes: usize,
-        /// Most bytes allowed.
+        /// Maximum length, bytes.
         max: usize,
     },
     /// Too many workers are attached.
     #[error("{limit} workers are attached already, the most allowed; attach again later")]
     TooManyWorkers {
-        /// Most workers allowed.
+        /// Maximum number of workers.
         limit: usize,
     },
-    /// Nothing was heard of it.
-    #[error("nothing was heard of this worker for {silent:?}; its lease has ended, attach again")]
+    /// It sent nothing until its lease expired.
+    #[error("no message came from this worker for {silent:?}; its lease has ended, attach again")]
     Expired {
-        /// For how long.
+        /// Time since its last message.
         silent: Duration,
     },
-    /// It lives, but does not answer.
+    /// It is alive, but does not answer its batches.
     #[error(
-        "this worker has not answered anything it holds for {waited:?}; its lease has ended, \
+        "this worker has not answered any of its batches for {waited:?}; its lease has ended, \
          attach again"
     )]
     Unanswering {
-        /// For how long.
+        /// Time without an answer.
         waited: Duration,
     },
-    /// It does not read what is sent to it.
+    /// It does not read the messages sent to it.
     #[error("this worker does not read its stream; its lease has ended, attach again")]
     NotReading,
     /// A message that no worker of this version sends.
     #[error("a message of this worker is malformed: {0}")]
     Malformed(#[from] Malformed),
-    /// An answer of the wrong length.
+    /// An answer has the wrong number of realizations.
     #[error("the answer to batch {batch} has {found} realizations, expected {expected}")]
     WrongCount {
         /// The batch.
         batch: BatchId,
-        /// How many it has.
+        /// Number of realizations in the answer.
         found: usize,
-        /// How many it must have.
+        /// Number of realizations in the batch.
         expected: u64,
     },
-    /// A second hello.
-    #[error("this worker said hello twice on one stream")]
+    /// It sent a second hello message.
+    #[error("this worker sent a second hello on one stream")]
     SecondHello,
-    /// It wanted to leave, and has answered everything.
+    /// It was draining and has answered everything.
     #[error("this worker has drained")]
     Drained,
     /// The coordinator is stopping.

@@ -1,4 +1,4 @@
-//! What an operator, or a test, may choose.
+//! Settings of a coordinator, chosen by an operator or a test.
 
 use std::time::Duration;
 
@@ -6,49 +6,52 @@ use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX
 
 use crate::audit::AuditKey;
 
-/// Fraction of the batches that a second worker computes too, unless an operator chooses otherwise.
+/// Default fraction of the batches that are computed by a second worker too.
 pub const AUDIT_FRACTION: f64 = 0.01;
 
 /// Settings of a coordinator. None of them changes a bit of any result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// The commit that the program was built from, which results name; `None` if nobody knows.
+    /// The commit that the program was built from, which results name; `None` if unknown.
     pub commit: Option<&'static str>,
-    /// How often both sides of a worker's stream give a sign of life.
+    /// Interval of the heartbeats on both sides of a worker's stream.
     pub heartbeat: Duration,
-    /// A lease ends after this long without a message.
+    /// A lease expires after this long without a message.
     pub expiry: Duration,
-    /// A worker that gives signs of life but answers nothing that it holds for this long has
-    /// lost its lease too.
+    /// A lease also ends when a worker sends heartbeats but answers none of its batches for this
+    /// long.
     pub answer_timeout: Duration,
     /// Computing time that a batch should take.
     pub batch_target: Duration,
-    /// Fraction of the batches that a second worker computes too, 0 to 1.
+    /// Fraction of the batches that are computed by a second worker too, 0 to 1.
     pub audit_fraction: f64,
-    /// Decides which; a running coordinator draws its own.
+    /// Decides which batches are audited; a running coordinator draws its own key.
     pub audit_key: AuditKey,
-    /// Whether slots that nobody has work for compute points that a search may ask for next.
+    /// Whether otherwise idle slots compute candidate points of searches speculatively.
     pub speculation: bool,
-    /// Ended jobs are forgotten after this long; `None`: when a client wants it.
+    /// Ended jobs are deleted after this long; `None`: only when a client requests it.
     pub keep_ended: Option<Duration>,
-    /// How often time is looked at; also the shortest interval between two snapshots.
+    /// Interval of the ticks, and the minimum interval between two snapshots.
     pub tick: Duration,
-    /// Most jobs that are computed at a time; the others wait in the order of their acceptance.
+    /// Maximum number of active jobs. The others wait: jobs of the clients with the fewest active
+    /// jobs begin first, of these the highest priority, then the oldest. A client without an active
+    /// job may exceed the limit, up to twice its value.
     pub active_jobs_max: usize,
-    /// Most realizations that the evaluations of these have together. A job finds room beyond it if
-    /// nothing else is computed.
+    /// Maximum number of realizations in the evaluations of the active jobs together. A job of a
+    /// client without an active job may exceed it, up to twice its value, and any job if no other
+    /// is active.
     pub active_realizations_max: u64,
-    /// Most bytes that the specifications of jobs that have not ended take together; those of one
-    /// client a quarter.
+    /// Maximum size of the specifications of all jobs that have not ended, bytes; those of one
+    /// client may take a quarter of it.
     pub jobs_bytes_max: u64,
-    /// How long a failed write to the store waits before it is tried again.
+    /// Time after which a failed write to the store is repeated.
     pub store_retry: Duration,
-    /// When the store has refused a record for this long, [`crate::Coordinator::failed`] says so;
-    /// `None`: never. In either case the record is tried again until it is taken.
-    pub store_patience: Option<Duration>,
-    /// Longest time from a call to the beginning of its answer.
+    /// [`crate::Coordinator::failed`] completes when the store has refused a record for this long;
+    /// `None`: never. In either case the write is repeated until it succeeds.
+    pub store_give_up_after: Option<Duration>,
+    /// Maximum time from a call to the beginning of its answer.
     pub call_timeout: Duration,
-    /// Longest time that a shutdown waits for streams to end and for the store.
+    /// Maximum time that a shutdown waits for streams to end and for the store.
     pub shutdown_timeout: Duration,
 }
 
@@ -69,7 +72,7 @@ impl Default for Config {
             active_realizations_max: ACTIVE_REALIZATIONS_MAX,
             jobs_bytes_max: JOBS_BYTES_MAX,
             store_retry: Duration::from_secs(2),
-            store_patience: None,
+            store_give_up_after: None,
             call_timeout: Duration::from_secs(CALL_S_MAX),
             shutdown_timeout: Duration::from_secs(5),
         }

@@ -1,4 +1,4 @@
-//! The one task that owns the state: messages become events, effects become messages.
+//! The task that owns the state: it turns messages into events and effects into messages.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use crate::close_reason::CloseReason;
 use crate::config::Config;
 use crate::effect::{Answer, Effect, Refusal};
-use crate::event::{Event, Hello, Request, Unread};
+use crate::event::{Event, Hello, ReadFailure, Request};
 use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
 use crate::outbound::{self, Outbound};
@@ -18,21 +18,21 @@ use crate::snapshot;
 use crate::state::State;
 use crate::store_thread::Command;
 
-/// What reaches the one task.
+/// A message to the core task.
 pub(crate) enum Message {
-    /// Something happened.
+    /// An event happened.
     Event(Event),
-    /// A client asks, and waits for the answer.
+    /// A client sends a request and waits for the answer.
     Ask(Request, oneshot::Sender<Answer>),
-    /// A client wants to watch a job.
+    /// A client requests to watch a job.
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
-    /// A worker's stream began; what is for it goes to `outbound`.
+    /// A worker's stream began; messages to it go to `outbound`.
     Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
-    /// Stop, and say when.
+    /// Stop, and report when that is done.
     Shutdown(oneshot::Sender<()>),
 }
 
-/// Time since the Unix epoch as it was at the start, monotonic from there.
+/// Clock of the time since the Unix epoch: read once at the start, monotonic from there.
 pub(crate) struct Clock {
     started: Instant,
     epoch: Duration,
@@ -56,7 +56,7 @@ pub(crate) struct Core {
     commands: mpsc::Sender<Command>,
     next_token: u64,
     waiting: BTreeMap<Token, oneshot::Sender<Answer>>,
-    /// Newest snapshots of jobs that somebody watches.
+    /// Newest snapshots of the jobs that are being watched.
     watching: BTreeMap<JobId, watch::Sender<v1::JobSnapshot>>,
     outbound: BTreeMap<WorkerId, Outbound>,
     on_stop: Option<oneshot::Sender<()>>,
@@ -101,7 +101,7 @@ impl Core {
         let mut ticks = tokio::time::interval(tick);
         ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         while !self.stopped {
-            // No branch may starve: the choice is random among those that are ready.
+            // No branch may starve: `select!` chooses at random among those that are ready.
             tokio::select! {
                 Some(message) = inbox.recv() => self.message(message),
                 Some(event) = from_store.recv() => self.handle(VecDeque::from([event])),
@@ -116,7 +116,7 @@ impl Core {
             Message::Ask(request, reply) => {
                 let token = Token(self.next_token);
                 self.next_token += 1;
-                // Those who went away do not wait.
+                // Requests whose clients have gone are dropped.
                 self.waiting.retain(|_, reply| !reply.is_closed());
                 self.waiting.insert(token, reply);
                 self.handle(VecDeque::from([Event::Requested { token, request }]));
@@ -133,7 +133,7 @@ impl Core {
         }
     }
 
-    /// Reacts to events, and to those that the effects bring about.
+    /// Reacts to events, and to the events that the effects cause.
     fn handle(&mut self, mut events: VecDeque<Event>) {
         while let Some(event) = events.pop_front() {
             tracing::trace!(?event);
@@ -178,7 +178,7 @@ impl Core {
                 }
                 Effect::Read { job, number } => {
                     if let Err(refused) = self.commands.try_send(Command::Read { job, number }) {
-                        let found = Err(Unread::Refused { error: refused.to_string() });
+                        let found = Err(ReadFailure::Refused { error: refused.to_string() });
                         followups.push_back(Event::Read { job, number, found });
                     }
                 }
@@ -197,7 +197,7 @@ impl Core {
                 }
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
-                Effect::Despair { error, waited } => {
+                Effect::GiveUp { error, waited } => {
                     self.failing.tell(Failed::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),
@@ -214,7 +214,8 @@ impl Core {
         if let Some(outbound) = self.outbound.get(&worker)
             && outbound.send(Ok(message)).is_err()
         {
-            // What is in flight is bounded: only who does not read, or is gone, lets it pile up.
+            // The messages in flight are bounded, so the queue is full only if the worker does not
+            // read or has gone.
             followups.push_back(Event::Misbehaved { worker, reason: CloseReason::NotReading });
         }
     }
@@ -222,7 +223,7 @@ impl Core {
     fn close(&mut self, worker: WorkerId, reason: &CloseReason) {
         tracing::debug!(%worker, %reason, "stream of a worker closed");
         if let Some(outbound) = self.outbound.remove(&worker) {
-            // A full queue belongs to a worker that does not read; it sees the stream end.
+            // If the queue is full, the worker does not read; its stream ends all the same.
             let _ = outbound.send(Err(outbound::status(reason)));
         }
     }
@@ -264,7 +265,7 @@ impl Core {
         self.stopped = true;
         self.watching.clear();
         if let Some(reply) = self.on_stop.take() {
-            // Who asked may not wait any more.
+            // The caller may no longer wait.
             let _ = reply.send(());
         }
     }

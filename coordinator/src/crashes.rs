@@ -1,50 +1,51 @@
-//! Workers that were lost over one task, and when the task is poison: when it is to blame.
+//! Workers that were lost over one task, and the rule for when the task is poison, that is, to
+//! blame for the losses.
 //!
-//! Machines fail in more ways than realizations kill: one bad node dies over whatever it is given,
-//! a stopped coordinator loses everybody at once. So a realization is only blamed for workers that
-//! had shown that they work, whose streams broke, and that did not come back, on different hosts if
-//! there are any.
+//! Machines fail for more reasons than poison tasks: a bad node crashes whatever it is given, and a
+//! stopped coordinator loses all workers at once. So a realization is only blamed for workers that
+//! had answered something before, whose streams broke and that did not come back, on different
+//! hosts if there are any.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 use crate::worker_name::WorkerName;
 
-/// So many crashes of workers that had shown that they work make a task poison.
+/// Number of crashes of workers that had answered something before that makes a task poison.
 const CRASH_LIMIT: usize = 3;
-/// And so many lost workers of any kind, so that nothing is tried for ever.
+/// Upper limit for lost workers of any kind, so that retries end.
 const LOSS_LIMIT: usize = 10;
 
-/// How the stay of a worker ended.
+/// Reason why the stay of a worker ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cause {
-    /// It was to end: nothing is to blame.
+    /// The departure was announced: no task is to blame.
     Announced,
-    /// Its stream broke: it may have died.
+    /// Its stream broke: the process may have died.
     StreamBroke,
-    /// Nothing was heard of it.
+    /// It sent nothing until its lease expired.
     Silence,
-    /// It lives, but does not answer, or answers what cannot be used.
+    /// It is alive, but does not answer, or its answers cannot be used.
     Misbehaviour,
 }
 
 /// A worker whose stay has ended.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LostWorker {
-    /// Who is gone.
+    /// The worker.
     pub(crate) worker: WorkerName,
-    /// How.
+    /// The reason.
     pub(crate) cause: Cause,
-    /// Since when.
+    /// Time when its stay ended.
     pub(crate) at: Duration,
-    /// It held one batch and nothing else.
+    /// It held exactly one batch.
     pub(crate) alone: bool,
     /// It had answered something in this stay.
     pub(crate) has_answered: bool,
 }
 
 impl LostWorker {
-    /// Whether it may be a sign against what the worker held.
+    /// Returns whether the loss counts as evidence against the batch that the worker held.
     fn is_credible(&self) -> bool {
         self.has_answered && self.cause == Cause::StreamBroke
     }
@@ -55,14 +56,14 @@ impl LostWorker {
 pub(crate) struct Crashes(Vec<LostWorker>);
 
 impl Crashes {
-    /// Takes a loss into account, unless it means nothing.
+    /// Adds a loss, unless it is irrelevant.
     pub(crate) fn add(&mut self, loss: &LostWorker) {
         if loss.alone && loss.cause != Cause::Announced {
             self.0.push(loss.clone());
         }
     }
 
-    /// Forgets the crashes of a worker that is back: it did not die.
+    /// Removes the losses of a worker that is back: it did not die. Misbehaviour is still counted.
     pub(crate) fn forget(&mut self, name: &WorkerName) {
         self.0.retain(|loss| loss.worker != *name || loss.cause == Cause::Misbehaviour);
     }
@@ -72,38 +73,39 @@ impl Crashes {
         self.0.iter_mut().for_each(|loss| shift(&mut loss.at));
     }
 
-    /// Whether nobody was lost.
+    /// Returns whether no worker was lost.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many were lost.
+    /// Returns the number of losses.
     pub(crate) fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// The hosts of those that were lost.
+    /// Returns the hosts of the lost workers.
     pub(crate) fn hosts(&self) -> BTreeSet<&str> {
         self.0.iter().map(|loss| loss.worker.host()).collect()
     }
 
-    /// Whether one of them was of `host`.
+    /// Returns whether a lost worker ran on `host`.
     pub(crate) fn are_of(&self, host: &str) -> bool {
         self.0.iter().any(|loss| loss.worker.host() == host)
     }
 
-    /// When the first was lost.
+    /// Returns the time of the first loss.
     pub(crate) fn first(&self) -> Option<Duration> {
         self.0.iter().map(|loss| loss.at).min()
     }
 
-    /// When the last was lost.
+    /// Returns the time of the last loss.
     pub(crate) fn last(&self) -> Option<Duration> {
         self.0.iter().map(|loss| loss.at).max()
     }
 
-    /// Whether so many were lost that the task is poison. `untried` says whether there is a worker that may be expected to
-    /// do better, on another host or there since before the first loss.
+    /// Returns whether enough workers were lost that the task is poison. `untried` returns whether
+    /// there is a worker that may be expected to do better, on another host or attached since
+    /// before the first loss.
     pub(crate) fn reach_limit(&self, untried: impl FnOnce() -> bool) -> bool {
         let credible = || self.0.iter().filter(|loss| loss.is_credible());
         let hosts: BTreeSet<&str> = credible().map(|loss| loss.worker.host()).collect();
@@ -116,8 +118,8 @@ impl Crashes {
 mod tests {
     use super::*;
 
-    /// Workers on these hosts are lost; whether that is enough while another host is there, and
-    /// while none is.
+    /// Loses workers on these hosts, and checks whether the limit is reached while another host is
+    /// there, and while none is.
     fn check(hosts: &[&str], change: impl Fn(usize, &mut LostWorker), expected: [bool; 2]) {
         let mut crashes = Crashes::default();
         for (process, host) in hosts.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Answers that differ, and whom to believe: two different workers that agree to the bit.
+//! Disputes: answers to the same indices that differ. An answer is accepted when two different
+//! workers agree on it bit for bit.
 
 use std::time::Duration;
 
@@ -9,22 +10,22 @@ use crate::ids::BatchId;
 use crate::indices::Indices;
 use crate::worker_name::WorkerName;
 
-/// Different answers to the same indices, undecided.
+/// An undecided dispute: different answers to the same indices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dispute {
-    /// What it is about.
+    /// The disputed indices.
     pub indices: Indices,
-    /// One for each worker, in the order they came; no two are the same.
+    /// One vote for each worker, in the order they arrived; no two are the same.
     votes: Vec<Vote>,
-    /// Since when.
+    /// Time when the dispute began.
     pub since: Duration,
-    /// Batch of the worker that is to decide, and its copies.
+    /// Batch of the worker that casts the deciding vote, and its duplicates.
     pub tie_breakers: Vec<BatchId>,
     /// Workers that were lost over it.
     pub(crate) crashes: Crashes,
 }
 
-/// What one worker says.
+/// Vote of one worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vote {
     /// The worker.
@@ -33,26 +34,26 @@ pub struct Vote {
     pub solved: Vec<Solved>,
 }
 
-/// An index at which two workers say different things.
+/// An index at which the answers of two workers differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contradiction {
     /// The index.
     pub index: u64,
-    /// Who says what: the answer that came first, then the other.
+    /// The two workers and their answers; the answer that arrived first comes first.
     pub answers: [(WorkerName, Solved); 2],
 }
 
 /// A decided dispute.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Verdict {
-    /// The two that agree.
+    /// The two workers that agree.
     pub(crate) believed: [WorkerName; 2],
-    /// Each of the others, with where it differs from those two.
+    /// Each of the other workers, with the first index at which it differs from those two.
     pub(crate) liars: Vec<Contradiction>,
 }
 
 impl Dispute {
-    /// A dispute between two workers whose answers differ.
+    /// Returns a dispute between two workers whose answers differ.
     pub(crate) fn new(indices: Indices, votes: [Vote; 2], since: Duration) -> Self {
         Self {
             indices,
@@ -63,18 +64,18 @@ impl Dispute {
         }
     }
 
-    /// Whether `name` is one of those whose answers differ.
+    /// Returns whether `name` is one of the workers that have voted.
     pub(crate) fn involves(&self, name: &WorkerName) -> bool {
         self.votes.iter().any(|vote| vote.by == *name)
     }
 
-    /// Where the first two differ.
+    /// Returns the first difference between the first two votes.
     pub(crate) fn contradiction(&self) -> Option<Contradiction> {
         let [first, second, ..] = self.votes.as_slice() else { return None };
         self.difference(first, second)
     }
 
-    /// Takes the answer of another worker: decided as soon as two agree.
+    /// Adds the vote of another worker. The dispute is decided as soon as two votes agree.
     pub(crate) fn vote(&mut self, vote: Vote) -> Option<Verdict> {
         let agrees = |other: &&Vote| same_bits(&other.solved, &vote.solved);
         let Some(second) = self.votes.iter().find(agrees) else {
@@ -87,7 +88,7 @@ impl Dispute {
         Some(Verdict { believed, liars })
     }
 
-    /// Forgets what a banned worker says; whether anything is left to decide.
+    /// Removes the vote of a banned worker, and returns whether anything is left to decide.
     pub(crate) fn forget(&mut self, name: &WorkerName) -> bool {
         self.votes.retain(|vote| vote.by != *name);
         self.votes.len() > 1
@@ -101,7 +102,7 @@ impl Dispute {
     }
 }
 
-/// Whether two answers are the same to the bit, estimated errors included.
+/// Returns whether two answers agree bit for bit, estimated errors included.
 pub(crate) fn same(a: Solved, b: Solved) -> bool {
     let bits = |solved: Solved| {
         let (code, velocity) = encode(solved.outcome);
@@ -124,7 +125,7 @@ mod tests {
         Vote { by: WorkerName::new("node", process, 0), solved }
     }
 
-    /// The liars, once the answers of workers 1, 2, … are in.
+    /// Checks the workers that are found wrong once the answers of workers 1, 2, … are in.
     fn check(velocities: &[f64], expected: Option<&[u32]>) {
         let indices = Indices { first: 10, count: 2 };
         let votes = [vote(1, velocities[0]), vote(2, velocities[1])];

@@ -1,4 +1,4 @@
-//! Everything that a coordinator does to the world: one closed list.
+//! All effects of a coordinator on the outside world, as one closed list.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,10 +13,10 @@ use crate::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
 use crate::notice::Notice;
 use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
 
-/// Something to do.
+/// An action for the shell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
-    /// Tell a worker that it is attached.
+    /// Confirm to a worker that it is attached.
     Welcome {
         /// The worker.
         worker: WorkerId,
@@ -25,26 +25,26 @@ pub enum Effect {
     },
     /// Send a batch.
     Send {
-        /// To this worker.
+        /// The worker.
         worker: WorkerId,
         /// Number of the batch.
         batch: BatchId,
-        /// What to compute.
+        /// The work.
         work: Work,
     },
-    /// Tell a worker to forget a batch.
+    /// Revoke a batch.
     Revoke {
         /// The worker.
         worker: WorkerId,
         /// The batch.
         batch: BatchId,
     },
-    /// Give a worker a sign of life.
+    /// Send a heartbeat to a worker.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
     },
-    /// Tell a worker to leave when it has answered what it holds.
+    /// Drain a worker: it leaves when it has answered the batches that it holds.
     Drain {
         /// The worker.
         worker: WorkerId,
@@ -53,49 +53,49 @@ pub enum Effect {
     Close {
         /// The worker.
         worker: WorkerId,
-        /// Why.
+        /// The reason.
         reason: CloseReason,
     },
-    /// Make a record durable, then report it.
+    /// Make a record durable, then report it with an event.
     Store(Record),
-    /// Read an evaluation of a job, then report it.
+    /// Read an evaluation of a job, then report it with an event.
     Read {
         /// The job.
         job: JobId,
         /// Number of the evaluation.
         number: u64,
     },
-    /// Forget ended jobs, then report it.
+    /// Delete ended jobs, then report it with an event.
     Prune {
-        /// The request, if a client wants it.
+        /// The request, if a client sent one.
         token: Option<Token>,
         /// The jobs.
         jobs: Vec<JobId>,
     },
     /// Answer a request.
     Answer {
-        /// Which.
+        /// The request.
         token: Token,
-        /// With this.
+        /// The answer.
         answer: Answer,
     },
-    /// Show those who watch a job how it stands.
+    /// Send a snapshot of a job to those who watch it.
     Publish {
         /// The job.
         job: JobId,
-        /// How it stands.
+        /// The snapshot.
         snapshot: JobSnapshot,
     },
-    /// Tell the operator, in the log.
+    /// Write a notice for the operator into the log.
     Note(Notice),
-    /// Say that the store takes nothing any more.
-    Despair {
-        /// What it said last.
+    /// Give up because the store no longer accepts records.
+    GiveUp {
+        /// Its last error.
         error: String,
-        /// For how long it has refused a record.
+        /// Time for which it has refused a record.
         waited: Duration,
     },
-    /// Nothing is left to do: everything stored, every stream closed.
+    /// Stop: everything is stored and every stream is closed.
     Stop,
 }
 
@@ -108,14 +108,14 @@ pub enum Record {
     Evaluation {
         /// The evaluation.
         record: EvaluationRecord,
-        /// Forget those after it: they belong to another path.
+        /// Delete the evaluations stored after it: they belong to another path of the search.
         is_last: bool,
     },
     /// The end of a job.
     End {
-        /// How it ended.
+        /// The end.
         end: EndRecord,
-        /// What its path came to.
+        /// Summary of the path of its search.
         summary: Arc<Summary>,
     },
     /// A worker is banned.
@@ -123,7 +123,7 @@ pub enum Record {
 }
 
 impl Record {
-    /// The job and the name of the record.
+    /// Returns the job and the key of the record.
     pub fn key(&self) -> (JobId, RecordKey) {
         match self {
             Self::Job(record) => (record.job, RecordKey::Job),
@@ -134,16 +134,16 @@ impl Record {
     }
 }
 
-/// Names one record of a job.
+/// Key of a record of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordKey {
     /// The job itself.
     Job,
     /// The evaluation with this number.
     Evaluation(u64),
-    /// Its end.
+    /// The end of the job.
     End,
-    /// The ban with this number, of a worker that was found in it.
+    /// The ban with this number, of a worker that was found in this job.
     Ban(u64),
 }
 
@@ -152,24 +152,24 @@ pub enum RecordKey {
 pub enum Answer {
     /// The job is accepted and durable.
     Submitted(JobId),
-    /// How a job stands.
+    /// Snapshot of a job.
     Snapshot(JobSnapshot),
     /// A page of jobs.
     Page {
         /// Oldest first.
         snapshots: Vec<JobSnapshot>,
-        /// The last of them, if there are more.
+        /// Last job of the page, if there are more.
         more_after: Option<JobId>,
     },
-    /// The job has ended; what it left is in the store.
+    /// The job has ended; its output is in the store.
     Ended(EndRecord),
-    /// These ended jobs are forgotten.
+    /// These ended jobs were deleted.
     Pruned(Vec<JobId>),
-    /// The banned workers, with the time since then.
+    /// The banned workers, with the time since their bans.
     Banned(Vec<(BanRecord, Duration)>),
-    /// The attached workers, and those that went last.
+    /// The attached workers, and those that departed last.
     Workers(ListWorkersResponse),
-    /// How a worker stands.
+    /// Snapshot of a worker.
     Worker(WorkerSnapshot),
     /// The request is refused.
     Refused(Refusal),
@@ -201,15 +201,15 @@ pub enum Refusal {
         /// The job it belongs to.
         job: JobId,
     },
-    /// Too many jobs wait or run.
+    /// Too many jobs are waiting or running.
     #[error(
         "{limit} jobs wait or run already, the most allowed; submit again when some have ended"
     )]
     TooManyJobs {
-        /// Most jobs allowed.
+        /// Maximum number of jobs.
         limit: usize,
     },
-    /// The jobs that wait or run are too large together.
+    /// The specifications of the jobs that are waiting or running are too large together.
     #[error(
         "the specifications of {whose} jobs that wait or run take {held} bytes, with this one's \
          {more} more than the {limit} allowed; submit again when some have ended, or with fewer \
@@ -218,11 +218,11 @@ pub enum Refusal {
     TooMuchQueued {
         /// `this client's` or `all`.
         whose: &'static str,
-        /// What they take already.
+        /// Size of the specifications held already, bytes.
         held: u64,
-        /// What the refused one would take.
+        /// Size of the refused specification, bytes.
         more: u64,
-        /// Most allowed.
+        /// Maximum total size, bytes.
         limit: u64,
     },
     /// The job has not ended.
@@ -234,16 +234,16 @@ pub enum Refusal {
     /// The coordinator is stopping.
     #[error("the coordinator is shutting down; try again when it is back")]
     Draining,
-    /// The store did not forget.
-    #[error("the store does not forget ended jobs, none is removed: {error}")]
+    /// The store could not delete the jobs.
+    #[error("the store cannot delete the ended jobs; none was deleted: {error}")]
     NotPruned {
-        /// What the store said.
+        /// Error of the store.
         error: String,
     },
     /// The store refused the job.
     #[error("the job could not be stored and is not accepted: {error}")]
     Store {
-        /// What the store said.
+        /// Error of the store.
         error: String,
     },
 }

@@ -1,4 +1,4 @@
-//! One evaluation under way: a result for each index, and the indices that nobody computes.
+//! An evaluation under way: a result for each index, and the indices that nobody computes yet.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -13,26 +13,26 @@ use crate::dispute::{self, Dispute, Vote};
 use crate::indices::Indices;
 use crate::worker_name::WorkerName;
 
-/// A batch that is to be computed a second time, by another worker.
+/// A batch that is to be computed a second time by another worker.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Audit {
     /// Its indices, all filled.
     pub(crate) indices: Indices,
-    /// Who computed it.
+    /// The worker that computed them first.
     pub(crate) by: WorkerName,
-    /// Workers that were lost over it.
+    /// Number of workers that were lost over the audit.
     pub(crate) lost: u32,
 }
 
-/// What the store has of an evaluation that is computed.
+/// Contents of the store for an evaluation that is being computed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) enum Before {
-    /// Nothing.
+    /// No record.
     #[default]
     Nothing,
-    /// Something that cannot be read.
+    /// A record that cannot be read.
     Damaged,
-    /// Outcomes, some of them by a worker that was banned.
+    /// Outcomes, some of them from a worker that was banned.
     Stored(Arc<[Outcome]>),
 }
 
@@ -41,39 +41,41 @@ pub(crate) enum Before {
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
-    /// Number of this attempt at it: what was sent in an earlier one means nothing in this.
+    /// Number of this attempt: batches of earlier attempts do not count in this one.
     pub(crate) attempt: u64,
     /// The point.
     pub point: Point,
-    /// What the store has of it.
+    /// Contents of the store for it.
     pub(crate) before: Before,
-    /// What became of each index.
+    /// Result of each index.
     pub(crate) results: Vec<Option<Solved>>,
-    /// How many results there are.
+    /// Number of results that are filled.
     pub(crate) filled: u64,
-    /// Indices to hand out, from the front.
+    /// Indices to be sent, from the front.
     pub(crate) queue: VecDeque<Indices>,
     /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
-    /// they held nothing else; those that wait are in `quarantine`.
+    /// they held nothing else. Those that wait for another attempt are in `quarantine`.
     pub(crate) crashes: BTreeMap<u64, Crashes>,
-    /// Quarantined indices that wait to be handed out, each alone to a worker that holds nothing else.
+    /// Quarantined indices that wait to be sent, each alone to a worker that holds nothing else.
     pub(crate) quarantine: VecDeque<u64>,
-    /// Every worker whose answers are among the results.
+    /// All workers whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Place in `workers` of the worker that each result is of; means nothing while there is none.
+    /// Position in `workers` of the worker that gave each result; meaningless while the result is
+    /// empty.
     owners: Vec<u32>,
-    /// Batches to be computed a second time.
+    /// Audits that have not been sent yet.
     pub(crate) audits: VecDeque<Audit>,
-    /// How many batches are being computed a second time.
+    /// Number of audits that are being computed.
     pub(crate) audits_out: usize,
-    /// Answers that differ.
+    /// Undecided disputes.
     pub(crate) disputes: Vec<Dispute>,
-    /// A worker was lost over it. Nobody is risked for it any more before the search asks for it.
-    pub(crate) lost_over: bool,
+    /// A worker was lost over it. While it is speculative, no further worker is risked for it until
+    /// the search asks for it.
+    pub(crate) has_crashed_worker: bool,
 }
 
 impl Evaluation {
-    /// The attempt with number `attempt` at an evaluation of which nothing is known.
+    /// Returns attempt `attempt` at an evaluation without any results.
     pub fn new(number: u64, attempt: u64, point: Point, realizations: u64) -> Self {
         let length = usize::try_from(realizations).unwrap_or(usize::MAX);
         Self {
@@ -91,16 +93,16 @@ impl Evaluation {
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
-            lost_over: false,
+            has_crashed_worker: false,
         }
     }
 
-    /// Realizations that have an outcome.
+    /// Returns the number of realizations that have an outcome.
     pub fn filled(&self) -> u64 {
         self.filled
     }
 
-    /// Realizations that nobody computes, quarantined ones aside.
+    /// Returns the number of realizations that wait to be sent, without the quarantined ones.
     pub fn queued(&self) -> u64 {
         self.queue.iter().map(|indices| indices.count).sum()
     }
@@ -117,7 +119,7 @@ impl Evaluation {
         Some(taken)
     }
 
-    /// Puts indices back that a worker was told to forget, before all others.
+    /// Puts the indices of a revoked batch back at the front of the queue.
     pub fn put_back(&mut self, indices: Indices) {
         match self.queue.front_mut() {
             Some(front) if front.first == indices.end() => {
@@ -128,7 +130,7 @@ impl Evaluation {
         }
     }
 
-    /// Puts the indices of a lost worker back, in halves, before all others.
+    /// Puts the indices of a lost worker back at the front of the queue, in halves.
     pub fn put_back_in_halves(&mut self, indices: Indices) {
         let half = indices.count.div_ceil(2);
         let rest = Indices { first: indices.first + half, count: indices.count - half };
@@ -138,18 +140,18 @@ impl Evaluation {
         self.queue.push_front(Indices { first: indices.first, count: half });
     }
 
-    /// Puts one index that was alone in a batch of a lost worker into quarantine.
+    /// Puts an index that was alone in a batch of a lost worker into quarantine.
     pub(crate) fn quarantine(&mut self, index: u64, loss: &LostWorker) {
         self.count_crash(index, loss);
         self.quarantine.push_back(index);
     }
 
-    /// A worker was lost over one index, of which another worker holds a copy.
+    /// Counts the loss of a worker over one index of which another worker holds a duplicate.
     pub(crate) fn count_crash(&mut self, index: u64, loss: &LostWorker) {
         self.crashes.entry(index).or_default().add(loss);
     }
 
-    /// A worker is back: nothing that it held is to blame.
+    /// Forgets the crashes of a worker that is back: nothing that it held is to blame.
     pub(crate) fn forget_crashes(&mut self, name: &WorkerName) {
         let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.crashes);
         for crashes in self.crashes.values_mut().chain(judged) {
@@ -176,8 +178,9 @@ impl Evaluation {
         }
     }
 
-    /// Compares an answer of `by` with what fills the results of `indices`: what differs, from the
-    /// first difference on as far as one worker filled the results. Empty results agree.
+    /// Compares an answer of `by` with the results of `indices`. Returns the difference, from the
+    /// first differing index to the last consecutive one that the same worker filled. Empty results
+    /// count as agreement.
     pub(crate) fn compare(
         &self,
         indices: Indices,
@@ -201,13 +204,13 @@ impl Evaluation {
         Some((indices, [Vote { by: owner, solved: earlier }, later]))
     }
 
-    /// Who filled the result of an index.
+    /// Returns the worker that filled the result of an index.
     pub(crate) fn owner(&self, index: u64) -> Option<WorkerName> {
         let owner = self.owners.get(usize::try_from(index).ok()?)?;
         self.workers.get(usize::try_from(*owner).ok()?).cloned()
     }
 
-    /// Whether every index has an outcome, and nothing about them is to be checked any more.
+    /// Returns whether every index has an outcome and no check of them is pending.
     pub(crate) fn is_settled(&self) -> bool {
         self.filled >= self.results.len() as u64
             && self.audits.is_empty()
@@ -215,8 +218,8 @@ impl Evaluation {
             && self.disputes.is_empty()
     }
 
-    /// Whether what the store has after it cannot be on its path: the store has other outcomes of it
-    /// than `outcomes`, or none.
+    /// Returns whether the evaluations stored after this one cannot be on its path, because the
+    /// store has outcomes other than `outcomes` for it, or none.
     pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
@@ -229,7 +232,8 @@ impl Evaluation {
         }
     }
 
-    /// All outcomes in index order and the estimated errors of the successes, once it is settled.
+    /// Returns all outcomes in index order and the estimated errors of the successes, once it is
+    /// settled.
     pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
         if !self.is_settled() {
             return None;

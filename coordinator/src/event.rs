@@ -1,4 +1,4 @@
-//! Everything that can happen to a coordinator: one closed list.
+//! All events of a coordinator, as one closed list.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,23 +11,23 @@ use crate::effect::RecordKey;
 use crate::ids::{BatchId, JobId, Token, WorkerId};
 use crate::store::EvaluationRecord;
 
-/// Something that happened.
+/// An event.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// Time went by.
+    /// Time has passed.
     Tick,
-    /// A client wants something; its answer goes to `token`.
+    /// A client sent a request; its answer goes to `token`.
     Requested {
-        /// Where the answer goes.
+        /// Destination of the answer.
         token: Token,
-        /// What it wants.
+        /// The request.
         request: Request,
     },
     /// A worker introduced itself on a new stream.
     Hello {
         /// Number of the stream.
         worker: WorkerId,
-        /// Who it is.
+        /// Its introduction.
         hello: Hello,
     },
     /// A worker answered a batch.
@@ -41,21 +41,21 @@ pub enum Event {
         /// Computing time, s, as the worker measured it.
         elapsed_s: f64,
     },
-    /// A worker is alive.
+    /// A worker sent a heartbeat.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker wants no more batches.
+    /// A worker accepts no more batches.
     WorkerDrains {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker sent what cannot be understood.
+    /// A worker sent an invalid message.
     Misbehaved {
         /// The worker.
         worker: WorkerId,
-        /// What is wrong with it.
+        /// The reason for closing its stream.
         reason: CloseReason,
     },
     /// A worker's stream ended.
@@ -67,114 +67,114 @@ pub enum Event {
     Stored {
         /// The job.
         job: JobId,
-        /// Which record.
+        /// The record.
         key: RecordKey,
     },
     /// A record of a job could not be stored.
     StoreFailed {
         /// The job.
         job: JobId,
-        /// Which record.
+        /// The record.
         key: RecordKey,
-        /// Why, for people.
+        /// Error text for people.
         error: String,
     },
-    /// The store was read for a job.
+    /// The store has finished a read for a job.
     Read {
         /// The job.
         job: JobId,
         /// Number of the evaluation.
         number: u64,
-        /// What the store has, or why it was not read.
-        found: Result<Option<EvaluationRecord>, Unread>,
+        /// The stored evaluation, if there is one, or why it was not read.
+        found: Result<Option<EvaluationRecord>, ReadFailure>,
     },
-    /// Ended jobs are forgotten, or cannot be.
+    /// Ended jobs were deleted, or could not be.
     Pruned {
-        /// The request, if a client wanted it.
+        /// The request, if a client sent one.
         token: Option<Token>,
         /// The jobs.
         jobs: Vec<JobId>,
-        /// Why they cannot be forgotten, for people.
+        /// Error text for people, if they could not be deleted.
         outcome: Result<(), String>,
     },
-    /// The coordinator is to stop.
+    /// The coordinator shall stop.
     Drain,
 }
 
 /// Why an evaluation was not read from the store.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unread {
-    /// It may be read another time.
+pub enum ReadFailure {
+    /// It may be readable at another time.
     Refused {
-        /// Why, for people.
+        /// Error text for people.
         error: String,
     },
-    /// What is stored of it is damaged, and stays so.
+    /// The stored record is permanently damaged.
     Damaged,
 }
 
-/// What a client wants.
+/// A client's request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
-    /// A job computed. The specification has passed its check.
+    /// Submit a job. The specification has passed its checks.
     Submit {
-        /// What to compute.
+        /// The specification.
         specification: Arc<JobSpecification>,
         /// Identifier of the request; empty if it has none.
         request_id: String,
-        /// Who wants it, as the client says.
+        /// Name of the client, as it gave it.
         client: String,
-        /// Rank among the client's jobs.
+        /// Priority among the client's jobs.
         priority: u32,
-        /// What people call it; may be empty.
+        /// Display name; may be empty.
         name: String,
     },
-    /// A snapshot.
+    /// Get a snapshot of a job.
     Get(JobId),
-    /// Snapshots of jobs after one, oldest first.
+    /// List snapshots of the jobs after a given one, oldest first.
     List {
-        /// The last job of the page before.
+        /// Last job of the previous page.
         after: Option<JobId>,
-        /// Most jobs to list.
+        /// Maximum number of jobs to list.
         limit: usize,
     },
-    /// A job ended before its time.
+    /// Cancel a job.
     Cancel(JobId),
-    /// What an ended job left.
+    /// Fetch the output of an ended job.
     Fetch(JobId),
-    /// Ended jobs forgotten.
+    /// Delete ended jobs.
     Prune(Retention),
-    /// The workers that were found to compute wrongly.
+    /// List the workers that were banned for wrong answers.
     Banned,
-    /// The attached workers, and those that went last.
+    /// List the attached workers, and those that departed last.
     Workers,
-    /// A worker sent away when it has answered what it holds.
+    /// Drain a worker: it leaves when it has answered the batches that it holds.
     DrainWorker(WorkerId),
 }
 
-/// Which ended jobs are kept: one that meets both conditions is forgotten.
+/// Rules for keeping ended jobs: a job is deleted only if neither rule keeps it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Retention {
-    /// Those that ended at most so long ago are kept.
+    /// Jobs that ended at most this long ago are kept.
     pub keep_for: Option<Duration>,
-    /// So many that ended last are kept.
+    /// This many of the jobs that ended last are kept.
     pub keep_last: Option<u64>,
 }
 
-/// How a worker introduces itself.
+/// Introduction of a worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hello {
     /// Version of its program.
     pub version: String,
     /// Fingerprint of its numerics.
     pub fingerprint: String,
-    /// How many realizations it computes at the same time: threads of a processor, or what another
-    /// device has. The field of the wire is called `threads`.
+    /// Number of realizations that it computes at the same time: threads of a processor, or the
+    /// equivalent of another device. The field of the message is called `threads`.
     pub slots: u32,
     /// Host name, for people.
     pub host: String,
     /// Process id, for people.
     pub process: u32,
-    /// A number that the process drew at its start, 0 if it told none.
+    /// Random number that the process drew at its start, 0 if it sent none.
     pub instance: u64,
 }

@@ -1,32 +1,32 @@
-//! A coordinator that cannot go on: whoever runs it is told, once.
+//! Reports once, to the process that runs a coordinator, that it cannot continue.
 
 use std::time::Duration;
 
 use thiserror::Error;
 use tokio::sync::watch;
 
-/// Why a running coordinator cannot go on.
+/// Reason why a running coordinator cannot continue.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Failed {
-    /// The task that owns the jobs ended unasked.
-    #[error("the coordinator's core ended unasked; {START_AGAIN}")]
+    /// The core task ended unexpectedly.
+    #[error("the coordinator's core ended unexpectedly; {START_AGAIN}")]
     Core,
-    /// The server of its port ended unasked.
-    #[error("the coordinator's server ended unasked; {START_AGAIN}")]
+    /// The server of its port ended unexpectedly.
+    #[error("the coordinator's server ended unexpectedly; {START_AGAIN}")]
     Server,
-    /// The thread that writes the store ended unasked.
-    #[error("the thread of the coordinator's store ended unasked; {START_AGAIN}")]
+    /// The thread of the store ended unexpectedly.
+    #[error("the thread of the coordinator's store ended unexpectedly; {START_AGAIN}")]
     Store,
-    /// The store takes no record any more.
+    /// The store no longer accepts records.
     #[error(
         "the store has refused a record for {} s: {error}; make room or repair it, then \
          {START_AGAIN}",
         waited.as_secs()
     )]
     StoreRefuses {
-        /// What the store said last.
+        /// Last error of the store.
         error: String,
-        /// For how long.
+        /// Time for which it has refused a record.
         waited: Duration,
     },
 }
@@ -36,16 +36,16 @@ const START_AGAIN: &str = "start it again: every job continues from its last sto
 #[derive(Debug)]
 enum Health {
     Well,
-    /// Somebody wants it to end: that parts of it end is no failure any more.
+    /// A shutdown has been requested: the end of a part is no failure from now on.
     Stopping,
     Failed(Failed),
 }
 
-/// Where the parts of a coordinator tell that it cannot go on.
+/// Shared channel on which the parts of a coordinator report that it cannot continue.
 #[derive(Debug, Clone)]
 pub(crate) struct Failing(watch::Sender<Health>);
 
-/// Held by a part of a coordinator for as long as it lives; tells of its end, by panic or not.
+/// Held by a part of a coordinator while it runs; reports its end, by panic or otherwise.
 #[derive(Debug)]
 pub(crate) struct Guard {
     part: Failed,
@@ -57,12 +57,12 @@ impl Failing {
         Self(watch::Sender::new(Health::Well))
     }
 
-    /// The coordinator cannot go on.
+    /// Reports that the coordinator cannot continue.
     pub(crate) fn tell(&self, failed: Failed) {
         self.leave_well(Health::Failed(failed));
     }
 
-    /// The coordinator is about to be stopped.
+    /// Notes that the coordinator is about to be stopped.
     pub(crate) fn disarm(&self) {
         self.leave_well(Health::Stopping);
     }
@@ -71,7 +71,7 @@ impl Failing {
         Guard { part, failing: self.clone() }
     }
 
-    /// The first that was told; never if there is none.
+    /// Returns the first failure; never completes if there is none.
     pub(crate) fn first(&self) -> impl Future<Output = Failed> + Send + use<> {
         let mut health = self.0.subscribe();
         async move {
@@ -81,14 +81,14 @@ impl Failing {
             {
                 return failed.clone();
             }
-            // Nobody is left who could tell.
+            // No sender is left that could report a failure.
             std::future::pending().await
         }
     }
 
     fn leave_well(&self, next: Health) {
         self.0.send_if_modified(|health| {
-            // The first failure is the cause of the others.
+            // The first failure is the cause of all others.
             let well = matches!(health, Health::Well);
             if well {
                 *health = next;

@@ -1,4 +1,4 @@
-//! Why a job fails for other reasons than its search.
+//! Failures of a job that are not caused by its search.
 
 use osteon_common::outcome::{Solved, encode};
 use osteon_common::parameters::Point;
@@ -11,7 +11,7 @@ use crate::dispute::Contradiction;
 /// A failure of a job.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Failure {
-    /// Two answers for one index differ, and there is nobody to decide.
+    /// Two answers for one index differ, and no third worker can decide between them.
     #[error(
         "integrity error: realization {} at the point {:?} is {} by {} and {} by {}; one of them \
          computes wrongly, and no third worker was there to decide: attach three workers and \
@@ -26,16 +26,16 @@ pub enum Failure {
         /// The point.
         point: Point,
     },
-    /// Workers vanish over one realization.
+    /// Workers are lost over one realization.
     #[error(
-        "realization {index} was alone on {workers} workers that vanished ({hosts}); to reproduce \
+        "realization {index} was alone on {workers} workers that were lost ({hosts}); to reproduce \
          it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
          {case}"
     )]
-    LethalRealization {
+    PoisonRealization {
         /// Index of the realization.
         index: u64,
-        /// How many were lost.
+        /// Number of lost workers.
         workers: usize,
         /// Their hosts.
         hosts: String,
@@ -45,7 +45,7 @@ pub enum Failure {
     /// The stored evaluations are not those of the job's search.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// A stored evaluation is gone.
+    /// A stored evaluation is missing.
     #[error("the store has no evaluation {number} of this job any more; submit it again")]
     Missing {
         /// Number of the evaluation.
@@ -54,17 +54,17 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Of which kind it is.
+    /// Returns the kind of the failure.
     pub fn kind(&self) -> JobFailure {
         match self {
             Self::Contradiction { .. } => JobFailure::IntegrityError,
-            Self::LethalRealization { .. } => JobFailure::LostRealization,
+            Self::PoisonRealization { .. } => JobFailure::LostRealization,
             Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
         }
     }
 }
 
-/// An answer, for people.
+/// Describes an answer, for people.
 pub(crate) fn shown(solved: Solved) -> String {
     match solved.outcome {
         Ok(velocity) => format!(

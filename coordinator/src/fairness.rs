@@ -1,28 +1,28 @@
-//! Who gets the next batch: clients share the workers evenly, whatever the number of their jobs.
+//! Fair shares: clients share the workers evenly, whatever the number of their jobs.
 //!
-//! What counts is computing time of slots. Who has had least of it is served next; a client
-//! that comes begins with what the least of the others has had, so that it neither waits nor
+//! Shares are measured in computing time of slots. The client with the least of it is served next;
+//! a client that begins starts from the smallest share of the others, so that it neither waits nor
 //! catches up on the past.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// No batch is charged more than this, whatever a worker says.
+/// Upper limit for the charge of a batch, whatever the worker reports.
 const CHARGE_MAX: Duration = Duration::from_secs(86_400);
 
-/// Computing time that each client with a job under way has had.
+/// Computing time received by each client with a job under way.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(BTreeMap<String, Share>);
 
 #[derive(Debug, Default)]
 struct Share {
-    /// How many of its jobs are under way.
+    /// Number of its jobs under way.
     jobs: usize,
     used: Duration,
 }
 
 impl Shares {
-    /// A job of `client` begins.
+    /// Notes that a job of `client` begins.
     pub(crate) fn begin(&mut self, client: &str) {
         if let Some(share) = self.0.get_mut(client) {
             share.jobs += 1;
@@ -32,7 +32,7 @@ impl Shares {
         self.0.insert(client.to_owned(), Share { jobs: 1, used });
     }
 
-    /// A job of `client` is not under way any more.
+    /// Notes that a job of `client` is no longer under way.
     pub(crate) fn end(&mut self, client: &str) {
         if let Some(share) = self.0.get_mut(client) {
             share.jobs = share.jobs.saturating_sub(1);
@@ -42,24 +42,24 @@ impl Shares {
         }
     }
 
-    /// How many jobs of `client` are under way.
+    /// Returns the number of jobs of `client` that are under way.
     pub(crate) fn jobs(&self, client: &str) -> usize {
         self.0.get(client).map_or(0, |share| share.jobs)
     }
 
-    /// What `client` has had.
+    /// Returns the computing time that `client` has received.
     pub(crate) fn used(&self, client: &str) -> Duration {
         self.0.get(client).map_or(Duration::ZERO, |share| share.used)
     }
 
-    /// Charges `client` for what it was given.
+    /// Charges `client` for the expected time of a batch.
     pub(crate) fn charge(&mut self, client: &str, time: Duration) {
         if let Some(share) = self.0.get_mut(client) {
             share.used += time;
         }
     }
 
-    /// Corrects a charge when it is known how long it took.
+    /// Corrects a charge when the actual time is known.
     pub(crate) fn correct(&mut self, client: &str, charged: Duration, took: Duration) {
         if let Some(share) = self.0.get_mut(client) {
             share.used = (share.used + took).saturating_sub(charged);
@@ -67,7 +67,7 @@ impl Shares {
     }
 }
 
-/// Time of `slots` for `seconds`, within reason.
+/// Returns the computing time of `slots` slots over `seconds`, limited to [0, `CHARGE_MAX`].
 pub(crate) fn slot_time(seconds: f64, slots: u32) -> Duration {
     let time = Duration::try_from_secs_f64(seconds * f64::from(slots));
     time.unwrap_or(CHARGE_MAX).min(CHARGE_MAX)

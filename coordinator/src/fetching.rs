@@ -1,4 +1,5 @@
-//! Sending what a job left: a few at a time, to those who read, and as it is read.
+//! Sends the output of an ended job: to a few clients at a time, only as fast as they read, and
+//! while it is being read from the store.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -18,21 +19,21 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use crate::ids::JobId;
-use crate::leftover::{Left, ReadError, Reading, Reply};
+use crate::job_output::{Left, ReadError, Reading, Reply};
 use crate::store::EndRecord;
 use crate::store_thread::Command;
 
-/// Messages that are made before they are read.
+/// Number of messages that are prepared before they are read.
 const AHEAD: usize = 2;
-/// Rows of the history in one message.
+/// Maximum number of history rows in one message.
 const HISTORY_BLOCK_ROWS: usize = 4096;
-/// While a part is read or computed a block of the history without rows comes this often.
+/// Interval of empty history blocks, sent as heartbeats while a part is read or computed.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
-/// Realizations in one message.
+/// Maximum number of realizations in one message.
 const REALIZATION_BLOCK: usize = 65_536;
 
-/// Asks the store for one record. The store is let go of at once: who waits for a record does not keep a
-/// coordinator from stopping.
+/// Requests one record from the store. The channel to the store is released at once, so that a
+/// pending read does not keep a coordinator from stopping.
 async fn read<T>(
     store: &mpsc::WeakSender<Command>,
     what: impl FnOnce(Reply<T>) -> Reading,
@@ -60,7 +61,7 @@ fn stopped() -> Status {
     Status::unavailable("the coordinator has stopped; try again when it is back")
 }
 
-/// Reads all that an ended job left but the outcomes.
+/// Reads the output of an ended job except its outcomes.
 async fn left(store: &mpsc::WeakSender<Command>, end: EndRecord) -> Result<Left, Status> {
     let job = end.job;
     let record = read(store, |reply| Reading::Job(job, reply)).await?;
@@ -68,9 +69,9 @@ async fn left(store: &mpsc::WeakSender<Command>, end: EndRecord) -> Result<Left,
     Ok(Left { end, specification: record.specification, summary })
 }
 
-/// Sends one specification, one result, history blocks, realization blocks; where the data are groups
-/// the result and the realization blocks of each. Read and made as they are sent, and what is computed
-/// for them on a thread of its own.
+/// Sends one specification, one result, history blocks and realization blocks; where the data are
+/// groups, also the result and the realization blocks of each. The parts are read and made while
+/// they are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
     store: mpsc::WeakSender<Command>,
     end: EndRecord,
@@ -110,9 +111,9 @@ fn outcomes_of(best: Option<BestPoint>) -> Vec<Outcome> {
     best.map(|best| best.outcomes).unwrap_or_default()
 }
 
-/// What `compute` makes of what a job left, on a thread that may take its time. It cannot be stopped, so
-/// it keeps the place of its fetch until it has ended: who goes and comes again starts no more of them
-/// than there are places.
+/// Runs `compute` on the output of a job, on a thread that may block. The thread cannot be stopped,
+/// so it holds the permit of its fetch until it ends: clients that disconnect and come back cannot
+/// start more of these threads than there are permits.
 async fn computed<T: Send + 'static>(
     left: &Arc<Left>,
     reader: &Reader,
@@ -140,19 +141,19 @@ async fn send_realizations(
     Ok(())
 }
 
-/// Who reads a fetch.
+/// The reading end of a fetch.
 pub(crate) struct Reader {
     parts: mpsc::Sender<Result<FetchResponse, Status>>,
     until: Instant,
-    /// Its place among the fetches.
+    /// Its concurrency permit.
     place: Arc<dyn Send + Sync>,
 }
 
-/// Why no more is sent.
+/// Reason for ending the stream.
 pub(crate) enum Stop {
     /// The reader is gone.
     Gone,
-    /// The reader is told so.
+    /// The reader receives this status.
     Told(Status),
 }
 
@@ -163,7 +164,7 @@ impl From<Status> for Stop {
 }
 
 impl Reader {
-    /// Hands over a part, as soon as those before it are read.
+    /// Sends a part as soon as the parts before it have been read.
     pub(crate) async fn send(&self, part: Part) -> Result<(), Stop> {
         let patience = patience().min(self.until.saturating_duration_since(Instant::now()));
         let message = Ok(FetchResponse { part: Some(part) });
@@ -174,8 +175,8 @@ impl Reader {
         }
     }
 
-    /// Waits for what `work` reads or computes, until the fetch has taken too long or the reader has
-    /// gone. Meanwhile the reader, who gives up a silent coordinator, gets signs of life.
+    /// Waits for `work`, until the fetch has taken too long or the reader has gone. Heartbeats are
+    /// sent meanwhile, because the reader gives up on a silent coordinator.
     async fn kept_waiting<T>(
         &self,
         work: impl Future<Output = Result<T, Status>>,
@@ -193,15 +194,15 @@ impl Reader {
                 return Err(Stop::Told(too_slow()));
             }
             let sign = Part::History(HistoryBlock::default());
-            // Who has parts to read already needs none.
+            // A reader that still has parts to read needs no heartbeat.
             drop(self.parts.try_send(Ok(FetchResponse { part: Some(sign) })));
         }
     }
 }
 
-/// The parts that `produce` sends as a stream. Whoever takes nothing for a while, or takes too long for
-/// all, gets nothing more, so that what the job left, and its `place` among the fetches, are not held for
-/// ever.
+/// Returns the parts that `produce` sends as a stream. A reader that reads nothing for a while, or
+/// takes too long in all, receives no more parts, so that the output of the job and the permit
+/// `place` are not held indefinitely.
 pub(crate) fn paced<F>(
     place: impl Send + Sync + 'static,
     produce: impl FnOnce(Reader) -> F,
@@ -214,10 +215,10 @@ where
     let until = Instant::now() + Duration::from_secs(FETCH_S_MAX);
     let producing = produce(Reader { parts, until, place: Arc::new(place) });
     tokio::spawn(async move {
-        // The reader's place ends with it.
+        // The reader's permit is released with it.
         let stopped = producing.await;
         if let Err(Stop::Told(status)) = stopped {
-            // The reader may be gone by now.
+            // The reader may have gone by now.
             drop(told.send(status));
         }
     });
@@ -253,9 +254,9 @@ mod tests {
     use tonic::Code;
 
     use super::*;
-    use crate::leftover::tests::ended;
+    use crate::job_output::tests::ended;
 
-    /// A fetch of so many parts.
+    /// Returns a fetch of `count` parts.
     fn parts(
         count: usize,
         place: OwnedSemaphorePermit,
@@ -290,7 +291,7 @@ mod tests {
     async fn who_does_not_read_gives_the_place_back_and_is_told() {
         let places = Arc::new(Semaphore::new(1));
         let stream = parts(10, place(&places).await);
-        // Comes only when the first one has lost its place.
+        // A permit is available only when the first fetch has lost its own.
         drop(place(&places).await);
         let read: Vec<_> = stream.collect().await;
         assert_eq!(read.len(), AHEAD + 1);
@@ -376,7 +377,7 @@ mod tests {
         assert_eq!(places.available_permits(), 1);
     }
 
-    /// Lets time pass until the stream has something.
+    /// Advances time until the stream has an item.
     async fn next(
         stream: &mut (impl Stream<Item = Result<FetchResponse, Status>> + Unpin),
     ) -> Option<Result<FetchResponse, Status>> {
@@ -384,7 +385,7 @@ mod tests {
             if let Some(next) = stream.next().now_or_never() {
                 return next;
             }
-            // While a thread computes, a paused clock does not move by itself.
+            // While a thread computes, a paused clock does not advance by itself.
             advance(SIGN_OF_LIFE / 4).await;
         }
         panic!("nothing came");

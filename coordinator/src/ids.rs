@@ -1,4 +1,4 @@
-//! Identifiers, each of its own type so that none is taken for another.
+//! Identifiers, each of its own type so that they cannot be confused.
 
 use std::fmt;
 
@@ -17,19 +17,20 @@ macro_rules! id {
 }
 
 id! {
-    /// A job; grows, survives restarts, never used twice in one store.
+    /// A job; increases, survives restarts, never used twice in one store.
     JobId
 }
 id! {
-    /// One stay of a worker, that is one stream; grows, unique for the life of the coordinator.
+    /// One stay of a worker, that is, one stream; increases, unique within a run of the
+    /// coordinator.
     WorkerId
 }
 id! {
-    /// A lease; grows with every attachment.
+    /// A lease; increases with every attachment.
     LeaseId
 }
 id! {
-    /// A batch; grows, unique for the life of the coordinator.
+    /// A batch; increases, unique within a run of the coordinator.
     BatchId
 }
 id! {
@@ -38,7 +39,7 @@ id! {
 }
 
 impl JobId {
-    /// The job that a user's text names, if it can be one.
+    /// Parses the identifier of a job from a user's text; `None` if it cannot be one.
     pub fn parse(text: &str) -> Option<Self> {
         text.parse().ok().map(Self)
     }

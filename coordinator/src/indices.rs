@@ -1,16 +1,16 @@
-//! Which realizations of an evaluation a batch is about.
+//! Ranges of realizations of an evaluation.
 
 /// Consecutive indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Indices {
-    /// The first.
+    /// The first index.
     pub first: u64,
-    /// How many, at least one.
+    /// Number of indices, at least one.
     pub count: u64,
 }
 
 impl Indices {
-    /// The index after the last.
+    /// Returns the index after the last.
     pub fn end(self) -> u64 {
         self.first + self.count
     }

@@ -1,4 +1,4 @@
-//! A job as the coordinator knows it: how far it is, and what is left of one that has ended.
+//! A job in the coordinator: its progress, and the summary that remains when it has ended.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -10,8 +10,8 @@ use prost::Message as _;
 
 use crate::evaluation::Evaluation;
 use crate::ids::{BatchId, Token};
-use crate::pace::Pace;
 use crate::rate::Rate;
+use crate::realization_time::RealizationTime;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 use crate::worker_name::WorkerName;
 use osteon_search::Search;
@@ -20,41 +20,42 @@ use osteon_search::Search;
 #[derive(Debug)]
 pub(crate) struct Job {
     pub(crate) record: JobRecord,
-    /// Digest of its specification: of two submissions of one request.
+    /// Digest of its specification, to compare two submissions with the same request id.
     pub(crate) identity: Identity,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// Speculative evaluations of points that its search may ask for next.
     pub(crate) speculation: Speculation,
-    /// How many evaluations the store has of it; those that the search was not told are read
-    /// before it goes on.
+    /// Number of its evaluations in the store. Those that the search has not received yet are read
+    /// before it continues.
     pub(crate) stored: u64,
-    /// Everybody whose answers are in evaluations that the search was told.
+    /// All workers whose answers are in evaluations that the search has received.
     pub(crate) workers: BTreeSet<WorkerName>,
-    /// Its search is to be restarted, when what is being stored is stored.
+    /// Its search is restarted as soon as the record that is being stored is durable.
     pub(crate) restart_pending: bool,
-    /// An evaluation was damaged in the store, and computed again.
+    /// An evaluation was damaged in the store and has been computed again.
     pub(crate) recomputed: bool,
-    /// A client wants it ended as soon as what is being stored is stored.
+    /// A client has cancelled it; it ends as soon as the record that is being stored is durable.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
-    /// How long its realizations take.
-    pub(crate) pace: Pace,
-    /// The newest duplicate of an overdue batch of it.
-    pub(crate) scout: Option<BatchId>,
-    /// Sequence number of its last snapshot that was published.
+    /// Duration of its realizations.
+    pub(crate) pace: RealizationTime,
+    /// The newest duplicate of one of its overdue batches.
+    pub(crate) newest_overdue_duplicate: Option<BatchId>,
+    /// Sequence number of its last published snapshot.
     pub(crate) sequence: u64,
-    /// When it last got an answer, or began, or was accepted.
+    /// Time of its last answer, its beginning or its acceptance, whichever was last.
     pub(crate) progressed: Duration,
-    /// Requests that are answered when the present record is durable: submissions at first,
+    /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
     pub(crate) tokens: Vec<Token>,
-    /// The store's refusal of the present record.
-    pub(crate) trouble: Option<Trouble>,
+    /// The store's refusal of the current record.
+    pub(crate) store_trouble: Option<StoreRetry>,
 }
 
 impl Job {
-    /// A job of which nothing is computed here yet, with so many stored evaluations.
+    /// Returns a job without computed results in this process, with `stored` evaluations in the
+    /// store.
     pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
         Self {
             identity: identity(&record.specification),
@@ -68,16 +69,16 @@ impl Job {
             recomputed: false,
             cancelled: false,
             rate: Rate::default(),
-            pace: Pace::default(),
-            scout: None,
+            pace: RealizationTime::default(),
+            newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,
             tokens: Vec::new(),
-            trouble: None,
+            store_trouble: None,
         }
     }
 
-    /// The evaluation that the search asked for, while it is under way.
+    /// Returns the evaluation that the search asked for, while it is under way.
     pub(crate) fn evaluation(&self) -> Option<&Evaluation> {
         match &self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
@@ -85,7 +86,7 @@ impl Job {
         }
     }
 
-    /// All evaluations under way, that which the search asked for first.
+    /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
         self.evaluation().into_iter().chain(&self.speculation.evaluations)
     }
@@ -100,25 +101,25 @@ impl Job {
     }
 }
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Debug)]
 pub(crate) enum Stage {
-    /// Its record is being stored; no client has heard of it.
+    /// Its record is being stored; no client has had an answer.
     Accepting,
     /// It waits for its turn.
     Waiting,
     /// A stored evaluation is being read for its search.
     Replaying {
-        /// The store was asked for it.
+        /// The store has received the request to read it.
         asked: bool,
     },
-    /// Its evaluation is handed out.
+    /// Batches of its evaluation are sent to workers.
     Computing(Evaluation),
     /// A complete evaluation is being stored.
     Storing {
         /// The evaluation.
         record: EvaluationRecord,
-        /// Those after it in the store belong to another path.
+        /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
     /// Its end is being stored.
@@ -132,41 +133,41 @@ impl Stage {
     }
 }
 
-/// Points that a search may ask for next. Nothing of them is stored or shown.
+/// Points that a search may ask for next. They are neither stored nor shown.
 #[derive(Debug, Default)]
 pub(crate) struct Speculation {
-    /// The points, the likeliest first.
+    /// Candidate points, most likely first.
     pub(crate) candidates: Vec<Point>,
-    /// The evaluations that are begun of them, in the order of their beginning.
+    /// Evaluations of candidates that have begun, in the order of their beginning.
     pub(crate) evaluations: Vec<Evaluation>,
 }
 
 /// A refusal of the store.
 #[derive(Debug)]
-pub(crate) struct Trouble {
+pub(crate) struct StoreRetry {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
     pub(crate) error: String,
-    /// It is on its way again.
+    /// The record is on its way to the store again.
     pub(crate) on_its_way: bool,
 }
 
-/// A job whose end is durable: what a list shows of it.
+/// A job whose end is durable, as far as lists show it.
 #[derive(Debug)]
 pub(crate) struct EndedJob {
     pub(crate) request: Option<RequestName>,
     pub(crate) identity: Identity,
     pub(crate) kind: JobKind,
-    /// Who submitted it.
+    /// The client that submitted it.
     pub(crate) client: String,
-    /// What people call it; may be empty.
+    /// Display name; may be empty.
     pub(crate) name: String,
-    /// Its rank among the jobs of its client.
+    /// Priority among the jobs of its client.
     pub(crate) priority: u32,
     pub(crate) max_evaluations: u64,
-    /// Realizations of each evaluation.
+    /// Number of realizations of each evaluation.
     pub(crate) realizations: u64,
-    /// When it was accepted, since the Unix epoch.
+    /// Time of acceptance, since the Unix epoch.
     pub(crate) accepted: Duration,
     /// Sequence number of its last snapshot.
     pub(crate) sequence: u64,
@@ -174,7 +175,7 @@ pub(crate) struct EndedJob {
 }
 
 impl EndedJob {
-    /// What is kept of a job that ended, after a snapshot with number `sequence`.
+    /// Returns the summary of an ended job whose last snapshot has number `sequence`.
     pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
         let specification = &record.specification;
         Self {
@@ -193,7 +194,7 @@ impl EndedJob {
     }
 }
 
-/// Names the request that submitted a job: ids of different clients have nothing in common.
+/// Name of the request that submitted a job: ids of different clients are independent.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct RequestName {
     client: String,
@@ -201,12 +202,13 @@ pub(crate) struct RequestName {
 }
 
 impl RequestName {
-    /// The request `id` of `client`; `None` without an id: then it is never repeated.
+    /// Returns the name of request `id` of `client`; `None` without an id, since such a request is
+    /// never repeated.
     pub(crate) fn new(client: &str, id: &str) -> Option<Self> {
         (!id.is_empty()).then(|| Self { client: client.to_owned(), id: id.to_owned() })
     }
 
-    /// That which submitted a job.
+    /// Returns the name of the request that submitted a job.
     pub(crate) fn of(record: &JobRecord) -> Option<Self> {
         Self::new(&record.client, &record.request_id)
     }
@@ -215,14 +217,14 @@ impl RequestName {
 /// Digest of a specification.
 pub(crate) type Identity = [u8; 32];
 
-/// Digest of a specification: equal for equal ones only.
+/// Returns the digest of a specification; different specifications have different digests.
 pub(crate) fn identity(specification: &JobSpecification) -> Identity {
     let encoded = specification::to_message(specification).encode_to_vec();
     *blake3::hash(&encoded).as_bytes()
 }
 
-/// Number of a snapshot at `now` after one with number `last`: it grows, and since it follows the
-/// clock it grows over restarts too.
+/// Returns the sequence number of a snapshot at `now` after one with number `last`. It always
+/// increases, and since it follows the clock it increases across restarts too.
 pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
     u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
 }

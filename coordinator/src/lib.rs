@@ -1,10 +1,10 @@
 //! Jobs, searches, dispatch, reduction and the public gRPC API of osteon.
 //!
-//! The coordinator is a state ([`state`]), reactions to events ([`event`], [`reactor`]) that are
-//! synchronous and know no clock, and effects ([`effect`]). Around it lies one asynchronous
-//! shell that only moves bytes. An [`osteon_search::Search`] decides the path of a job and knows no worker;
-//! [`store`] is what outlives a process. This crate never links the solver: in a job only a worker
-//! solves.
+//! The coordinator consists of a state ([`state`]), synchronous reactions to events ([`event`],
+//! [`reactor`]) that never read a clock, and effects ([`effect`]). An asynchronous shell around it
+//! only moves bytes. An [`osteon_search::Search`] decides which points a job evaluates and does not
+//! depend on workers; [`store`] holds everything that outlives the process. This crate never links
+//! the solver: only workers solve.
 
 mod accept;
 pub mod access;
@@ -27,18 +27,18 @@ mod fetching;
 pub mod ids;
 pub mod indices;
 mod job;
-pub mod leftover;
+pub mod job_output;
+mod limiter;
 pub mod listen;
 mod message_body;
 pub mod notice;
 mod observers;
 pub mod open_files;
 mod outbound;
-mod pace;
-mod places;
 mod probation;
 mod rate;
 pub mod reactor;
+mod realization_time;
 pub mod sanity;
 mod service_jobs;
 mod service_workers;

@@ -1,7 +1,7 @@
-//! Where a coordinator listens: a TCP address or a Unix socket.
+//! Listen addresses of a coordinator: TCP addresses and Unix sockets.
 //!
-//! Without TLS and tokens every local user is trusted and nobody else: an address that other
-//! machines can reach needs TLS, unless the operator insists.
+//! Without TLS and tokens, exactly the local users are trusted: an address that other machines can
+//! reach needs TLS, unless the operator insists.
 
 use std::io;
 use std::net::SocketAddr;
@@ -19,8 +19,8 @@ use crate::access::Policy;
 use crate::tls::Tls;
 use crate::tokens::Tokens;
 
-/// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. Port 0
-/// takes a free port.
+/// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. With port 0
+/// the system chooses a free port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ListenAddress {
     /// A TCP address.
@@ -29,18 +29,18 @@ pub enum ListenAddress {
     Unix(PathBuf),
 }
 
-/// A text that is no address to listen on.
+/// A text that is not a valid listen address.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
     "`{text}` is not a valid listen address; write IP:PORT (for example 127.0.0.1:0, where port 0 \
      takes a free port), [IPV6]:PORT, localhost:PORT, or unix:PATH"
 )]
 pub struct AddressError {
-    /// What was given.
+    /// The text.
     pub text: String,
 }
 
-/// Why an address cannot be listened on.
+/// Error when an address cannot be bound.
 #[derive(Debug, Error)]
 pub enum BindError {
     /// Other machines could reach it.
@@ -58,7 +58,7 @@ pub enum BindError {
     Tcp {
         /// The address.
         address: SocketAddr,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// The operating system refused a Unix socket.
@@ -66,7 +66,7 @@ pub enum BindError {
     Unix {
         /// The path.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// Another coordinator listens there.
@@ -75,7 +75,7 @@ pub enum BindError {
         /// The path.
         path: PathBuf,
     },
-    /// Something that is no socket is there.
+    /// The path exists and is not a socket.
     #[error(
         "{} exists, is not a socket and is left as it is; choose another path",
         path.display()
@@ -90,27 +90,28 @@ pub enum BindError {
 #[derive(Debug)]
 pub struct Listener {
     pub(crate) bound: Bound,
-    /// Of a Unix socket.
+    /// Present for a Unix socket.
     pub(crate) file: Option<SocketFile>,
     pub(crate) tls: Option<Tls>,
     pub(crate) policy: Policy,
     url: String,
 }
 
-/// The file of a Unix socket; removed with the last that needs it, unless another one is there.
+/// The file of a Unix socket. It is removed with its last user, unless another file has taken its
+/// place.
 #[derive(Debug)]
 pub(crate) struct SocketFile {
     path: PathBuf,
     identity: FileIdentity,
 }
 
-/// Device, inode and, since inodes are used again, the time when the file was made.
+/// Device, inode and, since inodes are reused, the creation time of the file.
 type FileIdentity = (u64, u64, Option<SystemTime>);
 
 impl Listener {
-    /// Binds an address. `insecure` allows one that other machines can reach.
+    /// Binds an address. `insecure` allows addresses that other machines can reach.
     ///
-    /// A socket file that nobody listens on, as a killed process leaves it, is replaced.
+    /// A socket file that nobody listens on, left by a killed process, is replaced.
     ///
     /// # Errors
     /// When the address is not a local one, in use, or refused by the operating system.
@@ -121,8 +122,8 @@ impl Listener {
         }
     }
 
-    /// Binds an address that anybody may reach: who gets in is decided by certificates and
-    /// `tokens`.
+    /// Binds an address that any machine may reach: certificates and `tokens` decide which callers
+    /// are admitted.
     ///
     /// # Errors
     /// When the operating system refuses the address.
@@ -135,7 +136,8 @@ impl Listener {
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let local = listener.local_addr().map_err(refused)?;
         let url = match tls.host() {
-            // Every address of this machine: none of them is its name.
+            // The wildcard address stands for all addresses of this machine, so it cannot be part
+            // of a URL.
             Some(host) if local.ip().is_unspecified() => format!("https://{host}:{}", local.port()),
             _ => format!("https://{local}"),
         };
@@ -143,14 +145,14 @@ impl Listener {
         Ok(Self { bound, file: None, tls: Some(tls), policy, url })
     }
 
-    /// Lets in only who holds a token.
+    /// Admits only holders of tokens.
     #[must_use]
     pub fn with_tokens(self, tokens: Tokens) -> Self {
         Self { policy: Policy::Tokens(tokens), ..self }
     }
 
-    /// URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT` or
-    /// `unix:PATH`.
+    /// Returns the URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT`
+    /// or `unix:PATH`.
     pub fn url(&self) -> &str {
         &self.url
     }
@@ -180,14 +182,14 @@ impl Listener {
         Ok(Self::open(Bound::Unix(listener), Some(file), url))
     }
 
-    /// For everybody who reaches it.
+    /// Returns a listener that admits everybody.
     fn open(bound: Bound, file: Option<SocketFile>, url: String) -> Self {
         Self { bound, file, tls: None, policy: Policy::Everybody, url }
     }
 }
 
 impl ListenAddress {
-    /// Whether only this machine can reach it.
+    /// Returns whether only this machine can reach the address.
     pub fn is_local(&self) -> bool {
         match self {
             Self::Tcp(address) => address.ip().is_loopback(),
@@ -212,8 +214,8 @@ impl FromStr for ListenAddress {
     }
 }
 
-/// The URL of an address; of one that stands for every address of this machine, by the machine's
-/// name, if it is a name that is known.
+/// Returns the URL of an address. For a wildcard address it contains the machine's name, if that
+/// can be resolved.
 async fn url(local: SocketAddr) -> String {
     if local.ip().is_unspecified() {
         let host = host_name().map(|name| format!("{name}:{}", local.port()));
@@ -226,8 +228,8 @@ async fn url(local: SocketAddr) -> String {
     format!("http://{local}")
 }
 
-/// Removes the socket that a killed process left at `path`: one that nobody listens on any more,
-/// and nothing else.
+/// Removes a socket at `path` that a killed process left, that is, one that nobody listens on.
+/// Nothing else is removed.
 async fn remove_dead(path: &Path) -> Result<(), BindError> {
     let refused = |source| BindError::Unix { path: path.to_owned(), source };
     let is_socket = std::fs::symlink_metadata(path).map_err(refused)?.file_type().is_socket();
@@ -238,7 +240,7 @@ async fn remove_dead(path: &Path) -> Result<(), BindError> {
         Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
             std::fs::remove_file(path).map_err(refused)
         }
-        // Its queue is full.
+        // Its accept queue is full, so somebody listens.
         Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
             Err(BindError::InUse { path: path.to_owned() })
         }
@@ -249,14 +251,14 @@ async fn remove_dead(path: &Path) -> Result<(), BindError> {
 
 fn identity(path: &Path) -> io::Result<FileIdentity> {
     let found = std::fs::symlink_metadata(path)?;
-    // Not every file system knows the time.
+    // Some file systems do not record the creation time.
     Ok((found.dev(), found.ino(), found.created().ok()))
 }
 
 impl Drop for SocketFile {
     fn drop(&mut self) {
         if identity(&self.path).is_ok_and(|found| found == self.identity) {
-            // Nothing can be done about a file that cannot be removed.
+            // A failure to remove the file cannot be handled.
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -298,7 +300,7 @@ mod tests {
         let listener = Listener::bind(&"0.0.0.0:0".parse().unwrap(), true).await.unwrap();
         let name = host_name().unwrap();
         let address = listener.url().strip_prefix("http://").unwrap().to_owned();
-        // A machine whose own name is not known keeps the address.
+        // On a machine whose own name cannot be resolved the URL keeps the address.
         let host = address.rsplit_once(':').unwrap().0;
         let known = tokio::net::lookup_host((name.as_str(), 1)).await.is_ok();
         assert_eq!(host, if known { &name } else { "0.0.0.0" });
@@ -317,7 +319,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("o.sock");
         let address = ListenAddress::Unix(path.clone());
-        // A process that was killed leaves the file.
+        // A killed process leaves the file.
         drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
         let listener = Listener::bind(&address, false).await.unwrap();
         let error = Listener::bind(&address, false).await.unwrap_err();
@@ -348,7 +350,7 @@ mod tests {
         let address = ListenAddress::Unix(path.clone());
         let socket = tokio::net::UnixSocket::new_stream().unwrap();
         socket.bind(&path).unwrap();
-        // Nobody accepts.
+        // Connections are never accepted.
         let _listener = socket.listen(1).unwrap();
         let mut waiting = Vec::new();
         while let Ok(stream) = UnixStream::connect(&path).await {

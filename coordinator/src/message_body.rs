@@ -1,4 +1,4 @@
-//! The message of a call, looked at before it is read: how long it says that it is.
+//! Body of a call, whose declared length is read before the message itself.
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -11,13 +11,13 @@ use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::Bytes;
 
-/// Before each message: whether it is compressed, and its length as four bytes, most significant
-/// first (gRPC over HTTP/2, "Length-Prefixed-Message").
+/// Length of the prefix of each message: one byte that tells whether it is compressed, then its
+/// length as four bytes, most significant first (gRPC over HTTP/2, "Length-Prefixed-Message").
 const PREFIX_BYTES: usize = 5;
 
-/// A message whose beginning has come.
+/// A message whose prefix has arrived.
 pub(crate) struct MessageBody {
-    /// What has come and is not passed on yet.
+    /// Bytes that have arrived and are not passed on yet.
     begun: Option<Bytes>,
     rest: Body,
     length: u64,
@@ -25,17 +25,17 @@ pub(crate) struct MessageBody {
 }
 
 impl MessageBody {
-    /// Waits for the beginning of the message.
+    /// Waits for the prefix of the message.
     ///
     /// # Errors
-    /// That of the connection.
+    /// An error of the connection.
     pub(crate) async fn begin(mut rest: Body) -> Result<Self, Status> {
         let mut begun = Vec::new();
         while begun.len() < PREFIX_BYTES {
             match poll_fn(|cx| Pin::new(&mut rest).poll_frame(cx)).await {
-                // Trailers say nothing.
+                // Trailers contain no data.
                 Some(frame) => begun.extend(frame?.into_data().unwrap_or_default()),
-                // Who reads on finds out what is missing.
+                // The reader of the body reports that it is too short.
                 None => break,
             }
         }
@@ -46,12 +46,12 @@ impl MessageBody {
         Ok(Self { begun: Some(begun.into()), rest, length, patience: None })
     }
 
-    /// How long the message says that it is, bytes.
+    /// Returns the declared length of the message, bytes.
     pub(crate) fn length(&self) -> u64 {
         self.length
     }
 
-    /// All of it, from its beginning, which must come within a time from now.
+    /// Returns the whole body, which must arrive within `limit` from now.
     pub(crate) fn within(self, limit: Duration) -> Self {
         Self { patience: Some((limit, Box::pin(sleep(limit)))), ..self }
     }
@@ -86,7 +86,7 @@ mod tests {
 
     use super::*;
 
-    /// Pieces, and then nothing more, ever.
+    /// A body of these pieces that never ends.
     struct Pieces(VecDeque<&'static [u8]>);
 
     impl HttpBody for Pieces {

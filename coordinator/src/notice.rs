@@ -1,5 +1,5 @@
-//! What the log of a coordinator tells of its state: one closed list. The reactor makes notices,
-//! the core task writes them.
+//! Notices: the log entries about a coordinator's state, as one closed list. The reactor makes
+//! them, the core task writes them.
 
 use std::fmt;
 use std::time::Duration;
@@ -11,78 +11,78 @@ use crate::close_reason::CloseReason;
 use crate::ids::{JobId, WorkerId};
 use crate::worker_name::WorkerName;
 
-/// Something that an operator wants to read in the log.
+/// A notice for the operator's log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Notice {
     /// A worker is attached.
     WorkerAttached {
         /// Its number.
         worker: WorkerId,
-        /// Who it is.
+        /// Its name.
         name: WorkerName,
-        /// How many realizations it computes at the same time.
+        /// Number of realizations that it computes at the same time.
         slots: u32,
         /// Version of its program.
         version: String,
     },
-    /// A worker introduced itself and is not taken.
+    /// A worker introduced itself and was refused.
     WorkerRefused {
         /// Its number.
         worker: WorkerId,
-        /// Who it is.
+        /// Its name.
         name: WorkerName,
-        /// Why it is not taken.
+        /// Reason for the refusal.
         reason: CloseReason,
     },
-    /// A worker is not attached any more.
+    /// A worker has departed.
     WorkerDetached {
         /// Its number.
         worker: WorkerId,
-        /// Who it is.
+        /// Its name.
         name: WorkerName,
-        /// How many batches it held, which are given to others.
+        /// Number of batches that it held, which are reassigned.
         batches: usize,
-        /// Why it is gone.
+        /// Reason for the departure.
         why: Departure,
     },
     /// A job is accepted and durable.
     JobAccepted {
         /// The job.
         job: JobId,
-        /// Who submitted it.
+        /// The client that submitted it.
         client: String,
-        /// What people call it; may be empty.
+        /// Display name; may be empty.
         name: String,
-        /// What it does.
+        /// Kind of the job.
         kind: JobKind,
-        /// Its rank among the jobs of its client.
+        /// Priority among the jobs of its client.
         priority: u32,
     },
-    /// A job is computed from now on.
+    /// The computation of a job begins.
     JobStarted {
         /// The job.
         job: JobId,
-        /// How many evaluations the store has of it already.
+        /// Number of its evaluations in the store already.
         stored: u64,
     },
     /// The end of a job is durable.
     JobEnded {
         /// The job.
         job: JobId,
-        /// Who submitted it.
+        /// The client that submitted it.
         client: String,
-        /// What it did.
+        /// Kind of the job.
         kind: JobKind,
-        /// How it ended.
+        /// Status and reason of the end.
         ending: Ending,
-        /// Complete evaluations.
+        /// Number of complete evaluations.
         evaluations: u64,
-        /// Time since it was accepted.
+        /// Time since its acceptance.
         elapsed: Duration,
     },
 }
 
-/// Why a worker is not attached any more.
+/// Reason why a worker departed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Departure {
     /// The coordinator closed its stream.
@@ -101,15 +101,15 @@ impl fmt::Display for Departure {
 }
 
 impl Departure {
-    /// Whether it left, or was sent away, in order: nothing is wrong with it.
+    /// Returns whether the worker left or was drained: nothing is wrong with it.
     pub fn is_orderly(&self) -> bool {
         matches!(self, Self::Closed(CloseReason::Drained | CloseReason::Draining))
     }
 }
 
 impl Notice {
-    /// Writes it to the log. What a peer says of itself is quoted, so that it cannot look like
-    /// another line.
+    /// Writes the notice to the log. Texts that a peer sent are quoted, so that they cannot look
+    /// like another line.
     pub(crate) fn write(&self) {
         match self {
             Self::WorkerAttached { worker, name, slots, version } => tracing::info!(
@@ -122,7 +122,7 @@ impl Notice {
             ),
             Self::WorkerDetached { worker, name, batches, why } => {
                 let (host, process, reason) = (name.host(), name.process(), why.to_string());
-                // One that held nothing is no loss, however it went.
+                // A worker that held nothing is not a loss, whatever the reason.
                 if why.is_orderly() || *batches == 0 {
                     tracing::info!(%worker, host, process, reason, "worker disconnected");
                 } else {

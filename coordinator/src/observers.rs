@@ -1,4 +1,4 @@
-//! Those who watch a job: each has the newest snapshot only, and nobody waits for the slow.
+//! Observers of a job: each receives only the newest snapshot, and a slow one delays nobody.
 
 use std::time::Duration;
 
@@ -8,11 +8,11 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
-/// Who reads nothing for this long is dropped.
+/// An observer that reads nothing for this long is dropped.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// The newest snapshot whenever there is another than number `after`, until the job has ended. Who
-/// reads slowly misses those in between.
+/// Returns a stream of the newest snapshots, starting with the first one other than number `after`,
+/// until the job has ended. A slow reader misses the snapshots in between.
 pub(crate) fn follow(
     snapshots: watch::Receiver<JobSnapshot>,
     after: u64,
@@ -29,7 +29,7 @@ pub(crate) fn follow(
     ReceiverStream::new(receiver).map(Ok).chain(last)
 }
 
-/// Feeds one observer until the job has ended, or the observer is gone.
+/// Sends snapshots to one observer until the job has ended or the observer has gone.
 async fn feed(
     mut snapshots: watch::Receiver<JobSnapshot>,
     mut seen: u64,
@@ -92,7 +92,7 @@ mod tests {
         sender.send_replace(snapshot(9, JobState::Running));
         assert_eq!(sequence(resumed.next().await), 9);
         assert_eq!(sequence(all.next().await), 9);
-        // The end comes to everybody, whatever was seen.
+        // Every observer receives the end, whatever it has seen before.
         sender.send_replace(snapshot(9, JobState::Ended));
         for mut stream in [all, resumed] {
             assert_eq!(sequence(stream.next().await), 9);
@@ -114,7 +114,7 @@ mod tests {
         let (sender, receiver) = watch::channel(snapshot(1, JobState::Running));
         let mut stream = Box::pin(follow(receiver, 0));
         for sequence in 2..=4 {
-            // The observer's task runs, and finds no place for the second snapshot.
+            // The observer's task runs, and finds the channel full at the second snapshot.
             tokio::time::sleep(PATIENCE / 2).await;
             sender.send_replace(snapshot(sequence, JobState::Running));
         }

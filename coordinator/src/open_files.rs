@@ -1,13 +1,14 @@
-//! How many files this process may have open, and with that connections.
+//! Limit of open files of this process, and the number of connections that it allows.
 
 use osteon_common::limits::CONNECTIONS_MAX;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-/// Files that are no connections: the store's, standard streams, what the runtime needs.
+/// Number of open files that are not connections: those of the store, standard streams and the
+/// runtime.
 const OTHERS: u64 = 32;
 
-/// Raises this process's limit of open files to what all connections need, as far as the system
-/// allows; warns where that is less.
+/// Raises this process's limit of open files to the number that all connections need, as far as the
+/// system allows, and warns if that is not enough.
 pub fn raise_limit() {
     let wanted = CONNECTIONS_MAX as u64 + OTHERS;
     let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
@@ -29,12 +30,12 @@ pub fn raise_limit() {
     }
 }
 
-/// Most connections at a time: others wait until one ends.
+/// Returns the maximum number of simultaneous connections: others wait until one ends.
 pub(crate) fn connections_max() -> usize {
     places(getrlimit(Resource::Nofile).current)
 }
 
-/// Connections under a limit of open files.
+/// Returns the number of connections that a limit of open files allows.
 fn places(limit: Option<u64>) -> usize {
     let room = limit.map_or(usize::MAX, |limit| {
         usize::try_from(limit.saturating_sub(OTHERS)).unwrap_or(usize::MAX)

@@ -1,4 +1,4 @@
-//! What goes to a worker: effects into messages, and the queue that they wait in.
+//! Messages to a worker: made from effects, and queued.
 
 use std::time::Duration;
 
@@ -13,26 +13,27 @@ use crate::close_reason::CloseReason;
 use crate::config::Config;
 use crate::ids::{BatchId, LeaseId, WorkerId};
 
-/// Messages to one worker that may wait: its batches, their revocations, signs of life.
+/// Maximum number of queued messages to one worker: its batches, their revocations and heartbeats.
 pub(crate) const OUTBOUND_MAX: usize = 64;
 
-/// When a worker that finds no place may try again.
+/// Time after which a worker that was refused for lack of room may try again.
 const RETRY: Duration = Duration::from_secs(30);
 
-/// What goes to a worker.
+/// A message to a worker, or the status that ends its stream.
 pub(crate) type Outgoing = Result<AttachResponse, Status>;
 
-/// Where messages to one worker go. Its stream ends when this is dropped, be it ever so full.
+/// Queue of messages to one worker. The worker's stream ends when this is dropped, even if the
+/// queue is full.
 #[derive(Debug)]
 pub(crate) struct Outbound {
     messages: mpsc::Sender<Outgoing>,
-    /// Never sent on: its end is the message.
+    /// Nothing is sent on it; dropping it is the signal.
     _open: oneshot::Sender<()>,
 }
 
 impl Outbound {
-    /// Makes the queue to a worker whose stream takes `messages`, and a receiver that ends when the
-    /// queue is dropped.
+    /// Returns a queue for a worker whose stream receives `messages`, and a receiver that completes
+    /// when the queue is dropped.
     pub(crate) fn new(messages: mpsc::Sender<Outgoing>) -> (Self, oneshot::Receiver<()>) {
         let (open, closed) = oneshot::channel();
         (Self { messages, _open: open }, closed)
@@ -41,17 +42,17 @@ impl Outbound {
     /// Queues a message.
     ///
     /// # Errors
-    /// When the queue is full or the worker is gone.
+    /// When the queue is full or the worker has gone.
     pub(crate) fn send(&self, message: Outgoing) -> Result<(), NotReading> {
         self.messages.try_send(message).map_err(|_| NotReading)
     }
 }
 
-/// A worker takes no message.
+/// Error when a worker accepts no message.
 #[derive(Debug)]
 pub(crate) struct NotReading;
 
-/// The first message to an attached worker.
+/// Returns the first message to an attached worker.
 pub(crate) fn welcome(worker: WorkerId, lease: LeaseId, config: &Config) -> AttachResponse {
     respond(Response::Welcome(WorkerWelcome {
         worker: worker.0,
@@ -61,27 +62,28 @@ pub(crate) fn welcome(worker: WorkerId, lease: LeaseId, config: &Config) -> Atta
     }))
 }
 
-/// A batch for a worker.
+/// Returns the message that sends a batch.
 pub(crate) fn batch(id: BatchId, work: &Work) -> AttachResponse {
     respond(Response::Batch(batch::to_message(id.0, work)))
 }
 
-/// A batch that a worker is to forget.
+/// Returns the message that revokes a batch.
 pub(crate) fn revoke(batch: BatchId) -> AttachResponse {
     respond(Response::Revoke(BatchRevoke { batch: batch.0 }))
 }
 
-/// The wish that a worker leaves when it has answered what it holds.
+/// Returns the message that drains a worker: it leaves when it has answered the batches that it
+/// holds.
 pub(crate) fn drain() -> AttachResponse {
     respond(Response::Drain(WorkerDrain {}))
 }
 
-/// A sign of life.
+/// Returns a heartbeat.
 pub(crate) fn heartbeat() -> AttachResponse {
     respond(Response::Heartbeat(Heartbeat {}))
 }
 
-/// The status that ends a worker's stream.
+/// Returns the status that ends a worker's stream.
 pub(crate) fn status(reason: &CloseReason) -> Status {
     let code = match reason {
         CloseReason::FingerprintDiffers { .. } => Code::FailedPrecondition,

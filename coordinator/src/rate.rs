@@ -1,23 +1,23 @@
-//! Realizations per second over the last seconds.
+//! Rate of realizations over the last seconds.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How far back the rate looks.
+/// Length of the window over which the rate is averaged.
 const WINDOW: Duration = Duration::from_secs(5);
-/// Counts closer together than this share an entry, so that their number is bounded.
+/// Counts closer together than this share an entry, which limits the number of entries.
 const GRAIN: Duration = Duration::from_millis(100);
 
-/// Counts of the last seconds.
+/// Counts of realizations in the last seconds.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Rate {
-    /// When the first realization of all was counted.
+    /// Time of the very first count.
     begun: Option<Duration>,
     counts: VecDeque<(Duration, u64)>,
 }
 
 impl Rate {
-    /// Counts realizations answered at `now`.
+    /// Counts realizations that were answered at `now`.
     pub(crate) fn add(&mut self, count: u64, now: Duration) {
         self.begun.get_or_insert(now);
         match self.counts.back_mut() {
@@ -29,15 +29,16 @@ impl Rate {
         }
     }
 
-    /// Realizations per second over the window that ends at `now`; over the time since the first
-    /// answer while that is shorter.
+    /// Returns the rate in realizations per second over the window that ends at `now`, or over the
+    /// time since the first answer while that is shorter.
     pub(crate) fn per_second(&self, now: Duration) -> f64 {
         let Some(begun) = self.begun else {
             return 0.0;
         };
         let recent = self.counts.iter().filter(|(at, _)| now.saturating_sub(*at) <= WINDOW);
         let sum: u64 = recent.map(|(_, count)| count).sum();
-        // What came with the first answer was computed before it: at least one grain.
+        // The realizations of the first answer were computed before it, so the span is at least one
+        // grain.
         let span = now.saturating_sub(begun).clamp(GRAIN, WINDOW);
         sum as f64 / span.as_secs_f64()
     }

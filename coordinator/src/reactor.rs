@@ -1,14 +1,17 @@
-//! Synchronous functions from state, event and time to effects: what a coordinator does about an
-//! event. No socket, no clock, no task; a run is a function of its events and their times.
+//! Synchronous functions from state, event and time to effects: the coordinator's reaction to each
+//! event. They use no socket, clock or task; a run is a function of its events and their times.
 //!
-//! Three layers, each of which calls only those below it:
+//! There are three layers, each of which calls only those below it:
 //!
-//! - `integrity`: which answers count. Takes in answers, compares them, settles disputes, bans workers;
-//! - `lifecycle`: jobs, their records, requests of clients, and workers that come and go;
-//! - `dispatch`: who computes what. Sends batches, their duplicates, audits and speculative ones.
+//! - `integrity` decides which answers count: it takes in answers, compares them, settles disputes
+//!   and bans workers;
+//! - `lifecycle` manages jobs, their records, client requests, and the arrival and departure of
+//!   workers;
+//! - `dispatch` decides which worker computes what: it sends batches, duplicates, audits and
+//!   speculative batches.
 //!
-//! No file calls another that calls it (`tests/circles.rs`). What a lower layer finds for an upper one
-//! to act on it returns: the failure of a job, or an evaluation that may be complete.
+//! No two files call each other in a circle (`tests/circles.rs`). A lower layer returns what an
+//! upper one must act on: the failure of a job, or an evaluation that may be complete.
 
 use std::time::Duration;
 
@@ -32,10 +35,10 @@ pub use lifecycle::restore::Restored;
 #[cfg(test)]
 mod tests;
 
-/// Changes `state` by one event at `now`, and returns what is to be done.
+/// Changes `state` by one event at `now`, and returns the effects to be carried out.
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut turn = Turn::new(state, now);
-    // A sign of life frees nobody, and there are many of them.
+    // A heartbeat makes no worker free, and heartbeats are frequent.
     let frees = !matches!(event, Event::Heartbeat { .. });
     apply(&mut turn, event);
     if frees {
@@ -71,7 +74,7 @@ fn apply(turn: &mut Turn, event: Event) {
     }
 }
 
-/// What the passing of time brings.
+/// Reacts to the passing of time.
 fn tick(turn: &mut Turn) {
     ticks::compensate_gap(turn.state, turn.now);
     ticks::expire(turn);

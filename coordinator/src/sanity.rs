@@ -1,4 +1,4 @@
-//! Re-derives every cross reference of a state, for tests and simulations.
+//! Checks every cross reference of a state, for tests and simulations.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,57 +14,58 @@ use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
 use crate::state::{BATCHES_IN_FLIGHT_MAX, Banned, SETTLED_MAX, State};
 use crate::worker_name::WorkerName;
 
-/// What does not fit together.
+/// An inconsistency of a state.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Insane {
-    /// A list of jobs does not hold exactly those in the stage it is for.
+pub enum Inconsistency {
+    /// A list of jobs does not hold exactly the jobs in the stage that it is for.
     #[error("job {0} is in a list for another stage, or missing in the list of its stage")]
     JobList(JobId),
-    /// A worker and a batch disagree about who holds what.
+    /// A worker and a batch disagree about which worker holds the batch.
     #[error("worker {0} and batch {1} disagree about who holds it")]
     Holding(WorkerId, BatchId),
-    /// A worker holds too much.
+    /// A worker holds more batches than allowed, more than one speculative batch, or another batch
+    /// beside an exclusive one, or too many of its settled batches are remembered.
     #[error("worker {0} holds more than it may")]
     TooMuch(WorkerId),
-    /// The duplicates of a batch do not name each other, or differ in what they are for.
+    /// The duplicates of a batch do not name each other, or differ in their purpose.
     #[error("batch {0} and its duplicates do not match")]
     Duplicates(BatchId),
-    /// What waits for another worker that computes the same is with nobody, is not the newest of
-    /// its copies, or is not waited for.
+    /// A batch that is listed as overdue does not exist, is speculative, or is not the newest of
+    /// its duplicates.
     #[error("batch {0} cannot be overdue")]
     Overdue(BatchId),
-    /// A batch of an evaluation that is not under way.
+    /// A batch belongs to an evaluation that is not under way.
     #[error("batch {0} belongs to no evaluation under way")]
     Stray(BatchId),
-    /// An index is not in exactly one place: filled, queued, in quarantine, or with a worker.
+    /// An index is not in exactly one place: filled, queued, in quarantine, or held by a worker.
     #[error("index {index} of job {job} is in {places} places")]
     Index {
         /// The job.
         job: JobId,
         /// The index.
         index: usize,
-        /// In how many places it is.
+        /// Number of places.
         places: u32,
     },
     /// The count of filled results is wrong.
     #[error("job {0} miscounts its filled results")]
     Filled(JobId),
-    /// A request id does not lead to the job that has it.
+    /// A request id does not lead to its job.
     #[error("the request id of job {0} leads elsewhere")]
     RequestId(JobId),
-    /// A search was told more than the store has.
+    /// A search has received more evaluations than the store has.
     #[error("the search of job {0} was told more evaluations than are stored")]
     Stored(JobId),
-    /// The checks of an evaluation and the batches for them do not match.
+    /// The audits and disputes of an evaluation do not match the batches for them.
     #[error("job {0} miscounts what is being checked")]
     Checks(JobId),
-    /// An answer of a banned worker counts, or it is attached.
+    /// A banned worker is attached, or one of its answers counts.
     #[error("worker {0} is expelled, and still counts")]
     Banned(WorkerName),
-    /// A speculative evaluation is of none of the points that a search may ask for.
+    /// A speculative evaluation is not of one of the candidate points.
     #[error("job {0} is ahead with what its search does not ask for")]
     Speculation(JobId),
-    /// A number that is handed out next is not above all in use.
+    /// The next identifier is not above all that are in use.
     #[error("a number is about to be given twice")]
     Numbers,
 }
@@ -72,8 +73,8 @@ pub enum Insane {
 /// Checks the whole state.
 ///
 /// # Errors
-/// The first thing that does not fit together.
-pub fn sanity_check(state: &State) -> Result<(), Insane> {
+/// The first inconsistency.
+pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
     check_jobs(state)?;
     check_workers(state)?;
     check_batches(state)?;
@@ -82,16 +83,16 @@ pub fn sanity_check(state: &State) -> Result<(), Insane> {
             check_evaluation(state, id, evaluation)?;
             check_checks(state, id, evaluation)?;
         }
-        check_ahead(job)?;
+        check_speculation(job)?;
     }
     let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
     let batches = state.batches.last_key_value();
     let batches = batches.is_some_and(|(last, _)| last.0 >= state.next_batch);
     let leases = state.workers.values().any(|worker| worker.lease.0 >= state.next_lease);
-    if jobs || batches || leases { Err(Insane::Numbers) } else { Ok(()) }
+    if jobs || batches || leases { Err(Inconsistency::Numbers) } else { Ok(()) }
 }
 
-fn check_jobs(state: &State) -> Result<(), Insane> {
+fn check_jobs(state: &State) -> Result<(), Inconsistency> {
     for (&id, job) in &state.jobs {
         let waiting = state.waiting.iter().filter(|waiting| **waiting == id).count();
         let active = state.active.contains(&id);
@@ -103,14 +104,14 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
             Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
         };
         if !fits || state.ended.contains_key(&id) {
-            return Err(Insane::JobList(id));
+            return Err(Inconsistency::JobList(id));
         }
         if job.search.evaluations() > job.stored {
-            return Err(Insane::Stored(id));
+            return Err(Inconsistency::Stored(id));
         }
         let request = RequestName::of(&job.record);
         if request.is_some_and(|request| state.requests.get(&request) != Some(&id)) {
-            return Err(Insane::RequestId(id));
+            return Err(Inconsistency::RequestId(id));
         }
     }
     for (id, job) in state.active.iter().filter_map(|id| Some((id, state.jobs.get(id)?))) {
@@ -118,21 +119,22 @@ fn check_jobs(state: &State) -> Result<(), Insane> {
         let of_client =
             |id: &&JobId| state.jobs.get(id).is_some_and(|job| job.record.client == *client);
         if state.active.iter().filter(of_client).count() != state.shares.jobs(client) {
-            return Err(Insane::JobList(*id));
+            return Err(Inconsistency::JobList(*id));
         }
     }
     let lost = |id: &&JobId| !state.jobs.contains_key(id);
     if let Some(id) = state.active.iter().chain(&state.waiting).find(lost) {
-        return Err(Insane::JobList(*id));
+        return Err(Inconsistency::JobList(*id));
     }
     match state.requests.values().find(|id| lost(id) && !state.ended.contains_key(id)) {
-        Some(id) => Err(Insane::JobList(*id)),
+        Some(id) => Err(Inconsistency::JobList(*id)),
         None => Ok(()),
     }
 }
 
-/// Speculative evaluations are of candidates, of each at most one, while an evaluation is under way.
-fn check_ahead(job: &Job) -> Result<(), Insane> {
+/// Checks that speculative evaluations are of candidates, at most one of each, while an evaluation
+/// is under way.
+fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
@@ -143,16 +145,17 @@ fn check_ahead(job: &Job) -> Result<(), Insane> {
         && candidates.len() <= CANDIDATES_MAX
         && (under_way || candidates.is_empty())
         && evaluations.iter().all(|it| it.audits_out == 0);
-    if fits { Ok(()) } else { Err(Insane::Speculation(job.record.job)) }
+    if fits { Ok(()) } else { Err(Inconsistency::Speculation(job.record.job)) }
 }
 
-/// Whether a batch is of this evaluation.
+/// Returns whether a batch belongs to this evaluation.
 fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
     batch.assignment.job == job && batch.assignment.attempt == evaluation.attempt
 }
 
-/// Audits and judges are with workers, and nobody who is banned has a say.
-fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+/// Checks that audits and tie-breakers are held by workers, and that no answer of a banned worker
+/// counts.
+fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Inconsistency> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
@@ -171,7 +174,7 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
         || with(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
         || !disputes.iter().all(judged)
     {
-        return Err(Insane::Checks(job));
+        return Err(Inconsistency::Checks(job));
     }
     for Banned { record, .. } in &state.banned {
         let name = &record.worker;
@@ -179,13 +182,13 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
         let disputes = disputes.iter().any(|dispute| dispute.involves(name));
         let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
         if attached || disputes || told || evaluation.workers.contains(name) {
-            return Err(Insane::Banned(name.clone()));
+            return Err(Inconsistency::Banned(name.clone()));
         }
     }
     Ok(())
 }
 
-fn check_workers(state: &State) -> Result<(), Insane> {
+fn check_workers(state: &State) -> Result<(), Inconsistency> {
     for (&id, worker) in &state.workers {
         let held = worker.in_flight.len();
         let count = |purpose| state.held_for(worker, purpose).count();
@@ -193,18 +196,18 @@ fn check_workers(state: &State) -> Result<(), Insane> {
         let speculative = count(Purpose::Speculative);
         let remembered = worker.settled.len();
         if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
-            return Err(Insane::TooMuch(id));
+            return Err(Inconsistency::TooMuch(id));
         }
         for batch in &worker.in_flight {
             if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
-                return Err(Insane::Holding(id, *batch));
+                return Err(Inconsistency::Holding(id, *batch));
             }
         }
     }
     Ok(())
 }
 
-fn check_batches(state: &State) -> Result<(), Insane> {
+fn check_batches(state: &State) -> Result<(), Inconsistency> {
     let overdue = |id: &&BatchId| {
         let batch = state.batches.get(id);
         batch.is_some_and(|batch| {
@@ -212,13 +215,13 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         })
     };
     if let Some(id) = state.overdue.iter().find(|id| !overdue(id)) {
-        return Err(Insane::Overdue(*id));
+        return Err(Inconsistency::Overdue(*id));
     }
     for (&id, batch) in &state.batches {
         let worker = state.workers.get(&batch.worker);
         let held = worker.map_or(0, |w| w.in_flight.iter().filter(|held| **held == id).count());
         if held != 1 {
-            return Err(Insane::Holding(batch.worker, id));
+            return Err(Inconsistency::Holding(batch.worker, id));
         }
         let matches = |other: &BatchId| {
             state.batches.get(other).is_some_and(|other| {
@@ -229,7 +232,7 @@ fn check_batches(state: &State) -> Result<(), Insane> {
             })
         };
         if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= DUPLICATES_MAX {
-            return Err(Insane::Duplicates(id));
+            return Err(Inconsistency::Duplicates(id));
         }
         let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
@@ -237,22 +240,26 @@ fn check_batches(state: &State) -> Result<(), Insane> {
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {
-            return Err(Insane::Stray(id));
+            return Err(Inconsistency::Stray(id));
         }
     }
     Ok(())
 }
 
-/// Every index is in exactly one place.
-fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Insane> {
+/// Checks that every index is in exactly one place.
+fn check_evaluation(
+    state: &State,
+    job: JobId,
+    evaluation: &Evaluation,
+) -> Result<(), Inconsistency> {
     let mut places: Vec<u32> =
         evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
     if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
-        return Err(Insane::Filled(job));
+        return Err(Inconsistency::Filled(job));
     }
     let queued = evaluation.queue.iter().map(|indices| (indices.first, indices.count));
     let quarantine = evaluation.quarantine.iter().map(|index| (*index, 1));
-    // A batch and its copy are one place.
+    // A batch and its duplicates count as one place.
     let out: BTreeMap<u64, u64> = state
         .batches
         .values()
@@ -267,7 +274,7 @@ fn check_evaluation(state: &State, job: JobId, evaluation: &Evaluation) -> Resul
         }
     }
     match places.iter().position(|places| *places != 1) {
-        Some(index) => Err(Insane::Index { job, index, places: places[index] }),
+        Some(index) => Err(Inconsistency::Index { job, index, places: places[index] }),
         None => Ok(()),
     }
 }

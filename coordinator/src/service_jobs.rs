@@ -1,4 +1,4 @@
-//! The service of clients: calls into requests, answers into messages.
+//! The gRPC service for clients: turns calls into requests, and answers into messages.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -31,27 +31,29 @@ use crate::effect::{Answer, Refusal};
 use crate::event::{self, Retention};
 use crate::fetching;
 use crate::ids::{JobId, WorkerId};
+use crate::limiter::{Caller, Limiter};
 use crate::observers;
-use crate::places::{Caller, Places};
 use crate::store::EndRecord;
 use crate::store_thread::Command;
 
-/// Most jobs of one page.
+/// Maximum number of jobs in one page.
 const PAGE_JOBS_MAX: u32 = 1000;
-/// A request that finds no place among those that wait for this long is refused.
+/// A request that finds the queue full for this long is refused.
 const QUEUE_PATIENCE: Duration = Duration::from_secs(5);
-/// Who cancels a job that has not ended after this long is told what it waits for.
+/// A client that cancels a job that has not ended after this long receives the reason for the wait.
 const END_PATIENCE: Duration = Duration::from_secs(5);
-/// When what was refused for want of room may be tried again.
+/// Time after which a call that was refused for lack of room may be repeated.
 const RETRY: Duration = Duration::from_secs(10);
 
-/// The service of clients.
+/// The gRPC service for clients.
 pub(crate) struct JobsService {
     messages: mpsc::Sender<Message>,
     store: mpsc::Sender<Command>,
-    /// What jobs left may be large: a few at a time are held in memory.
-    fetches: Places,
-    /// A copy of the store takes room on its disk: one at a time.
+    /// Permits of fetches: the output of a job may be large, so that of only a few is held in
+    /// memory at a time.
+    fetches: Limiter,
+    /// Permit of backups: a copy of the store takes space on its disk, so only one is made at a
+    /// time.
     backups: Arc<Semaphore>,
 }
 
@@ -59,11 +61,11 @@ type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
-        let fetches = Places::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
+        let fetches = Limiter::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
         Self { messages, store, fetches, backups: Arc::new(Semaphore::new(1)) }
     }
 
-    /// Queues a message for the core; refused when it does not keep up.
+    /// Queues a message for the core task; refused when the task does not keep up.
     async fn send(&self, message: Message) -> Result<(), Status> {
         self.messages.send_timeout(message, QUEUE_PATIENCE).await.map_err(|error| match error {
             SendTimeoutError::Closed(_) => stopped(),
@@ -90,7 +92,8 @@ impl JobsService {
         }
     }
 
-    /// Says what a cancelled job waits for, before its client has waited too long.
+    /// Returns the status that names what a cancelled job waits for, before its client has waited
+    /// too long.
     async fn not_ended_yet(&self, job: JobId) -> Result<Status, Status> {
         let snapshot = self.snapshot(event::Request::Get(job)).await?;
         let waiting_for = snapshot.unwrap_or_default().waiting_for;
@@ -98,7 +101,7 @@ impl JobsService {
         Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
-    /// How an ended job ended.
+    /// Returns the end of an ended job.
     async fn end(&self, job: JobId) -> Result<EndRecord, Status> {
         match self.ask(event::Request::Fetch(job)).await? {
             Answer::Ended(end) => Ok(end),
@@ -120,7 +123,7 @@ impl Jobs for JobsService {
         let holder = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
         let SubmitRequest { specification: message, request_id, client, priority, name } =
             request.into_inner();
-        // Who showed a token is who it was made for, whatever else it says.
+        // A token determines the client's name, whatever the message says.
         let client = holder.unwrap_or(client);
         for (field, value) in [("request_id", &request_id), ("client", &client), ("name", &name)] {
             if value.len() > NAME_BYTES_MAX {

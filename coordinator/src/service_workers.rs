@@ -1,4 +1,4 @@
-//! The service of workers: bytes of a stream into events.
+//! The gRPC service for workers: turns the messages of a stream into events.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,10 +20,10 @@ use crate::event::{Event, Hello};
 use crate::ids::{BatchId, WorkerId};
 use crate::outbound::{OUTBOUND_MAX, Outbound, Outgoing};
 
-/// A new stream must say hello within this time.
+/// A new stream must send its hello message within this time.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The service of workers.
+/// The gRPC service for workers.
 pub(crate) struct WorkersService {
     messages: mpsc::Sender<Message>,
     next_worker: Arc<AtomicU64>,
@@ -48,7 +48,7 @@ impl Workers for WorkersService {
     }
 }
 
-/// Serves one worker in a task of its own; what the worker gets.
+/// Serves one worker in a task of its own; returns the messages to the worker.
 fn attach(
     worker: WorkerId,
     incoming: impl Stream<Item = Result<AttachRequest, Status>> + Send + Unpin + 'static,
@@ -59,19 +59,19 @@ fn attach(
         let (outbound, closed) = Outbound::new(outgoing.clone());
         tokio::select! {
             () = forward(worker, incoming, &messages, outbound) => {}
-            // The coordinator has dropped the other end: it closed the stream.
+            // The coordinator has dropped the other end, so the stream is closed.
             _ = closed => {}
-            // The worker is gone.
+            // The worker has gone.
             () = outgoing.closed() => {}
         }
         drop(outgoing);
-        // Without its core the coordinator is gone, and the stream means nothing.
+        // Without its core task the coordinator is gone, and the end of the stream is irrelevant.
         let _ = messages.send(Message::Event(Event::StreamEnded { worker })).await;
     });
     ReceiverStream::new(stream)
 }
 
-/// Turns what a worker sends into events, until its stream ends.
+/// Turns the messages of a worker into events, until its stream ends.
 async fn forward(
     worker: WorkerId,
     mut incoming: impl Stream<Item = Result<AttachRequest, Status>> + Unpin,
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
     use crate::outbound::{heartbeat, status};
 
-    /// A worker that says hello, then neither speaks nor reads.
+    /// Returns a worker that sends a hello message, then neither sends nor reads.
     async fn attached() -> (Outbound, mpsc::Receiver<Message>, ReceiverStream<Outgoing>) {
         let hello = AttachRequest { message: Some(Request::Hello(WorkerHello::default())) };
         let incoming = futures::stream::iter([Ok(hello)]).chain(futures::stream::pending());
@@ -171,7 +171,7 @@ mod tests {
         for _ in 0..OUTBOUND_MAX {
             outbound.send(Ok(heartbeat())).unwrap();
         }
-        // The status finds no place.
+        // The queue is full, so the status is not sent.
         outbound.send(Err(status(&CloseReason::NotReading))).unwrap_err();
         drop(outbound);
         let read = tokio::time::timeout(HELLO_TIMEOUT, stream.count()).await;

@@ -1,6 +1,6 @@
-//! Starting and stopping: the store's thread, the task that owns the state, the services on one
-//! port. This, the services and [`crate::core_task`] are all that is asynchronous; they only move
-//! bytes.
+//! Starts and stops a coordinator: the store's thread, the task that owns the state, and the
+//! services on one port. All asynchronous code is here, in the services and in
+//! [`crate::core_task`], and only moves bytes.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -34,41 +34,42 @@ use crate::store_thread::{self, Command};
 use crate::tls::Tls;
 use crate::tokens::Tokens;
 
-/// Events that may wait for the one task.
+/// Maximum number of events that wait for the core task.
 const EVENTS_MAX: usize = 1024;
-/// Streams and calls that one connection may have open.
+/// Maximum number of streams and calls that one connection may have open.
 const STREAMS_PER_CONNECTION_MAX: u32 = 256;
-/// A silent connection is probed this often, and given up when a probe stays unanswered as long.
+/// A silent connection is probed at this interval, and closed when a probe is not answered within
+/// the same time.
 const KEEPALIVE: Duration = Duration::from_secs(10);
 
-/// The services behind their door.
+/// The services behind the access layer.
 type GuardedRouter = Router<Stack<AccessLayer, Identity>>;
 
-/// Why a coordinator does not start.
+/// Error when a coordinator cannot start.
 #[derive(Debug, Error)]
 pub enum StartError {
     /// The store cannot be read.
     #[error(transparent)]
     Restore(#[from] StoreError),
-    /// The operating system gives no thread.
+    /// The operating system cannot create a thread.
     #[error("cannot start the store's thread: {source}")]
     Thread {
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The thread that reads the store ended unasked.
-    #[error("the store could not be read: its thread ended unasked")]
+    /// The thread that reads the store ended unexpectedly.
+    #[error("the store could not be read: its thread ended unexpectedly")]
     Interrupted {
-        /// How.
+        /// The cause.
         source: tokio::task::JoinError,
     },
-    /// No secret can be drawn.
+    /// The operating system provides no random numbers for secrets.
     #[error(transparent)]
     NoRandomness(#[from] NoRandomness),
     /// The description of the services cannot be read.
     #[error("the services' description for gRPC reflection cannot be read")]
     Reflection {
-        /// Why.
+        /// The cause.
         source: tonic_reflection::server::Error,
     },
 }
@@ -88,10 +89,10 @@ pub struct Coordinator {
     shutdown_timeout: Duration,
 }
 
-/// Starts a coordinator on a bound address, and goes on with the jobs of its store.
+/// Starts a coordinator on a bound address, and continues the jobs of its store.
 ///
 /// # Errors
-/// When the store cannot be read.
+/// When the store cannot be read, or another part cannot be started.
 pub async fn start(
     listener: Listener,
     mut store: Box<dyn Store + Send>,
@@ -143,13 +144,14 @@ pub async fn start(
 }
 
 impl Coordinator {
-    /// URL that clients and workers use: `http://127.0.0.1:PORT` or `unix:PATH`.
+    /// Returns the URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT`
+    /// or `unix:PATH`.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Takes these tokens, and no others, for every call that begins from now on. A coordinator
-    /// that asks for none goes on to ask for none.
+    /// Replaces the accepted tokens, for every call that begins from now on. A coordinator that
+    /// requires no tokens continues to require none.
     pub fn replace_tokens(&self, tokens: Tokens) {
         self.policy.send_modify(|policy| match **policy {
             Policy::Everybody => {}
@@ -158,30 +160,30 @@ impl Coordinator {
         });
     }
 
-    /// Uses these certificates for every connection that begins from now on; a coordinator
-    /// without TLS goes on without.
+    /// Replaces the certificates, for every connection that begins from now on. A coordinator
+    /// without TLS continues without.
     pub fn replace_tls(&self, with: Tls) {
         if let Some(tls) = &self.tls {
             tls.send_replace(with);
         }
     }
 
-    /// Waits, for ever if all is well, until a part of the coordinator has ended unasked, or the
-    /// store has refused a record for [`Config::store_patience`]. Then nothing goes on any more:
-    /// shut it down, and say why.
+    /// Waits until a part of the coordinator has ended unexpectedly, or the store has refused a
+    /// record for [`Config::store_give_up_after`]; otherwise the future never completes. The coordinator
+    /// cannot continue then: shut it down and report the reason.
     pub fn failed(&self) -> impl Future<Output = Failed> + Send + use<> {
         self.failing.first()
     }
 
-    /// Stops: no new batch, every stream closed, everything complete stored. Waits for that no
-    /// longer than [`Config::shutdown_timeout`]; what is not stored then is computed again by the
-    /// next coordinator on the same store.
+    /// Stops: sends no new batch, closes every stream and stores everything complete. Waits for
+    /// that at most [`Config::shutdown_timeout`]; evaluations that are not stored by then are
+    /// computed again by the next coordinator on the same store.
     pub async fn shutdown(self) {
         self.failing.disarm();
         let stop = async {
             let (reply, stopped) = oneshot::channel();
             if self.messages.send(Message::Shutdown(reply)).await.is_ok() {
-                // The task may be gone already; then there is nothing to wait for.
+                // The task may have ended already; then there is nothing to wait for.
                 let _ = stopped.await;
             }
         };
@@ -196,8 +198,8 @@ impl Coordinator {
             server.abort();
             let _ = server.await;
         }
-        // The services, which hold the last senders of commands, are gone: the thread ends after
-        // the write it is at, and closes the store.
+        // The services, which held the last senders of commands, are gone: the thread finishes its
+        // current write, closes the store and ends.
         let store = self.store;
         let joined = tokio::task::spawn_blocking(move || store.join());
         let _ = tokio::time::timeout(self.shutdown_timeout, joined).await;
@@ -209,7 +211,7 @@ async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
     drop(guard);
 }
 
-/// The services of one port.
+/// Builds the services of one port.
 async fn services(
     messages: &mpsc::Sender<Message>,
     commands: &mpsc::Sender<Command>,
@@ -228,7 +230,7 @@ async fn services(
     };
     let unreadable = |source| StartError::Reflection { source };
     let reflection = described().build_v1().map_err(unreadable)?;
-    // The official clients of some languages know this version only.
+    // The official clients of some languages support only this version.
     let reflection_v1alpha = described().build_v1alpha().map_err(unreadable)?;
     Ok(Server::builder()
         .http2_keepalive_interval(Some(KEEPALIVE))
@@ -259,7 +261,7 @@ async fn serve(
     stopped: oneshot::Receiver<()>,
 ) {
     let signal = async {
-        // Told, or the coordinator was dropped: both mean stop.
+        // A message and a dropped sender both mean stop.
         let _ = stopped.await;
     };
     let Listener { bound, file: _file, .. } = listener;

@@ -1,4 +1,4 @@
-//! A job at one moment, as clients see it.
+//! Snapshots: the state of a job at one moment, as clients see it.
 
 use std::time::Duration;
 
@@ -9,14 +9,14 @@ use osteon_proto::v1::{JobSnapshot, JobState};
 use crate::batch::Purpose;
 use crate::ids::JobId;
 use crate::job::{EndedJob, Job, Stage};
-use crate::state::{LostInARow, State};
+use crate::state::{HostLosses, State};
 
-/// Without an answer for this long, a snapshot says what is waited for.
+/// Without an answer for this long, a snapshot says what the job waits for.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Most hosts that are named whose workers vanish, and most workers that do not answer.
+/// Maximum number of failing hosts that are named, and of workers that do not answer.
 const UNFIT_SHOWN_MAX: usize = 3;
 
-/// How `id` stands at `now`; `None` if no client can know of it.
+/// Returns the snapshot of `id` at `now`; `None` if no client can know the job yet.
 pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
     if let Some(job) = state.ended.get(&id) {
         return Some(ended(state, job));
@@ -65,7 +65,7 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
         reason: end.ending.reason.clone().unwrap_or_default(),
         evaluations: end.evaluations,
         max_evaluations: job.max_evaluations,
-        // An evaluation that counts is complete.
+        // Only complete evaluations count.
         realizations_done: if end.evaluations > 0 { job.realizations } else { 0 },
         realizations: job.realizations,
         best_cost: end.best_cost,
@@ -103,18 +103,18 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
     snapshot.waiting_for = waiting_for(state, job, now);
 }
 
-/// What a job that has not ended waits for, in words; empty if it does not wait.
+/// Describes what a job that has not ended waits for; empty if it does not wait.
 fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
-    if let Some(trouble) = &job.trouble {
+    if let Some(store_trouble) = &job.store_trouble {
         let does = match job.stage {
-            Stage::Replaying { .. } => "give",
-            _ => "take",
+            Stage::Replaying { .. } => "read",
+            _ => "write",
         };
         return format!(
-            "the store does not {does} a record, it is tried again: {} {}",
-            trouble.error,
-            since(trouble.since)
+            "the store cannot {does} a record; retrying: {} {}",
+            store_trouble.error,
+            since(store_trouble.since)
         );
     }
     if state.draining {
@@ -124,7 +124,9 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     match &job.stage {
         Stage::Computing(evaluation) if !evaluation.quarantine.is_empty() && !unfit.is_empty() => {
             let count = evaluation.quarantine.len();
-            format!("a sound worker for {count} realizations over which others vanished; {unfit}")
+            format!(
+                "a reliable worker for {count} realizations over which others were lost; {unfit}"
+            )
         }
         Stage::Waiting => format!(
             "its turn: {} jobs run and {} wait {}",
@@ -163,7 +165,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     }
 }
 
-/// The answer that a job waits for longest, in words.
+/// Describes the answer that a job has been waiting for longest.
 fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -> Option<String> {
     let of_job = state.batches.iter().filter(|(_, batch)| {
         batch.assignment.job == job.record.job && batch.purpose != Purpose::Speculative
@@ -175,7 +177,7 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
         0 if job.pace.is_known() => {
             "; it is overdue, and no other worker has taken it over".to_owned()
         }
-        // It may take so long.
+        // The first answer may just take this long.
         0 => "; nothing of this job is answered yet".to_owned(),
         1 => "; another worker computes the same".to_owned(),
         _ => format!("; {others} others compute the same"),
@@ -184,17 +186,17 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
     Some(format!("the answer of {name} to {count} realizations {}{instead}", since(batch.sent)))
 }
 
-/// The hosts whose workers vanish with whatever they hold, and the workers that do not answer it, in
-/// words; empty if there is none.
+/// Describes the hosts whose workers are lost whatever they hold, and the workers that do not
+/// answer; empty if there are none.
 fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
-    let named = |(host, lost): (&String, &LostInARow)| {
-        format!("the last {} workers of {host} vanished with what they held", lost.workers.len())
+    let named = |(host, lost): (&String, &HostLosses)| {
+        format!("the last {} workers of {host} were lost with their batches", lost.workers.len())
     };
-    // A worker that holds nothing, or is gone, is not waited for.
+    // A worker that holds nothing or has departed is not waited for.
     let holding = state.workers.values().filter(|worker| !worker.in_flight.is_empty());
     let silent = holding.filter(|worker| state.probation.is_silent(&worker.name));
-    let silent = silent.map(|worker| format!("{} does not answer what it holds", worker.name));
+    let silent = silent.map(|worker| format!("{} does not answer its batches", worker.name));
     let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")
 }

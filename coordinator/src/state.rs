@@ -1,4 +1,4 @@
-//! The whole truth of a coordinator as plain data. [`crate::reactor`] changes it,
+//! The complete state of a coordinator as plain data. [`crate::reactor`] changes it,
 //! [`crate::sanity`] checks it; nothing here waits, sends or reads a clock.
 //!
 //! Times are durations since the Unix epoch, given with each event.
@@ -22,16 +22,16 @@ use crate::rate::Rate;
 use crate::store::BanRecord;
 use crate::worker_name::WorkerName;
 
-/// Batches that a worker holds at a time: it computes one while the next is on its way.
+/// Maximum number of batches that a worker holds: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
-/// So many workers of a host that are lost in a row make it one that is given only what it cannot
-/// do much harm to.
+/// Number of workers of a host lost in a row after which its workers receive only work that can do
+/// little harm if they are lost again.
 const LOST_IN_A_ROW_MAX: usize = 3;
-/// So many of them are remembered.
+/// Number of lost workers that are remembered per host.
 const LOST_SHOWN_MAX: usize = 99;
-/// Workers that went which are remembered, to be listed.
+/// Number of departed workers that are remembered, to be listed.
 pub(crate) const DEPARTED_MAX: usize = 64;
-/// Settled batches that are remembered for each worker, to compare late answers with.
+/// Number of settled batches that are remembered per worker, to compare late answers with.
 pub(crate) const SETTLED_MAX: usize = 16;
 
 /// State of a coordinator.
@@ -40,43 +40,44 @@ pub struct State {
     pub(crate) config: Config,
     /// Jobs that have not ended.
     pub(crate) jobs: BTreeMap<JobId, Job>,
-    /// Jobs that have ended; what they left is in the store.
+    /// Jobs that have ended; their output is in the store.
     pub(crate) ended: BTreeMap<JobId, EndedJob>,
-    /// Job of each request.
+    /// The job that each request submitted.
     pub(crate) requests: BTreeMap<RequestName, JobId>,
-    /// Jobs that are not begun, in the order of their acceptance.
+    /// Jobs that have not begun, in the order of their acceptance; one whose end was taken back is
+    /// last.
     pub(crate) waiting: VecDeque<JobId>,
-    /// Jobs that are computed or whose evaluation is being stored.
+    /// Jobs that are replayed or computed, or whose evaluation is being stored.
     pub(crate) active: BTreeSet<JobId>,
-    /// What the clients of active jobs have had.
+    /// Computing time that the clients of active jobs have received.
     pub(crate) shares: Shares,
-    /// Job that was handed out last.
+    /// The job whose batch was sent last.
     pub(crate) last_served: Option<JobId>,
-    /// Jobs that changed since they were published.
+    /// Jobs that changed since their last published snapshot.
     pub(crate) changed: BTreeSet<JobId>,
-    /// When time was looked at last.
+    /// Time of the last tick.
     pub(crate) ticked: Duration,
-    /// When all active jobs were published last.
+    /// Time when all active jobs were last published.
     pub(crate) published: Duration,
-    /// When this life began.
+    /// Start time of this process.
     pub(crate) started: Duration,
-    /// When old jobs were looked for last; `None` if they were not.
+    /// Time of the last search for jobs to prune; `None` if there was none.
     pub(crate) pruned: Option<Duration>,
     pub(crate) workers: BTreeMap<WorkerId, Worker>,
-    /// Workers that went last, the newest at the end, at most [`DEPARTED_MAX`].
+    /// The workers that departed last, newest at the end, at most [`DEPARTED_MAX`].
     pub(crate) departed: VecDeque<Departed>,
-    /// Workers that compute wrongly, in the order in which they were found.
+    /// Workers that returned wrong answers, in the order of their detection.
     pub(crate) banned: Vec<Banned>,
-    /// How many workers of a host were lost in a row with what they held, none answering anything
+    /// The workers of each host that were lost in a row while they held batches, without an answer
     /// in between.
-    pub(crate) lost_in_a_row: BTreeMap<String, LostInARow>,
-    /// Workers that take batches and do not answer them.
+    pub(crate) lost_in_a_row: BTreeMap<String, HostLosses>,
+    /// Workers that accept batches and do not answer them.
     pub(crate) probation: Probation,
-    /// Since when there has been no worker; meaningless while there is one.
+    /// Time since which no worker has been attached; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
-    /// Batches that are overdue and wait for another worker that computes the same; of duplicates the
-    /// newest.
+    /// Overdue batches that wait for a duplicate on another worker; of several duplicates only the
+    /// newest is listed.
     pub(crate) overdue: BTreeSet<BatchId>,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
@@ -85,23 +86,24 @@ pub struct State {
     pub(crate) draining: bool,
 }
 
-/// A worker that computes wrongly: refused for the life of the coordinator.
+/// A worker that returned wrong answers. It is refused while this process runs, and after a restart
+/// while its ban is in the store.
 #[derive(Debug)]
 pub(crate) struct Banned {
     pub(crate) record: BanRecord,
-    /// When its record is written again; `None` once it is durable. Until then no job reads its
-    /// stored evaluations: after a crash nobody would know which of them are wrong.
+    /// Time of the next attempt to write its record; `None` once it is durable. Until then no job
+    /// reads its stored evaluations: after a crash it would be unknown which of them are wrong.
     pub(crate) store_at: Option<Duration>,
-    /// The store refused it, and it is not on its way again.
+    /// The store refused the record, and it has not been sent again yet.
     pub(crate) refused: bool,
 }
 
-/// Workers of one host.
+/// Lost workers of one host.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct LostInARow {
-    /// Which, the newest.
+pub(crate) struct HostLosses {
+    /// Their names, newest last.
     pub(crate) workers: VecDeque<WorkerName>,
-    /// When the last was lost.
+    /// Time of the last loss.
     pub(crate) last: Duration,
 }
 
@@ -110,54 +112,54 @@ pub(crate) struct LostInARow {
 pub(crate) struct Departed {
     pub(crate) worker: WorkerId,
     pub(crate) name: WorkerName,
-    /// When it went.
+    /// Time of departure.
     pub(crate) at: Duration,
-    /// How many batches it held.
+    /// Number of batches that it held.
     pub(crate) batches: usize,
     pub(crate) why: Departure,
 }
 
-/// A stay of a worker.
+/// One stay of a worker, from its attachment to its departure.
 #[derive(Debug)]
 pub(crate) struct Worker {
     pub(crate) lease: LeaseId,
     pub(crate) name: WorkerName,
     pub(crate) hello: Hello,
-    /// Since when it is there.
+    /// Time of attachment.
     pub(crate) attached: Duration,
-    /// When its last message came.
+    /// Time of its last message.
     pub(crate) last_seen: Duration,
-    /// When its last answer came, or it attached.
+    /// Time of its last answer, or of its attachment.
     pub(crate) answered: Duration,
-    /// It has answered something in this stay.
+    /// It has answered at least one batch in this stay.
     pub(crate) has_answered: bool,
-    /// Batches that others answered in its place, since its last answer to one that it held.
-    pub(crate) missed: Missed,
-    /// When the last sign of life was given to it.
+    /// Batches that others answered in its place since its last answer to a batch that it held.
+    pub(crate) missed: MissedBatches,
+    /// Time when the last heartbeat was sent to it.
     pub(crate) heartbeat_sent: Duration,
-    /// Batches it holds, in the order they were sent.
+    /// Batches that it holds, in the order they were sent.
     pub(crate) in_flight: Vec<BatchId>,
-    /// Batches it answered or was told to forget, newest last.
+    /// Batches that it answered or that were revoked, newest last.
     pub(crate) settled: VecDeque<(BatchId, Assignment)>,
-    /// What it answers, over all jobs.
+    /// Its rate over all jobs.
     pub(crate) rate: Rate,
-    /// Realizations per second, by job.
+    /// Its rate in realizations per second, by job.
     pub(crate) rates: BTreeMap<JobId, f64>,
-    /// It wants no more batches.
+    /// It accepts no more batches.
     pub(crate) draining: bool,
 }
 
-/// Batches in a row that others answered, long after their worker should have.
+/// Consecutive batches of a worker that others answered, long after it should have.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Missed {
-    /// How many.
+pub(crate) struct MissedBatches {
+    /// Their number.
     pub(crate) count: u32,
-    /// When the worker could begin the first of them; means nothing while there is none.
+    /// Time when the worker could begin the first of them; meaningless while there is none.
     pub(crate) since: Duration,
 }
 
 impl State {
-    /// A coordinator that knows no job, as of `now`.
+    /// Returns a coordinator without jobs, as of `now`.
     pub fn new(config: Config, now: Duration) -> Self {
         Self {
             config,
@@ -189,25 +191,26 @@ impl State {
         }
     }
 
-    /// Whether nothing is left to do.
+    /// Returns whether nothing is left to do.
     pub fn is_idle(&self) -> bool {
         self.active.is_empty() && self.waiting.is_empty() && self.unstored() == 0
     }
 
-    /// How many jobs have not ended.
+    /// Returns the number of jobs that have not ended.
     pub(crate) fn unfinished(&self) -> usize {
         self.jobs.len()
     }
 
-    /// Records on their way to the store.
+    /// Returns the number of records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
         let banned = self.banned.iter().filter(on_its_way).count();
-        let jobs = self.jobs.values().filter(|job| job.stage.is_storing() && job.trouble.is_none());
+        let jobs =
+            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_trouble.is_none());
         jobs.count() + banned
     }
 
-    /// The work of an assignment, while its evaluation is under way.
+    /// Returns the work of an assignment while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
         let evaluation = self.evaluation_of(assignment)?;
         let specification = &self.jobs.get(&assignment.job)?.record.specification;
@@ -220,7 +223,7 @@ impl State {
         })
     }
 
-    /// The evaluation of a job, while it is under way.
+    /// Returns the evaluation that the job's search asked for, while it is under way.
     pub(crate) fn evaluation_mut(&mut self, job: JobId) -> Option<&mut Evaluation> {
         match &mut self.jobs.get_mut(&job)?.stage {
             Stage::Computing(evaluation) => Some(evaluation),
@@ -228,7 +231,7 @@ impl State {
         }
     }
 
-    /// The evaluation that a batch is about, while this attempt at it is under way.
+    /// Returns the evaluation of an assignment while this attempt at it is under way.
     pub(crate) fn evaluation_of(&self, assignment: &Assignment) -> Option<&Evaluation> {
         let job = self.jobs.get(&assignment.job)?;
         job.evaluations().find(|found| found.attempt == assignment.attempt)
@@ -240,29 +243,29 @@ impl State {
         job.evaluations_mut().find(|found| found.attempt == assignment.attempt)
     }
 
-    /// A number for the next attempt at an evaluation.
+    /// Returns a number for the next attempt at an evaluation.
     pub(crate) fn new_attempt(&mut self) -> u64 {
         self.next_attempt += 1;
         self.next_attempt - 1
     }
 
-    /// The ban of a worker, if it was banned.
+    /// Returns the ban of a worker, if it is banned.
     pub(crate) fn ban(&self, name: &WorkerName) -> Option<&BanRecord> {
         let found = self.banned.iter().find(|banned| banned.record.worker == *name);
         found.map(|banned| &banned.record)
     }
 
-    /// Whether the ban of a worker is not durable yet.
+    /// Returns whether any ban is not durable yet.
     pub(crate) fn ban_pending(&self) -> bool {
         self.banned.iter().any(|banned| banned.store_at.is_some())
     }
 
-    /// Whether the workers of a host are lost over whatever they hold.
+    /// Returns whether the workers of a host are lost whatever they hold.
     pub(crate) fn is_failing(&self, host: &str) -> bool {
         self.lost_in_a_row.get(host).is_some_and(|lost| lost.workers.len() >= LOST_IN_A_ROW_MAX)
     }
 
-    /// A worker of a host has answered.
+    /// Notes that a worker has answered.
     pub(crate) fn note_answer(&mut self, worker: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&worker) {
             worker.has_answered = true;
@@ -270,7 +273,7 @@ impl State {
         }
     }
 
-    /// A worker of a host was lost with what it held.
+    /// Notes that a worker was lost while it held batches.
     pub(crate) fn count_loss(&mut self, name: &WorkerName, now: Duration) {
         let host = name.host();
         if self.lost_in_a_row.len() >= WORKERS_MAX && !self.lost_in_a_row.contains_key(host) {
@@ -283,22 +286,22 @@ impl State {
             lost.workers.pop_front();
         }
         if lost.workers.len() == LOST_IN_A_ROW_MAX {
-            tracing::warn!(%host, "the workers of this host vanish with whatever they hold");
+            tracing::warn!(%host, "workers on this host keep disappearing with the batches they hold");
         }
     }
 
-    /// Whether a worker takes batches, and is expected to answer them.
+    /// Returns whether a worker accepts batches and is expected to answer them.
     pub(crate) fn is_sound(&self, worker: &Worker) -> bool {
         !worker.draining && !self.probation.has(&worker.name)
     }
 
-    /// Whether somebody that meets `of` takes batches, and is expected to answer them.
+    /// Returns whether a worker that satisfies `of` accepts batches and is expected to answer them.
     pub(crate) fn answers_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
         let answers = |worker: &Worker| of(&worker.name) && self.is_sound(worker);
         !self.draining && self.workers.values().any(answers)
     }
 
-    /// The batches that a worker holds for one purpose.
+    /// Returns the batches that a worker holds for one purpose.
     pub(crate) fn held_for<'a>(
         &'a self,
         worker: &'a Worker,
@@ -309,7 +312,7 @@ impl State {
         worker.in_flight.iter().copied().filter(is_for)
     }
 
-    /// Forgets a batch, and remembers with its worker what it was about.
+    /// Removes a batch, and remembers its assignment with its worker.
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
         self.overdue.remove(&batch);

@@ -1,7 +1,7 @@
-//! What outlives a coordinator: jobs, their evaluations, how they ended.
+//! The durable state of a coordinator: jobs, their evaluations and their ends.
 //!
 //! The interface is small and synchronous; one blocking thread calls it. Each `put` returns when
-//! the record is durable, and putting the same record again is no error, so that a write whose
+//! the record is durable, and putting the same record again is not an error, so that a write whose
 //! answer was lost can be repeated.
 
 use std::collections::BTreeSet;
@@ -32,17 +32,17 @@ pub struct JobRecord {
     pub job: JobId,
     /// Identifier of the request that submitted it; empty if it had none.
     pub request_id: String,
-    /// What to compute.
+    /// The specification.
     pub specification: Arc<JobSpecification>,
-    /// When it was accepted, since the Unix epoch.
+    /// Time of acceptance, since the Unix epoch.
     pub accepted: Duration,
     /// Fingerprint of the numerics that its stored evaluations were computed with.
     pub fingerprint: String,
-    /// Who submitted it, as the client says; jobs of one client share what is its.
+    /// Name of the client, as it gave it. The jobs of a client share its computing time.
     pub client: String,
-    /// Its rank among the jobs of its client: a higher one goes first.
+    /// Priority among the jobs of its client: higher values go first.
     pub priority: u32,
-    /// What people call it; may be empty.
+    /// Display name; may be empty.
     pub name: String,
 }
 
@@ -59,37 +59,37 @@ pub struct EvaluationRecord {
     pub outcomes: Arc<[Outcome]>,
     /// Estimated errors of the successes, unless there are none.
     pub estimated_error: Option<EstimatedError>,
-    /// Everybody whose answers are in it.
+    /// All workers whose answers are in it.
     pub workers: BTreeSet<WorkerName>,
 }
 
-/// A worker that was found to compute wrongly.
+/// A worker that was banned for wrong answers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BanRecord {
     /// Number of the ban, from 1.
     pub number: u64,
     /// The worker.
     pub worker: WorkerName,
-    /// The job in which it was found.
+    /// The job in which a wrong answer was found.
     pub job: JobId,
-    /// What was found, in a sentence.
+    /// The finding, as a sentence.
     pub reason: String,
-    /// When, since the Unix epoch.
+    /// Time of the ban, since the Unix epoch.
     pub at: Duration,
 }
 
-/// The end of a job, with what a snapshot of it shows.
+/// The end of a job, with the values that its snapshot shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndRecord {
     /// The job.
     pub job: JobId,
-    /// How it ended.
+    /// Status and reason of the end.
     pub ending: Ending,
-    /// The program that computed it.
+    /// The program that computed the job.
     pub program: Program,
-    /// When, since the Unix epoch.
+    /// Time of the end, since the Unix epoch.
     pub ended: Duration,
-    /// Complete evaluations.
+    /// Number of complete evaluations.
     pub evaluations: u64,
     /// Cost of the best feasible point.
     pub best_cost: Option<f64>,
@@ -98,7 +98,7 @@ pub struct EndRecord {
 }
 
 impl EndRecord {
-    /// The end of a job whose best feasible evaluation is `best`.
+    /// Returns the end of a job whose best feasible evaluation is `best`.
     pub fn new(
         job: JobId,
         ending: Ending,
@@ -119,40 +119,40 @@ impl EndRecord {
     }
 }
 
-/// A job as the store has it.
+/// A job as stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredJob {
     /// The job.
     pub record: JobRecord,
     /// Its end, if it has ended.
     pub end: Option<EndRecord>,
-    /// How many evaluations the store has of it.
+    /// Number of its evaluations in the store.
     pub evaluations: u64,
 }
 
-/// Why the store did not do what it was asked.
+/// Error of the store.
 ///
-/// A message is complete: it contains that of its cause, which is no source of it, so that nobody
-/// who prints the chain says it twice.
+/// A message is complete: it contains the message of its cause, which is not returned as its
+/// source, so that printing the chain does not repeat it.
 #[derive(Debug, Error)]
 pub enum StoreError {
-    /// SQLite refused.
+    /// SQLite reported an error.
     #[error("{}: {error}", path.display())]
     Sqlite {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// The error of SQLite.
         error: rusqlite::Error,
     },
-    /// The directory cannot be made.
+    /// The directory cannot be created.
     #[error("cannot create {}: {error}; choose another directory", path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// The file that says who has the store open cannot be written.
+    /// The lock file, which names the process that has the store open, cannot be written.
     #[error(
         "cannot write and lock {}: {error}; give the coordinator's user write permission to its \
          directory, or choose another one, on a disk that knows locks",
@@ -161,18 +161,18 @@ pub enum StoreError {
     Lock {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// There is no room for a new file.
+    /// The disk has no space for a new file.
     #[error("no room is left for {}: {error}; make room on its disk", path.display())]
     NoRoom {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// The file cannot be made.
+    /// The file cannot be created.
     #[error(
         "cannot make {}: {error}; give the coordinator's user write permission to its directory, or \
          choose another directory",
@@ -181,7 +181,7 @@ pub enum StoreError {
     Make {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
     /// Another process has it open.
@@ -192,18 +192,18 @@ pub enum StoreError {
     InUse {
         /// The file.
         path: PathBuf,
-        /// Who has it, for people.
+        /// The process that has it open, for people.
         holder: String,
     },
-    /// There is no room.
+    /// The disk is full.
     #[error("no room is left for {}: {error}; make room on its disk", path.display())]
     Full {
         /// The file.
         path: PathBuf,
-        /// What SQLite said.
+        /// The error of SQLite.
         error: rusqlite::Error,
     },
-    /// The system fails to read or write it.
+    /// The operating system fails to read or write it.
     #[error(
         "{} cannot be read or written: {error}; check the disk and its quota",
         path.display()
@@ -211,7 +211,7 @@ pub enum StoreError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What SQLite said.
+        /// The error of SQLite.
         error: rusqlite::Error,
     },
     /// It cannot be opened or written.
@@ -223,10 +223,10 @@ pub enum StoreError {
     NotWritable {
         /// The file.
         path: PathBuf,
-        /// What SQLite said.
+        /// The error of SQLite.
         error: rusqlite::Error,
     },
-    /// SQLite cannot make sense of it.
+    /// SQLite reports it as damaged or not a database.
     #[error(
         "{} is damaged or not a database: {error}; restore the file from a copy, or choose another \
          directory",
@@ -235,21 +235,21 @@ pub enum StoreError {
     Corrupt {
         /// The file.
         path: PathBuf,
-        /// What SQLite said.
+        /// The error of SQLite.
         error: rusqlite::Error,
     },
-    /// There is no file to copy.
+    /// The store is in memory, so there is no file to copy.
     #[error("this coordinator keeps its jobs in memory; there is nothing to copy")]
     NoFile,
-    /// A copy of it cannot be made.
+    /// A copy of it cannot be made or removed.
     #[error("{} cannot be made or removed: {error}; look at its directory", path.display())]
     Copy {
         /// The file of the copy.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// Its pages do not fit together.
+    /// SQLite's integrity check found damage.
     #[error(
         "{} is damaged: {found}; restore the file from a copy, or choose another directory",
         path.display()
@@ -257,10 +257,10 @@ pub enum StoreError {
     Inconsistent {
         /// The file.
         path: PathBuf,
-        /// What SQLite found first.
+        /// The first finding of SQLite.
         found: String,
     },
-    /// Another program's tables are in it.
+    /// It holds tables of another program.
     #[error(
         "{} is a database of another program and is left as it is; choose another directory",
         path.display()
@@ -269,7 +269,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// A version of osteon with another format wrote it.
+    /// It was written by a version of osteon with another format.
     #[error(
         "{}: this store has format {found}; this version writes {known}: run the version that wrote \
          it, or choose another directory",
@@ -280,7 +280,7 @@ pub enum StoreError {
         path: PathBuf,
         /// Format of the file.
         found: i64,
-        /// The only format known.
+        /// The only supported format.
         known: i64,
     },
     /// The mark of acknowledged jobs cannot be read or written.
@@ -292,12 +292,12 @@ pub enum StoreError {
     Mark {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// The mark of acknowledged jobs makes no sense.
+    /// The mark of acknowledged jobs is damaged.
     #[error(
-        "{} is damaged: whether acknowledged jobs are missing cannot be told; look at the disk, \
+        "{} is damaged: it cannot be determined whether acknowledged jobs are missing; look at the disk, \
          restore the store from a copy, or start with --accept-lost-jobs",
         path.display()
     )]
@@ -305,7 +305,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// Jobs whose clients were told that they are accepted are not there.
+    /// Jobs that clients had been told were accepted are missing.
     #[error(
         "{} has lost {}, which had been accepted: its write-ahead log was cut short or damaged, or \
          an older copy of it was put in place; look at the disk, restore the store from a copy, or \
@@ -316,9 +316,9 @@ pub enum StoreError {
     LostJobs {
         /// The file.
         path: PathBuf,
-        /// The first that is missing.
+        /// The first missing job.
         first: JobId,
-        /// The last.
+        /// The last missing job.
         last: JobId,
     },
     /// An evaluation is missing.
@@ -332,7 +332,7 @@ pub enum StoreError {
         path: PathBuf,
         /// The job.
         job: JobId,
-        /// How many there are.
+        /// Number of evaluations found.
         found: u64,
         /// Number of the last, from 0.
         last: u64,
@@ -348,12 +348,12 @@ pub enum StoreError {
         path: PathBuf,
         /// The job.
         job: JobId,
-        /// Which record.
+        /// The record.
         record: DamagedRecord,
     },
 }
 
-/// Which record cannot be read.
+/// A record that cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum DamagedRecord {
     /// The specification.
@@ -365,20 +365,20 @@ pub enum DamagedRecord {
     /// The end.
     #[error("the end")]
     End,
-    /// What its path came to.
+    /// The summary of the path of the search.
     #[error("the summary")]
     Summary,
-    /// A ban of a worker that was found in it.
+    /// The ban of a worker that gave a wrong answer in the job.
     #[error("the expulsion of a worker, found in a realization")]
     Ban,
 }
 
-/// What is done between two pieces of a copy; `Break` ends it.
+/// Callback between two pieces of a copy; `Break` ends the copy.
 pub type Between<'a> = dyn FnMut(&mut dyn Store) -> ControlFlow<()> + 'a;
 
-/// A durable place for jobs.
+/// Durable storage for jobs.
 pub trait Store {
-    /// All jobs, in the order of their identifiers.
+    /// Returns all jobs, in the order of their identifiers.
     ///
     /// # Errors
     /// As [`visit_jobs`](Self::visit_jobs).
@@ -388,31 +388,32 @@ pub trait Store {
         Ok(jobs)
     }
 
-    /// A copy of the whole store, as it is when this returns: a SQLite file that is open for
-    /// reading and that nobody else can find. `None` if `between` ended it. The copy is made in
-    /// pieces; after each of them `between` may use the store, and what it changes is in the copy.
+    /// Returns a copy of the whole store as of the return of this call: a SQLite file that is open
+    /// for reading and has no name in the file system. `None` if `between` ended it. The copy is
+    /// made in pieces; after each of them `between` may use the store, and its changes are included
+    /// in the copy.
     ///
     /// # Errors
-    /// When the store is no file, cannot be read, or the copy cannot be written beside it.
+    /// When the store is not a file or cannot be read, or the copy cannot be written beside it.
     fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
-        // Where nothing is copied there is nothing between.
+        // A store that copies nothing never calls it.
         let _ = between;
         Err(StoreError::NoFile)
     }
 
-    /// Shows `visit` all jobs, in the order of their identifiers. One is in memory at a time.
+    /// Calls `visit` with each job, in the order of their identifiers. One is in memory at a time.
     ///
     /// # Errors
     /// When the store cannot be read, or an evaluation is missing before one that is there.
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError>;
 
-    /// One job.
+    /// Returns one job.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn job(&mut self, job: JobId) -> Result<Option<JobRecord>, StoreError>;
 
-    /// One evaluation of a job.
+    /// Returns one evaluation of a job.
     ///
     /// # Errors
     /// When the store cannot be read.
@@ -422,12 +423,12 @@ pub trait Store {
         number: u64,
     ) -> Result<Option<EvaluationRecord>, StoreError>;
 
-    /// Forgets the evaluations of a job, which from now on is computed with the numerics of
-    /// `fingerprint`: both or neither.
+    /// Deletes the evaluations of a job and records `fingerprint` as the numerics it is computed
+    /// with from now on, both in one transaction.
     ///
     /// # Errors
     /// When that is not durable.
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError>;
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError>;
 
     /// Makes a job durable.
     ///
@@ -435,8 +436,8 @@ pub trait Store {
     /// When it is not durable.
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError>;
 
-    /// Makes an evaluation durable, in the place of the one with the same number; with
-    /// `is_last`, forgets all after it: both or neither.
+    /// Makes an evaluation durable, replacing the one with the same number; with `is_last`, deletes
+    /// all evaluations after it in the same transaction.
     ///
     /// # Errors
     /// When that is not durable.
@@ -446,51 +447,51 @@ pub trait Store {
         is_last: bool,
     ) -> Result<(), StoreError>;
 
-    /// Makes the end of a job and what its path came to durable: both or neither.
+    /// Makes the end of a job and the summary of its search durable, both in one transaction.
     ///
     /// # Errors
     /// When they are not durable.
     fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError>;
 
-    /// What the path of an ended job came to.
+    /// Returns the summary of an ended job.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError>;
 
-    /// Forgets ended jobs and all that belongs to them: all of them or none. The room they took
-    /// is given back as far as the store can.
+    /// Deletes ended jobs and all their records in one transaction. Their disk space is released as
+    /// far as the store can.
     ///
     /// # Errors
     /// When that is not durable.
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError>;
 
-    /// The highest identifier of a job that was forgotten: no other job gets it, since somebody
-    /// may still ask for it.
+    /// Returns the highest identifier of a deleted job. It is never assigned again, since a client
+    /// may still ask for that job.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError>;
 
-    /// Makes durable that a worker is banned.
+    /// Makes the ban of a worker durable.
     ///
     /// # Errors
     /// When that is not durable.
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError>;
 
-    /// All banned workers, in the order of their numbers.
+    /// Returns all banned workers, in the order of their numbers.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError>;
 
-    /// Ended jobs with evaluations that a worker contributed to.
+    /// Returns the ended jobs with evaluations that a worker contributed to.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
 
-    /// Forgets all banned workers.
+    /// Deletes all bans.
     ///
     /// # Errors
     /// When that is not durable.

@@ -1,5 +1,5 @@
-//! The one thread that touches the store. Records are written in the order they come, each is
-//! reported as an event; what ended jobs left is read for those who fetch it.
+//! The only thread that uses the store. Records are written in the order of their arrival, and each
+//! is reported as an event; the output of ended jobs is read for the clients that fetch it.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -11,27 +11,27 @@ use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::effect::Record;
-use crate::event::{Event, Unread};
+use crate::event::{Event, ReadFailure};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
-use crate::leftover::Reading;
+use crate::job_output::Reading;
 use crate::store::{BanRecord, Store, StoreError};
 
-/// Commands that may wait: a record for every job, and some readers.
+/// Maximum number of waiting commands: a record for every job, and some reads.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
 
-/// Most commands that are done between two pieces of a copy, so that it comes to its end.
+/// Maximum number of commands that run between two pieces of a copy, so that the copy finishes.
 const COMMANDS_BETWEEN: usize = 64;
 
-/// Something to do with the store.
+/// A command for the store.
 pub(crate) enum Command {
     /// Make a record durable.
     Put(Record),
     /// Read an evaluation of a job.
     Read { job: JobId, number: u64 },
-    /// Forget ended jobs.
+    /// Delete ended jobs.
     Prune { token: Option<Token>, jobs: Vec<JobId> },
-    /// Read a record of what an ended job left.
+    /// Read a record of an ended job's output.
     Fetch(Reading),
     /// Copy the whole store.
     Copy { reply: CopyReply },
@@ -52,15 +52,15 @@ pub(crate) fn start(
     Ok((sender, thread))
 }
 
-/// Does what is asked for until every sender of commands is gone. Of what is fetched or copied one
-/// piece is read at a time, and a command that has come meanwhile goes first: no record of a job
-/// under way waits for longer than it takes to read one.
+/// Runs commands until every sender of commands is gone. Fetches and copies are served one piece at
+/// a time, and commands that arrive meanwhile run first: no record of a job under way waits for
+/// longer than it takes to read one piece.
 pub(crate) fn serve(
     store: &mut dyn Store,
     commands: &mut mpsc::Receiver<Command>,
     events: &mpsc::Sender<Event>,
 ) {
-    let mut desk = Desk { events, readings: VecDeque::new(), copies: VecDeque::new() };
+    let mut desk = PendingWork { events, readings: VecDeque::new(), copies: VecDeque::new() };
     loop {
         let command = if desk.readings.is_empty() && desk.copies.is_empty() {
             match commands.blocking_recv() {
@@ -84,29 +84,29 @@ pub(crate) fn serve(
     }
 }
 
-/// Where the answer to a copy goes; `None` inside if nobody waited for it any more.
+/// Channel for the result of a copy; `None` inside if the receiver had gone.
 pub(crate) type CopyReply = oneshot::Sender<Result<Option<File>, StoreError>>;
 
-/// What is to be done piece by piece, between commands.
-struct Desk<'a> {
+/// Work that is done piece by piece, between commands.
+struct PendingWork<'a> {
     events: &'a mpsc::Sender<Event>,
-    /// As many as there are fetches at once.
+    /// As many as there are fetches under way.
     readings: VecDeque<Reading>,
-    /// One, and perhaps one whose reader has gone.
+    /// One copy, and perhaps another whose reader has gone.
     copies: VecDeque<CopyReply>,
 }
 
-impl Desk<'_> {
+impl PendingWork<'_> {
     fn run(&mut self, store: &mut dyn Store, command: Command) {
         match command {
-            // Nobody listens any more when the coordinator has stopped.
+            // The receiver is gone when the coordinator has stopped.
             Command::Put(record) => drop(self.events.blocking_send(put(store, &record))),
             Command::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
                 drop(self.events.blocking_send(Event::Read { job, number, found }));
             }
             Command::Prune { token, jobs } => {
-                let outcome = store.forget_jobs(&jobs).map_err(|error| error.to_string());
+                let outcome = store.delete_jobs(&jobs).map_err(|error| error.to_string());
                 drop(self.events.blocking_send(Event::Pruned { token, jobs, outcome }));
             }
             Command::Fetch(reading) => self.readings.push_back(reading),
@@ -114,14 +114,14 @@ impl Desk<'_> {
         }
     }
 
-    /// Reads one record of what is fetched.
+    /// Reads one record for a fetch.
     fn read_on(&mut self, store: &mut dyn Store) {
         if let Some(reading) = self.readings.pop_front() {
             reading.serve(store);
         }
     }
 
-    /// Copies the store, and does between two pieces what is asked for meanwhile.
+    /// Copies the store, and runs waiting commands between two pieces.
     fn copy(
         &mut self,
         store: &mut dyn Store,
@@ -133,7 +133,7 @@ impl Desk<'_> {
                 match commands.try_recv() {
                     Ok(command) => self.run(store, command),
                     Err(TryRecvError::Empty) => break,
-                    // The coordinator stops.
+                    // The coordinator is stopping.
                     Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
                 }
             }
@@ -145,16 +145,16 @@ impl Desk<'_> {
     }
 }
 
-/// Why an evaluation was not read: what is damaged is not read another time either.
-fn unread(job: JobId, error: StoreError) -> Unread {
+/// Returns the reason why an evaluation was not read: a damaged one is permanently unreadable.
+fn unread(job: JobId, error: StoreError) -> ReadFailure {
     match error {
         StoreError::Damaged { .. } | StoreError::Corrupt { .. } => {
             tracing::error!(%job, %error, "a stored evaluation is damaged; it is computed again");
-            Unread::Damaged
+            ReadFailure::Damaged
         }
         _ => {
             tracing::warn!(%job, %error, "a stored evaluation cannot be read; it is tried again");
-            Unread::Refused { error: error.to_string() }
+            ReadFailure::Refused { error: error.to_string() }
         }
     }
 }
@@ -176,10 +176,10 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
     }
 }
 
-/// Stores a ban, and says whose results can no longer be relied on.
+/// Stores a ban, and logs the ended jobs whose results can no longer be relied on.
 fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
     store.put_ban(record)?;
-    // The log is a service: what it fails to say does not undo what is stored.
+    // Logging is a courtesy: if its query fails, the stored ban remains.
     let ended = store.ended_with(&record.worker).unwrap_or_default();
     if !ended.is_empty() {
         let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();

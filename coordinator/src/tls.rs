@@ -1,4 +1,4 @@
-//! The coordinator's side of TLS: its files, and what a peer's certificate says of the peer.
+//! The coordinator's side of TLS: its files, and the check of peers' certificates.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use crate::access::{Certificate, Fault, WORKER_NAME};
 /// The files of a listener with TLS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TlsFiles {
-    /// Certificates of the authorities that workers' certificates may be signed by.
+    /// Certificates of the authorities that may sign workers' certificates.
     pub ca: PathBuf,
     /// The coordinator's certificate.
     pub certificate: PathBuf,
@@ -32,7 +32,7 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
-/// Why TLS cannot be set up.
+/// Error when TLS cannot be set up.
 #[derive(Debug, Error)]
 pub enum TlsError {
     /// A file cannot be used.
@@ -43,24 +43,24 @@ pub enum TlsError {
     Authority {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: VerifierBuilderError,
     },
-    /// TLS refuses what the files hold.
+    /// The TLS library rejects the contents of the files.
     #[error("TLS cannot be set up: {source}")]
     Setup {
-        /// Why.
+        /// The cause.
         source: rustls::Error,
     },
 }
 
-/// Makes connections into TLS connections.
+/// Server side of TLS connections.
 #[derive(Clone)]
 pub struct Tls {
     pub(crate) acceptor: TlsAcceptor,
-    /// Decides of clients' certificates.
+    /// Verifies the certificates of peers.
     verifier: Arc<dyn ClientCertVerifier>,
-    /// A host name that the certificate is for, if possible one for other machines.
+    /// A host name that the certificate is for, preferably one that other machines can use.
     host: Option<String>,
 }
 
@@ -77,7 +77,7 @@ impl Tls {
         let roots = Arc::new(credentials::roots(&files.ca)?);
         let verifier: Arc<dyn ClientCertVerifier> =
             WebPkiClientVerifier::builder_with_provider(roots, Arc::clone(&provider))
-                // Clients come without; what they may call is decided call by call.
+                // Clients connect without certificates; access is decided call by call.
                 .allow_unauthenticated()
                 .build()
                 .map_err(|source| TlsError::Authority { path: files.ca.clone(), source })?;
@@ -91,7 +91,8 @@ impl Tls {
         Ok(Self { acceptor: TlsAcceptor::from(Arc::new(config)), verifier, host })
     }
 
-    /// What the certificates of a peer say, which has proved that it holds the key of the first.
+    /// Returns the result of the check of a peer's certificates; the peer has proved that it holds
+    /// the key of the first.
     pub(crate) fn certificate(&self, chain: Option<&[CertificateDer<'_>]>) -> Certificate {
         let Some((first, intermediates)) = chain.and_then(|chain| chain.split_first()) else {
             return Certificate::Absent;
@@ -103,7 +104,7 @@ impl Tls {
         }
     }
 
-    /// A host name that the certificate is for.
+    /// Returns a host name that the certificate is for.
     pub(crate) fn host(&self) -> Option<&str> {
         self.host.as_deref()
     }
@@ -115,9 +116,9 @@ impl std::fmt::Debug for Tls {
     }
 }
 
-/// Lets every certificate through the handshake whose key the peer holds. Whether it is in order
-/// is looked at behind the handshake ([`Tls::certificate`]) and told in the answer to the first
-/// call: an alert of TLS, which may be lost with the connection, would leave people guessing.
+/// Accepts in the handshake every certificate whose key the peer holds. Whether it is valid is
+/// checked after the handshake ([`Tls::certificate`]) and reported in the answer to the first call:
+/// a TLS alert may be lost with the connection, and users would have to guess the reason.
 #[derive(Debug)]
 struct LateVerifier(Arc<dyn ClientCertVerifier>);
 
@@ -177,7 +178,7 @@ fn fault(error: &rustls::Error) -> Fault {
     }
 }
 
-/// The first of the certificate's names, `localhost` only if there is no other.
+/// Returns the first of the certificate's names, `localhost` only if there is no other.
 fn host_name(certificate: &CertificateDer<'_>) -> Option<String> {
     let certificate = EndEntityCert::try_from(certificate).ok()?;
     let names = || certificate.valid_dns_names().filter(|name| !name.contains('*'));

@@ -1,5 +1,5 @@
-//! The tokens that a coordinator takes: names, roles, hashes. Read from a text, compared without
-//! telling by time how much of a hash was right.
+//! Tokens that a coordinator accepts: names, roles and hashes, read from a text. Hashes are
+//! compared in constant time, so that the timing does not show how much of one was right.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,30 +10,30 @@ use osteon_proto::credential_file::{self, CredentialError};
 use osteon_proto::token::{PREFIX, Token, TokenHash};
 use thiserror::Error;
 
-/// So many hexadecimal digits in a row may be a secret: half of a token's.
+/// This many consecutive hexadecimal digits may be a secret: half of those in a token.
 const SECRET_DIGITS: usize = 32;
 
-/// What the holder of a token may do; each role may do what those before it may.
+/// Permissions of a token's holder; each role includes those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// See every job and fetch every result.
     Read,
     /// Submit and cancel jobs.
     Submit,
-    /// Everything.
+    /// Call every method.
     Admin,
 }
 
-/// The tokens that are taken.
+/// The accepted tokens.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Tokens(Vec<Entry>);
 
-/// Whom a token belongs to.
+/// Holder of a token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holder {
     /// The name, for logs.
     pub name: String,
-    /// What the holder may do.
+    /// The holder's permissions.
     pub role: Role,
 }
 
@@ -43,7 +43,7 @@ struct Entry {
     hash: TokenHash,
 }
 
-/// Why a file of tokens cannot be used. No message holds a word of the file but names and roles.
+/// Error of a file of tokens. Messages contain nothing from the file but names and roles.
 #[derive(Debug, Error)]
 pub enum TokensError {
     /// The file cannot be read.
@@ -56,32 +56,32 @@ pub enum TokensError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The fault of the line.
         fault: LineFault,
     },
-    /// Nobody could do anything.
+    /// The file holds no token, so nobody could use the coordinator.
     #[error("{} holds no tokens; `osteon token` makes one", visible::path(path))]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// More than there can be people.
+    /// The file holds more tokens than are allowed.
     #[error("{} holds more than {max} tokens", visible::path(path))]
     TooMany {
         /// The file.
         path: PathBuf,
-        /// Most tokens.
+        /// Maximum number of tokens.
         max: usize,
     },
 }
 
-/// What is wrong with a line of a file of tokens.
+/// Fault of a line in a file of tokens.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum LineFault {
-    /// Not three words.
+    /// The line does not have three words.
     #[error("has {words} words; it must be `NAME ROLE HASH`, as `osteon token` prints it")]
     Words {
-        /// How many there are.
+        /// Number of words.
         words: usize,
     },
     /// The name is unusable.
@@ -93,7 +93,7 @@ pub enum LineFault {
     /// The role is unknown.
     #[error("gives `{name}` an unknown role; allowed are read, submit, admin")]
     Role {
-        /// Of whom.
+        /// Name of the token.
         name: String,
     },
     /// The token itself stands where its hash should.
@@ -102,19 +102,19 @@ pub enum LineFault {
          which prints the hash"
     )]
     TokenItself {
-        /// Of whom.
+        /// Name of the token.
         name: String,
     },
-    /// The hash is none.
+    /// The hash is not valid.
     #[error("gives `{name}` an invalid hash (it must be `blake3:` and 64 hexadecimal digits)")]
     Hash {
-        /// Of whom.
+        /// Name of the token.
         name: String,
     },
-    /// The hash is there already.
+    /// Another line has the same hash.
     #[error("gives `{name}` a token that line {first} has already")]
     Twice {
-        /// Of whom.
+        /// Name of the token.
         name: String,
         /// The other line, from 1.
         first: usize,
@@ -131,7 +131,7 @@ impl Tokens {
         Self::parse(&text, path)
     }
 
-    /// One token that may do everything, read from the file that its holder uses, too.
+    /// Adds a token with the role `admin`, read from the file that its holder uses too.
     ///
     /// # Errors
     /// When the file cannot be used.
@@ -142,12 +142,12 @@ impl Tokens {
         Ok(self)
     }
 
-    /// How many tokens are taken.
+    /// Returns the number of accepted tokens.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// Whose token a text is. Every hash is compared, each in constant time.
+    /// Returns the holder of a token. Every hash is compared, each in constant time.
     pub fn holder(&self, text: &str) -> Option<&Holder> {
         let hash = Token::parse(text).ok()?.hash();
         let mut found = None;
@@ -186,7 +186,7 @@ impl Tokens {
 }
 
 impl Role {
-    /// As it is written.
+    /// Returns the name as written in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Read => "read",
@@ -195,13 +195,14 @@ impl Role {
         }
     }
 
-    /// The role of a name.
+    /// Returns the role with this name.
     pub fn named(name: &str) -> Option<Self> {
         [Self::Read, Self::Submit, Self::Admin].into_iter().find(|role| role.name() == name)
     }
 }
 
-/// Whether a token can have this name. Names are shown: what may be a token, or most of one, is none.
+/// Returns whether a token can have this name. Names are shown, so one that may be a token, or most
+/// of one, is not allowed.
 pub fn is_name(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-@".contains(&byte);
     (1..=NAME_BYTES_MAX).contains(&name.len())
@@ -210,7 +211,7 @@ pub fn is_name(name: &str) -> bool {
         && !name.split(|c: char| !c.is_ascii_hexdigit()).any(|run| run.len() >= SECRET_DIGITS)
 }
 
-/// The line of a file of tokens.
+/// Returns a line for a file of tokens.
 pub fn line(name: &str, role: Role, hash: &TokenHash) -> String {
     format!("{name} {} {hash}", role.name())
 }

@@ -1,4 +1,4 @@
-//! The workers at one moment, as clients see them.
+//! Snapshots of the workers, as clients see them.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use osteon_proto::v1::{DepartedWorker, ListWorkersResponse, WorkerSnapshot, Work
 use crate::ids::WorkerId;
 use crate::state::{Departed, State, Worker};
 
-/// The attached workers, and those that went last.
+/// Returns the attached workers, and those that departed last.
 pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
     ListWorkersResponse {
         workers: state.workers.iter().map(|(id, it)| snapshot(state, *id, it, now)).collect(),
@@ -16,7 +16,7 @@ pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
     }
 }
 
-/// How one worker stands; `None` if it is not attached.
+/// Returns the snapshot of a worker; `None` if it is not attached.
 pub(crate) fn of(state: &State, worker: WorkerId, now: Duration) -> Option<WorkerSnapshot> {
     state.workers.get(&worker).map(|attached| snapshot(state, worker, attached, now))
 }

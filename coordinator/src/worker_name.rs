@@ -1,4 +1,4 @@
-//! Who a worker is over all its stays: a process on a host, and a number that it drew.
+//! Identity of a worker over all its stays: a process on a host, and a random number that it drew.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,8 +6,8 @@ use std::sync::Arc;
 use osteon_common::visible;
 
 /// A process on a host. A worker that attaches again has the same name; two stays with one name
-/// are one worker to those who compare answers. Two containers may have host and process in common:
-/// the number that each process drew at its start tells them apart.
+/// count as one worker when answers are compared. Two containers may have host and process in
+/// common: the number that each process drew at its start distinguishes them.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerName {
     host: Arc<str>,
@@ -16,24 +16,24 @@ pub struct WorkerName {
 }
 
 impl WorkerName {
-    /// The process `process` on `host` that drew `instance`, 0 if none; characters of the host
-    /// that are not seen are replaced.
+    /// Returns the name of process `process` on `host` that drew `instance`, 0 if none; invisible
+    /// characters in the host name are replaced.
     pub fn new(host: &str, process: u32, instance: u64) -> Self {
         let shown = |c: char| if visible::is_hidden(c) { '?' } else { c };
         Self { host: host.chars().map(shown).collect::<String>().into(), process, instance }
     }
 
-    /// Host name, as the worker told it.
+    /// Host name, as the worker sent it.
     pub fn host(&self) -> &str {
         &self.host
     }
 
-    /// Process id, as the worker told it.
+    /// Process id, as the worker sent it.
     pub fn process(&self) -> u32 {
         self.process
     }
 
-    /// The number that the process drew at its start; 0 if it told none.
+    /// Number that the process drew at its start; 0 if it sent none.
     pub fn instance(&self) -> u64 {
         self.instance
     }

@@ -1,5 +1,4 @@
-//! What is larger than allowed is refused, what is as large as allowed is not, and many may come
-//! at once.
+//! Messages over a size limit are refused, those at the limit are accepted, also many at a time.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -30,7 +29,7 @@ use tonic_prost::ProstCodec;
 use crate::slow::{begin_submission, large};
 
 const TIMEOUT: Duration = Duration::from_secs(30);
-/// Less than any wait for a place.
+/// Less than any wait for a permit.
 const PROMPT: Duration = Duration::from_secs(3);
 
 async fn coordinator() -> (Coordinator, Channel) {
@@ -45,7 +44,7 @@ async fn coordinator_with(config: Config) -> (Coordinator, Channel) {
     (coordinator, channel)
 }
 
-/// A hello whose message has `bytes` bytes.
+/// Returns a hello whose message has `bytes` bytes.
 fn hello(bytes: usize) -> AttachRequest {
     let with = |length: usize| AttachRequest {
         message: Some(Message::Hello(WorkerHello {
@@ -53,7 +52,7 @@ fn hello(bytes: usize) -> AttachRequest {
             ..WorkerHello::default()
         })),
     };
-    // Two lengths stand before the name, each in as many bytes as it takes.
+    // The name is preceded by two lengths, whose own size depends on their values.
     let mut length = bytes;
     while with(length).encoded_len() > bytes {
         length -= with(length).encoded_len() - bytes;
@@ -65,7 +64,7 @@ fn hello(bytes: usize) -> AttachRequest {
 async fn a_workers_message_is_read_up_to_its_bound() {
     let (coordinator, channel) = coordinator().await;
     for (bytes, code) in [
-        // Read, and refused for what it says.
+        // Read, and refused for its contents.
         (WORKER_MESSAGE_BYTES_MAX, Some(Code::InvalidArgument)),
         // Not read: the stream ends.
         (WORKER_MESSAGE_BYTES_MAX + 1, None),
@@ -86,7 +85,7 @@ async fn a_workers_message_is_read_up_to_its_bound() {
 async fn headers_are_read_up_to_their_bound() {
     let (coordinator, channel) = coordinator().await;
     let mut client = jobs_client(channel);
-    // What gRPC itself sends takes some room.
+    // The headers of gRPC itself take some of the space.
     for (bytes, passes) in
         [(HEADER_BYTES_MAX as usize - 1000, true), (HEADER_BYTES_MAX as usize, false)]
     {
@@ -126,7 +125,8 @@ async fn a_call_whose_message_never_ends_is_given_up() {
     let call_timeout = Duration::from_millis(200);
     let (coordinator, channel) =
         coordinator_with(Config { call_timeout, ..Config::default() }).await;
-    // More of them than submissions are read at a time: they must not block the others for ever.
+    // More than the number of submissions that are read at a time: they must not block each other
+    // forever.
     let mut calls = tokio::task::JoinSet::new();
     for _ in 0..2 * SUBMISSIONS_AT_ONCE_MAX {
         let mut grpc = Grpc::new(channel.clone());
@@ -164,7 +164,7 @@ async fn slow_submissions_keep_nobody_out() {
         let request = SubmitRequest { specification, ..Default::default() };
         jobs_client(channel.clone()).submit(request).await
     };
-    // The slow ones have come when one of their own finds no place.
+    // The slow submissions have arrived when one of the same caller gets no permit.
     let full = loop {
         if let Err(full) = submit(&slow, &large).await {
             break full;

@@ -1,6 +1,6 @@
-//! A wall clock that jumps. Within one life of a coordinator time is monotonic: the wall clock is
-//! read once, at the start. Between two lives it may have been set to anything, years back or
-//! ahead of what the store has.
+//! A wall clock that jumps. Within one run of a coordinator time is monotonic: the wall clock is
+//! read once, at the start. Between two runs it may have been set to anything, years before or
+//! after the times in the store.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -15,7 +15,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Answer, Effect};
 use osteon_coordinator::event::{Event, Request};
 use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::Store as _;
@@ -25,7 +25,8 @@ use osteon_proto::v1::{JobSnapshot, JobState};
 const YEAR: Duration = Duration::from_secs(365 * 86_400);
 const JOB: JobId = JobId(1);
 
-/// One life from `now` on, with one worker, ended after so many writes; how the job stands then.
+/// Runs a coordinator from `now` on, with one worker, until it has made so many writes; returns the
+/// last snapshot of the job.
 fn live(
     store: &mut MemoryStore,
     specification: &JobSpecification,
@@ -67,7 +68,7 @@ fn live(
     snapshot.unwrap()
 }
 
-/// The first life at `clocks[0]`, the others at the others.
+/// Runs three coordinators one after the other, starting at these clocks.
 fn check(clocks: [Duration; 3]) {
     let specification = fake::identification(20, 8, 5);
     let mut store = MemoryStore::new();
@@ -82,7 +83,7 @@ fn check(clocks: [Duration; 3]) {
         assert_eq!(seen.state() == JobState::Ended, now == clocks[2], "{clocks:?}: {seen:?}");
     }
     let jobs = store.jobs().unwrap();
-    let result = leftover::read(&mut store, jobs[0].end.as_ref().unwrap()).unwrap().result;
+    let result = job_output::read(&mut store, jobs[0].end.as_ref().unwrap()).unwrap().result;
     assert_eq!(result, fake::plain_run(&specification), "{clocks:?}");
 }
 

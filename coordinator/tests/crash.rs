@@ -1,5 +1,5 @@
-//! The coordinator is killed at every single write to its file, just before and just after it;
-//! what comes up on what is left goes on to the same result.
+//! The coordinator is killed at every single write to its file, just before and just after it; a
+//! restart on the remaining files must reach the same result.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -18,7 +18,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::Effect;
 use osteon_coordinator::event::Event;
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::{Restored, react};
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
@@ -27,7 +27,7 @@ use osteon_proto::batch::Work;
 use osteon_search::{Search, Step};
 use tempfile::TempDir;
 
-/// When a process dies, counted in writes since the beginning of the job.
+/// Time of a process's death, counted in writes since the beginning of the job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Death {
     Before(u32),
@@ -56,15 +56,15 @@ fn killed_at_any_write_it_goes_on_to_the_same_result() {
     }
 }
 
-/// A version of the program with other numerics has begun the job: none of its outcomes is left
-/// in the result.
+/// A version of the program with other numerics began the job: none of its outcomes may be in the
+/// result.
 #[test]
 fn evaluations_of_other_numerics_are_computed_again() {
     let specification = fake::identification(20, 6, 5);
     let directory = tempfile::tempdir().unwrap();
     assert!(!live(directory.path(), &specification, Some(Death::After(4))));
     let mut store = SqliteStore::open(directory.path()).unwrap();
-    store.begin_again(JobId(1), "osteon 0.0.0 numerics 0").unwrap();
+    store.reset_job(JobId(1), "osteon 0.0.0 numerics 0").unwrap();
     let mut search = Search::new(Arc::new(specification.clone()));
     for number in 0..3 {
         let Step::Evaluate(point) = search.ask() else { panic!("done") };
@@ -87,8 +87,8 @@ fn evaluations_of_other_numerics_are_computed_again() {
     assert_eq!(store.jobs().unwrap()[0].record.fingerprint, version::fingerprint());
 }
 
-/// A worker lies now and then, is found out late, and the coordinator is killed at every write
-/// before, while and after all that it has touched is computed again.
+/// A worker returns wrong answers now and then and is found out late. The coordinator is killed at
+/// every write before, during and after the recomputation of everything the worker contributed to.
 #[test]
 fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
     let specification = fake::identification(40, 12, 5);
@@ -119,7 +119,7 @@ fn killed_at_any_write_a_lie_that_was_found_leaves_no_trace() {
     }
 }
 
-/// The bytes of every file of a store: what a process that is killed now leaves.
+/// The bytes of every file of a store, as a process that is killed now leaves them.
 type Image = Vec<(OsString, Vec<u8>)>;
 
 fn image(directory: &Path) -> Image {
@@ -131,7 +131,7 @@ fn part<'i>(image: &'i mut Image, name: &str) -> &'i mut Vec<u8> {
     &mut image.iter_mut().find(|(file, _)| file == name).unwrap().1
 }
 
-/// Opens a store of these files.
+/// Opens a store with these files.
 fn opened(image: &Image, lost: LostJobs) -> (TempDir, Result<SqliteStore, StoreError>) {
     let directory = tempfile::tempdir().unwrap();
     for (name, bytes) in image {
@@ -161,8 +161,8 @@ fn numbers(store: &mut SqliteStore) -> Vec<u64> {
 const LOG: &str = "osteon.sqlite-wal";
 const MARK: &str = "osteon.acknowledged";
 
-/// A store that has acknowledged the jobs 1 to 6, of which 2 is forgotten, and its files after each
-/// change, with the last job that was acknowledged by then.
+/// Returns a store that has acknowledged jobs 1 to 6, of which 2 is deleted, and its files after
+/// each change, with the last job that was acknowledged by then.
 fn lives_of_a_store() -> (TempDir, SqliteStore, Vec<(u64, Image)>) {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(directory.path()).unwrap();
@@ -171,14 +171,14 @@ fn lives_of_a_store() -> (TempDir, SqliteStore, Vec<(u64, Image)>) {
         store.put_job(&record(job)).unwrap();
         images.push((job, image(directory.path())));
         if job == 3 {
-            store.forget_jobs(&[JobId(2)]).unwrap();
+            store.delete_jobs(&[JobId(2)]).unwrap();
             images.push((job, image(directory.path())));
         }
     }
     (directory, store, images)
 }
 
-/// A job is durable first, then the mark says so, then its client hears of it.
+/// First a job is durable, then the mark names it, then its client is answered.
 #[test]
 fn killed_between_a_job_and_its_mark_no_job_is_missed() {
     let (_directory, _store, images) = lives_of_a_store();
@@ -189,14 +189,14 @@ fn killed_between_a_job_and_its_mark_no_job_is_missed() {
         for image in [before, &between, after] {
             opened(image, LostJobs::Refuse).1.unwrap();
         }
-        // The other way round it would be a loss.
+        // In the opposite order a job would be missed.
         let mut lost = before.clone();
         *part(&mut lost, MARK) = part(&mut after.clone(), MARK).clone();
         let missed = lost != *before;
         let refused = opened(&lost, LostJobs::Refuse).1;
         assert_eq!(refused.is_err(), missed, "{acknowledged}");
     }
-    // What was only stored counts from the next start on.
+    // A job that was only stored counts from the next start on.
     let mut between = images[2].1.clone();
     *part(&mut between, MARK) = part(&mut images[1].1.clone(), MARK).clone();
     let (directory, store) = opened(&between, LostJobs::Refuse);
@@ -207,7 +207,7 @@ fn killed_between_a_job_and_its_mark_no_job_is_missed() {
     assert!(matches!(refused, StoreError::LostJobs { .. }), "{refused}");
 }
 
-/// SQLite takes a log that is cut, or damaged somewhere, for one that ends there.
+/// SQLite takes a log that is truncated, or damaged somewhere, for one that ends there.
 #[test]
 fn a_log_that_was_cut_anywhere_loses_no_job_in_silence() {
     let (_directory, _store, images) = lives_of_a_store();
@@ -262,7 +262,7 @@ fn lost_jobs_that_are_accepted_leave_their_numbers_unused() {
     assert_eq!(store.last_forgotten().unwrap(), Some(JobId(6)));
     drop(store);
     drop(SqliteStore::open(directory.path()).unwrap());
-    // A mark that makes no sense says nothing of what is there.
+    // A damaged mark does not tell which jobs must be there.
     fs::write(directory.path().join(MARK), "?").unwrap();
     let told = SqliteStore::open(directory.path()).unwrap_err().to_string();
     assert!(told.contains("osteon.acknowledged is damaged"), "{told}");
@@ -270,12 +270,12 @@ fn lost_jobs_that_are_accepted_leave_their_numbers_unused() {
     drop(SqliteStore::open(directory.path()).unwrap());
 }
 
-/// Who computes, and how many batches are computed twice.
+/// The workers, and the fraction of batches that is audited.
 #[derive(Debug, Clone, Copy)]
 struct Crew {
     workers: u32,
     audit_fraction: f64,
-    /// This process lies in every seventh batch.
+    /// This process answers every seventh batch wrongly.
     liar: Option<u32>,
 }
 
@@ -292,7 +292,7 @@ impl Crew {
     }
 }
 
-/// One life of a coordinator with one worker; whether it got to the end of the job.
+/// Runs a coordinator with one worker; returns whether it reached the end of the job.
 fn live(directory: &Path, specification: &JobSpecification, death: Option<Death>) -> bool {
     live_with(directory, specification, death, Crew::ALONE)
 }
@@ -342,11 +342,11 @@ fn beginning(specification: &JobSpecification, crew: Crew) -> Vec<Event> {
     [submitted].into_iter().chain((1..=crew.workers).map(fake::attached)).collect()
 }
 
-/// What the store says of the only job there is, as text: NaN equals nothing.
+/// Returns the stored state of the only job, as text, since NaN is not equal to itself.
 fn result(directory: &Path) -> String {
     let mut store = SqliteStore::open(directory).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!(jobs.len(), 1);
-    let left = leftover::read(&mut store, jobs[0].end.as_ref().unwrap());
+    let left = job_output::read(&mut store, jobs[0].end.as_ref().unwrap());
     format!("{:?}", left.unwrap().result)
 }

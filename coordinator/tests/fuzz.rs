@@ -1,4 +1,4 @@
-//! What a coordinator reads besides messages, damaged: lists of tokens, headers, paths, addresses.
+//! Damaged inputs of a coordinator other than messages: lists of tokens, headers, paths, addresses.
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
-use osteon_coordinator::access::{self, Need, Presented};
+use osteon_coordinator::access::{self, Presented, Requirement};
 use osteon_coordinator::ids::JobId;
 use osteon_coordinator::tokens::{self, Role, TokensError};
 use osteon_coordinator::{ListenAddress, Tokens};
@@ -31,13 +31,13 @@ fn check_tokens(bytes: &[u8]) {
         Err(error) => {
             let error = error.to_string();
             assert!(error.len() < 4096 && error.contains("list"), "{error}");
-            // Whatever else it says, nothing that could be a secret.
+            // No message may contain anything that could be a secret.
             assert!(!error.contains("osteon_0") && !error.contains(&"0".repeat(32)), "{error}");
         }
     }
 }
 
-/// What an accepted line says, as osteon itself writes it; `None` if it says nothing.
+/// Returns an accepted line in the form that osteon writes; `None` if it has no contents.
 fn line_again(line: &str) -> Option<String> {
     let mut words = line.split('#').next()?.split_whitespace();
     let (name, role, hash) = (words.next()?, words.next()?, words.next()?);
@@ -53,7 +53,7 @@ fn check_header(bytes: &[u8]) {
 }
 
 fn check_path(path: &str) {
-    let open = bounded(path.len(), || access::need(path)) == Need::Nothing;
+    let open = bounded(path.len(), || access::need(path)) == Requirement::Nothing;
     assert_eq!(open, path.starts_with("/grpc.health.v1.Health/"), "{path}");
 }
 

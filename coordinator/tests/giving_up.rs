@@ -1,4 +1,4 @@
-//! Clients that give up, by a deadline or by a cancellation, hold nothing any more.
+//! Clients that give up, by a deadline or by a cancellation, release everything they held.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -29,8 +29,8 @@ use tonic::{Code, Request, Status, Streaming};
 
 use crate::slow::{begin_submission, large};
 
-/// Shorter than a call may take, and than a reader may pause: what comes within it was not freed by
-/// those bounds.
+/// Shorter than the time limits of a call and of a reader's pause, so those limits cannot be what
+/// freed the permits.
 const TIMEOUT: Duration = Duration::from_secs(25);
 /// Length of a submission that never ends, bytes.
 const LONG: u32 = 1 << 20;
@@ -81,7 +81,7 @@ async fn a_cancellation_frees_the_place_of_a_submission() {
     for _ in 0..2 * SUBMISSIONS_AT_ONCE_MAX {
         calls.spawn(begin_submission(channel.clone(), LONG, None));
     }
-    // Until they hold every place that there is for their connection.
+    // Until they hold every permit of their connection.
     let (large, deadline) = (large(), Duration::from_millis(300));
     let taken = async { while submit_within(deadline, &channel, &large).await.is_ok() {} };
     tokio::time::timeout(TIMEOUT, taken).await.unwrap();
@@ -90,7 +90,7 @@ async fn a_cancellation_frees_the_place_of_a_submission() {
     coordinator.shutdown().await;
 }
 
-/// A worker that answers everything.
+/// A worker that answers every batch.
 async fn work(channel: Channel) {
     let (outbound, messages) = mpsc::channel(16);
     let hello = WorkerHello { threads: 2, ..fake::wire_hello(1) };
@@ -115,7 +115,7 @@ async fn fetch(channel: &Channel, job: &str) -> Result<Streaming<FetchResponse>,
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_that_goes_frees_the_place_of_a_fetch() {
     let (coordinator, channel) = coordinator().await;
-    // More than what is sent before anybody reads.
+    // More than is sent before the client reads.
     let specification = fake::propagation(8 * u64::from(BATCH_REALIZATIONS_MAX), 7);
     let job = submit(&channel, &specification).await;
     let worker = tokio::spawn(work(channel.clone()));
@@ -127,7 +127,7 @@ async fn a_reader_that_goes_frees_the_place_of_a_fetch() {
     for _ in 0..FETCHES_OF_ONE_MAX {
         held.push(fetch(&channel, &job).await.unwrap());
     }
-    // Its deadline is over before one of the others lets it in.
+    // Its deadline passes before another fetch releases its permit.
     let refused = fetch(&channel, &job).await.unwrap_err();
     assert!(matches!(refused.code(), Code::DeadlineExceeded | Code::Cancelled), "{refused}");
     drop(held);

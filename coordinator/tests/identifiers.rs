@@ -1,6 +1,6 @@
-//! Identifiers of jobs are given once: whoever asks for a job that was forgotten, or fetches it
-//! late, shall not get the job of somebody else. It did happen after a restart, when the newest
-//! job had been forgotten: the next one got its number.
+//! Identifiers of jobs are assigned once: a client that asks for a deleted job, or fetches it late,
+//! must not get the job of another client. That happened after a restart when the newest job had
+//! been deleted: the next one got its number.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
@@ -19,7 +19,7 @@ use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 
-/// The identifier that the next life gives to a job, which it stores.
+/// Returns the identifier that the next run assigns to a job, which it stores.
 fn next(store: &mut dyn Store) -> JobId {
     let restored = Restored::load(store).unwrap();
     let (mut state, _) = State::restore(Config::default(), restored, Duration::ZERO);
@@ -34,11 +34,11 @@ fn next(store: &mut dyn Store) -> JobId {
 fn check(mut open: impl FnMut() -> Box<dyn Store>) {
     assert_eq!(next(&mut *open()), JobId(1));
     assert_eq!(next(&mut *open()), JobId(2));
-    open().forget_jobs(&[JobId(2)]).unwrap();
+    open().delete_jobs(&[JobId(2)]).unwrap();
     assert_eq!(next(&mut *open()), JobId(3));
-    // An older one does not make it less.
-    open().forget_jobs(&[JobId(3)]).unwrap();
-    open().forget_jobs(&[JobId(1)]).unwrap();
+    // Deleting an older job does not lower it.
+    open().delete_jobs(&[JobId(3)]).unwrap();
+    open().delete_jobs(&[JobId(1)]).unwrap();
     assert_eq!(open().last_forgotten().unwrap(), Some(JobId(3)));
     assert_eq!(next(&mut *open()), JobId(4));
 }

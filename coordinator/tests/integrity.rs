@@ -1,5 +1,5 @@
-//! A worker that computes wrongly, over real sockets: found out, banned, and without a trace in
-//! the result. Then the job is forgotten.
+//! A worker that returns wrong answers, over real sockets: it is found out and banned, and leaves
+//! no trace in the result. Then the job is deleted.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -35,7 +35,8 @@ async fn channel(coordinator: &Coordinator) -> Channel {
     connect(&endpoint, TIMEOUT).await.unwrap()
 }
 
-/// Works in `process` until the stream ends. The liar is off by one bit now and then.
+/// Works in `process` until the stream ends. The faulty worker's answers are off by one bit now and
+/// then.
 async fn work(channel: Channel, process: u32) -> Result<(), Status> {
     let (outbound, messages) = mpsc::channel(16);
     let hello = fake::wire_hello(process);
@@ -59,7 +60,7 @@ async fn work(channel: Channel, process: u32) -> Result<(), Status> {
     Ok(())
 }
 
-/// The digest and the status of what a job left.
+/// Returns the digest and the status of an ended job.
 async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(String, JobEnd), Status> {
     let mut stream = client.fetch(FetchRequest { job: job.to_owned() }).await?.into_inner();
     loop {
@@ -96,7 +97,7 @@ async fn a_liar_leaves_no_trace_and_stays_out() {
 
     let mut after = 0;
     loop {
-        // A watch is broken off and taken up again where it was.
+        // A watch is interrupted and resumed.
         let request = WatchRequest { job: job.clone(), after };
         let mut stream = client.watch(request).await.unwrap().into_inner();
         let read = tokio::time::timeout(TIMEOUT, stream.message()).await.unwrap();

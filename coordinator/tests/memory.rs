@@ -1,4 +1,4 @@
-//! Ended jobs take little memory: what they left is in the store.
+//! Ended jobs take little memory: their output is in the store.
 
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
@@ -18,7 +18,7 @@ use osteon_coordinator::reactor::react;
 use osteon_coordinator::state::State;
 use osteon_coordinator::store::sqlite::SqliteStore;
 
-/// Memory of this process, bytes.
+/// Returns the resident memory of this process, bytes.
 fn resident() -> u64 {
     let text = std::fs::read_to_string("/proc/self/statm").unwrap();
     text.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096
@@ -57,7 +57,7 @@ fn ended_jobs_take_little_memory() {
         run(&mut state, &mut store, fake::submission(&specification, ""));
         assert!(state.is_idle());
     };
-    // The first ones find the room that the others use again.
+    // The first jobs allocate memory that later ones reuse.
     (0..5).for_each(&mut one_more);
     let before = resident();
     (0..JOBS).for_each(&mut one_more);

@@ -1,4 +1,4 @@
-//! The services over real sockets, with workers that compute a cheap stand-in.
+//! The services over real sockets, with workers that compute a cheap substitute for the physics.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
@@ -56,8 +56,7 @@ fn hello(fingerprint: String) -> AttachRequest {
     AttachRequest { message: Some(Request::Hello(hello)) }
 }
 
-/// A worker that answers batches until its stream ends, but at most `batches_max`; then it is
-/// gone without a word.
+/// A worker that answers at most `batches_max` batches, then disappears without notice.
 async fn work(channel: Channel, batches_max: usize) -> Result<usize, Status> {
     let (outbound, messages) = mpsc::channel(16);
     outbound.send(hello(version::fingerprint())).await.unwrap();
@@ -91,7 +90,7 @@ async fn submit(
     Ok(client.submit(request).await?.into_inner().job)
 }
 
-/// Watches a job to its end; the last snapshot.
+/// Watches a job to its end; returns the last snapshot.
 async fn watch(client: &mut JobsClient<Channel>, job: &str) -> JobSnapshot {
     let request = WatchRequest { job: job.to_owned(), ..WatchRequest::default() };
     let mut stream = client.watch(request).await.unwrap().into_inner();
@@ -111,7 +110,7 @@ async fn fetch(client: &mut JobsClient<Channel>, job: &str) -> Result<Vec<Part>,
     let mut parts = Vec::new();
     while let Some(response) = stream.message().await? {
         let part = response.part.unwrap();
-        // A sign of life of a coordinator on a busy machine.
+        // A heartbeat of a coordinator on a busy machine.
         let is_sign = matches!(&part, Part::History(block) if block.rows.is_empty());
         if !is_sign {
             parts.push(part);
@@ -120,7 +119,7 @@ async fn fetch(client: &mut JobsClient<Channel>, job: &str) -> Result<Vec<Part>,
     Ok(parts)
 }
 
-/// Asserts that what `job` left is the plain run's result.
+/// Asserts that the output of `job` is the result of the plain run.
 async fn check_leftover(
     client: &mut JobsClient<Channel>,
     job: &str,
@@ -199,7 +198,7 @@ async fn a_restarted_coordinator_goes_on() {
     second.shutdown().await;
     assert_eq!(worker.await.unwrap().unwrap_err().code(), Code::Unavailable);
 
-    // What has ended is there after another restart.
+    // Ended jobs are still there after another restart.
     let third = coordinator(&socket, store()).await;
     let mut jobs = client(&third).await;
     check_leftover(&mut jobs, &job, &specification).await;
@@ -273,7 +272,7 @@ async fn a_worker_with_other_numerics_is_refused() {
     coordinator.shutdown().await;
 }
 
-/// A store that takes jobs, and then nothing, or dies.
+/// A store that accepts jobs, and then refuses every evaluation, or panics at it.
 #[derive(Clone)]
 struct BrokenStore {
     sound: MemoryStore,
@@ -297,8 +296,8 @@ impl Store for BrokenStore {
         self.sound.evaluation(job, number)
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
-        self.sound.begin_again(job, fingerprint)
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        self.sound.reset_job(job, fingerprint)
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -319,8 +318,8 @@ impl Store for BrokenStore {
         self.sound.summary(job)
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
-        self.sound.forget_jobs(jobs)
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        self.sound.delete_jobs(jobs)
     }
 
     fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
@@ -344,14 +343,15 @@ impl Store for BrokenStore {
     }
 }
 
-/// A coordinator whose store takes no evaluation, and its job, once it has said that it failed.
+/// Returns a coordinator whose store accepts no evaluation, and its job, once the coordinator has
+/// reported the failure.
 async fn failed(dies: bool) -> (Coordinator, MemoryStore, String, Failed) {
     let sound = MemoryStore::new();
     let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
     let config = Config {
         tick: Duration::from_millis(10),
         store_retry: Duration::from_millis(10),
-        store_patience: Some(Duration::from_millis(50)),
+        store_give_up_after: Some(Duration::from_millis(50)),
         shutdown_timeout: Duration::from_millis(200),
         ..Config::default()
     };

@@ -1,10 +1,11 @@
-//! Coordinator, workers and store in one thread under a false clock. One seed decides order,
-//! delays, deaths, stalls, answers that come late, never, twice, malformed or contradict each other,
-//! a node that dies over whatever it gets, refusals, damage and long outages of the store, cancellations,
-//! points that are computed ahead, pauses, clean stops and restarts of the coordinator. Whatever happens, every job leaves what a plain loop computes; one that was
-//! cancelled, or failed because of a contradiction, what the loop has found by then.
+//! Coordinator, workers and store in one thread under a simulated clock. One seed decides order,
+//! delays, losses, stalls, answers that are late, missing, repeated, malformed or contradictory, a
+//! node whose workers are lost over everything they get, refusals, damage and long outages of the
+//! store, cancellations, speculative evaluations, pauses, clean stops and restarts of the
+//! coordinator. Whatever happens, the output of every job must be what a plain loop computes; if
+//! the job was cancelled, or failed because of a contradiction, what the loop has found by then.
 //!
-//! `OSTEON_SIMULATION_SEED=N` runs one seed, for a look at a failure.
+//! `OSTEON_SIMULATION_SEED=N` runs one seed, to examine a failure.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
@@ -16,7 +17,7 @@ use std::panic;
 
 use world::World;
 
-/// Schedules of one test run.
+/// Number of schedules in one test run.
 const SCHEDULES: u64 = 3000;
 
 #[test]
@@ -36,7 +37,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             }
         }
     }
-    // A simulation in which nothing goes wrong tests nothing.
+    // A simulation in which nothing goes wrong would test nothing.
     if seeds.end - seeds.start == SCHEDULES {
         let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
         let world::Counts { ahead, dropped, swallowed, .. } = seen;

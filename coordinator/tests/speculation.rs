@@ -1,4 +1,4 @@
-//! What it is worth, and what it costs, that idle workers compute points ahead: in virtual time.
+//! Gain and cost of speculation, in virtual time.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,8 +20,8 @@ use clockwork::{Clockwork, Times};
 use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::Config;
 
-/// When each of some jobs ended, on a coordinator with or without speculation; every result is that of
-/// a plain loop, to the bit.
+/// Returns the times at which some jobs ended, on a coordinator with or without speculation; every
+/// result must equal that of a plain loop, to the bit.
 fn run(
     speculation: bool,
     threads: &[u32],
@@ -31,13 +31,14 @@ fn run(
     let config = Config { speculation, ..Config::default() };
     let ended = Clockwork::with_config(threads, times, config).run(jobs);
     for (job, ended) in jobs.iter().zip(&ended) {
-        // As text: an unknown standard error is NaN, which equals nothing.
+        // Compared as text: an unknown standard error is NaN, which is not equal to itself.
         assert_eq!(format!("{:?}", ended.result), format!("{:?}", fake::plain_run(job)));
     }
     ended.into_iter().map(|ended| ended.at).collect()
 }
 
-/// How many times as long a search takes without speculation, over workers of so many threads.
+/// Returns the ratio of a search's time without speculation to that with it, over workers of these
+/// numbers of threads.
 fn gain(threads: &[u32], times: Times, realizations: u64, evaluations: u64) -> f64 {
     let job = fake::identification(realizations, evaluations, 3);
     let [without, with] = [false, true].map(|speculation| {

@@ -1,5 +1,5 @@
-//! What workers cost that give signs of life and do not answer: in virtual time. Every result is that
-//! of a plain loop, to the bit.
+//! Delay caused by workers that send heartbeats and do not answer, in virtual time. Every result
+//! must equal that of a plain loop, to the bit.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,20 +20,20 @@ use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::Config;
 
 const REALIZATION: Duration = Duration::from_millis(1);
-/// An answer that does not come is waited for so long, where others may give it.
+/// Time after which a missing answer is overdue, where other workers can give it.
 const OVERDUE: Duration = Duration::from_secs(3);
-/// And then it takes so long until the others have given it.
+/// Additional time until the other workers have given it.
 const SOON: Duration = Duration::from_millis(500);
 
-/// What a job took.
+/// Duration and other measurements of a job.
 #[derive(Debug)]
 struct Run {
     time: Duration,
     swallowed: u64,
 }
 
-/// Runs a job over `sound` workers of two threads; before them attach so many that do not answer one
-/// in `n` of their batches.
+/// Runs a job over `sound` workers of two threads; before them attach so many faulty ones that do
+/// not answer one in `n` of their batches.
 fn run(
     sound: usize,
     (faulty, n): (usize, u64),
@@ -47,7 +47,7 @@ fn run(
         clockwork.swallow(worker, n);
     }
     let ended = clockwork.run(std::slice::from_ref(job));
-    // As text: an unknown standard error is NaN, which equals nothing.
+    // Compared as text: an unknown standard error is NaN, which is not equal to itself.
     assert_eq!(format!("{:?}", ended[0].result), format!("{:?}", fake::plain_run(job)));
     Run { time: ended[0].at, swallowed: clockwork.swallowed }
 }
@@ -73,7 +73,7 @@ fn workers_that_never_answer_cost_seconds() {
                          {disturbed:?}"
                     );
                     assert!(disturbed.swallowed >= 2 * faulty as u64, "{disturbed:?}");
-                    // Each misses three, and then one now and then.
+                    // Each faulty worker misses three, and then one now and then.
                     let delay = disturbed.time.saturating_sub(undisturbed.time);
                     assert!(delay < 8 * (OVERDUE + SOON), "{delay:?}");
                 }
@@ -99,7 +99,8 @@ fn each_batch_that_is_not_answered_costs_seconds() {
     }
 }
 
-/// Batches that a job of realizations of this length takes on four workers, and its time.
+/// Returns the number of batches that a job of realizations of this length takes on four workers,
+/// and its time.
 fn slow(realization: Duration, job: &JobSpecification) -> (u64, Duration) {
     let mut clockwork = Clockwork::with(&[2; 4], Times::Spread, realization, Config::default());
     let ended = clockwork.run(std::slice::from_ref(job));
@@ -111,7 +112,7 @@ fn slow(realization: Duration, job: &JobSpecification) -> (u64, Duration) {
 fn realizations_that_are_slow_everywhere_are_not_computed_many_times() {
     for job in [fake::identification(40, 10, 3), fake::propagation(400, 5), fake::propagation(3, 5)]
     {
-        // Where nothing is ever overdue, copies are for idle workers only.
+        // Where nothing is ever overdue, only idle workers get duplicates.
         let (usual, _) = slow(Duration::from_millis(100), &job);
         for seconds in [1, 5, 30] {
             let (sent, time) = slow(Duration::from_secs(seconds), &job);

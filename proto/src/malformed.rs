@@ -58,7 +58,7 @@ pub enum Malformed {
     EstimatedError {
         /// Index within the block.
         index: usize,
-        /// The value found.
+        /// The number found.
         value: f64,
     },
     /// The setup of a batch lacks a field, so its result would depend on the worker's defaults.

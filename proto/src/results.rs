@@ -1,9 +1,9 @@
 //! Results and the history of a job as messages.
 
-use osteon_common::data_statistics::{Interval, KolmogorovTest, MomentIntervals};
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{Objective, Search};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
+use osteon_common::moments::{Interval, KolmogorovTest, MomentIntervals};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::results::{
     BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult,

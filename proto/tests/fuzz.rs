@@ -5,10 +5,10 @@
 
 use std::path::Path;
 
-use osteon_common::data_statistics::KolmogorovTest;
 use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{JobKind, JobSpecification, Sampling};
+use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, Solved};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::report::ResultFile;

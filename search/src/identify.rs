@@ -35,7 +35,7 @@ pub struct Realizations {
 pub struct Identified {
     /// Status, digest, best point (or the result of each group), and what the data determine.
     pub result: JobResult,
-    /// Rows of all evaluations, in order.
+    /// Returns the rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
 }
 

@@ -69,7 +69,7 @@ pub struct Summary {
     pub digest: String,
     /// Number of the best evaluation, if a point was feasible; `None` if the data are groups.
     pub best: Option<u64>,
-    /// Rows of all evaluations, in order.
+    /// Returns the rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
     /// Endings of the searches for the groups of the data that have ended; empty if there are no
     /// groups.
@@ -145,7 +145,7 @@ impl Search {
     /// # Errors
     /// If it is at a different point from the one that the search asks for; nothing is changed
     /// then.
-    pub fn retell(
+    pub fn replay(
         &mut self,
         point: Point,
         outcomes: Arc<[Outcome]>,

@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// The paper's optimum.
+    /// The optimum of the paper.
     const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     #[test]

@@ -20,8 +20,8 @@ use crate::signals;
 /// Heartbeats within the duration of a lease; several, because some may come late.
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
-/// Serves until SIGINT or SIGTERM, or until a part of it ends unexpectedly. The URL in use is
-/// printed, and written to DIR/address.
+/// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
+/// printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
     // Read before anything is bound or created.

@@ -209,7 +209,7 @@ class Refusals(WithService):
         request = jobs_pb2.ListRequest()
         bare = jobs_pb2_grpc.JobsStub(self.service.channel_without_token())
         error = self.refused(grpc.StatusCode.UNAUTHENTICATED, bare.List, request)
-        self.assertIn("wants a token", error.details())
+        self.assertIn("requires a token", error.details())
         reader = self.service.jobs("read")
         reader.List(request)
         code = grpc.StatusCode.PERMISSION_DENIED

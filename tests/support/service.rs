@@ -97,7 +97,7 @@ impl Service {
 
     /// Returns the number of leases that ended because their workers were silent.
     pub(crate) fn expirations(&self) -> usize {
-        self.log().matches("nothing was heard of this worker").count()
+        self.log().matches("no message came from this worker").count()
     }
 
     /// Returns the number of batches that were reassigned from lost workers.

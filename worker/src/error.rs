@@ -37,7 +37,7 @@ pub enum WorkerError {
     /// The coordinator refused this worker; trying again would change nothing.
     #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
     Refused {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The gRPC status code.
         code: Code,
@@ -47,7 +47,7 @@ pub enum WorkerError {
     /// Coordinator and worker do not trust each other's certificates, or cannot establish TLS.
     #[error("no trust between this worker and the coordinator at {endpoint}: {failure}")]
     Distrust {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The TLS failure.
         failure: TlsFailure,
@@ -55,7 +55,7 @@ pub enum WorkerError {
     /// No coordinator was reached within the allowed time.
     #[error("gave up after {seconds} s without the coordinator at {endpoint}; last: {last}")]
     GaveUp {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// Time without a coordinator, s.
         seconds: f64,
@@ -65,7 +65,7 @@ pub enum WorkerError {
     /// A batch cannot be read; a guess could give wrong numbers.
     #[error("the coordinator at {endpoint} sent a batch that cannot be read: {source}")]
     Malformed {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
         /// The defect of the batch.
         source: Malformed,

@@ -35,7 +35,7 @@ const OUTBOX_MAX: usize = 2 * BATCHES_HELD_MAX;
 /// Configuration of a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// Address of the coordinator.
+    /// Returns the address of the coordinator.
     pub endpoint: Endpoint,
     /// Certificates and token for the coordinator, and the authorities that are trusted.
     pub credentials: Credentials,

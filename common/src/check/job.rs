@@ -9,12 +9,12 @@ use crate::job::{
     SearchMethod,
 };
 use crate::limits;
+use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::plausible::{self, Quantity, short};
 use crate::quantile::quantile;
 use crate::reach;
 use crate::statistics;
-use crate::velocities::Origin;
 use crate::violations::Violations;
 use crate::visible;
 

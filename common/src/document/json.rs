@@ -7,7 +7,7 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::budget::Budget;
-use super::{Format, Malformed, Node, Value, quoted};
+use super::node::{Format, Malformed, Node, Value, quoted};
 
 /// Parses a JSON text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {

@@ -5,7 +5,7 @@ mod extent;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-use super::{Format, Malformed, Node, Value, position};
+use super::node::{Format, Malformed, Node, Value, position};
 
 /// Parses a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {

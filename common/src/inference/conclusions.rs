@@ -1,37 +1,10 @@
 //! All conclusions from one set of data, as they are contained in results.
 
-use super::{
-    Inference, Profile, Solution, Spreads, first_below_noise, inference, profiles, solutions,
-    spread,
-};
+use super::{first_below_noise, inference, profiles, solutions, spread};
+use crate::conclusions::{Conclusions, Profile, Solutions};
 use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
 use crate::parameters::Point;
 use crate::results::{BestPoint, Evaluation, PointMeaning};
-
-/// Conclusions from one set of data: the parameters that it determines, and the points that match
-/// it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Conclusions {
-    /// Identified quantities; `None` if the derivatives were not measured, or cannot be computed.
-    pub inference: Option<Inference>,
-    /// Profiles of the cost, one for each free parameter; empty for a likelihood, and if there are
-    /// priors.
-    pub profiles: Vec<Profile>,
-    /// The solutions from all starts; `None` for a single start.
-    pub solutions: Option<Solutions>,
-}
-
-/// The solutions of searches from several starts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solutions {
-    /// The best point of each start that found a feasible one.
-    pub points: Vec<Solution>,
-    /// Number of them that match the data as well as the best one, or within the tolerance of the
-    /// search.
-    pub matching: u64,
-    /// Spreads over these points; `None` if there are none.
-    pub spread: Option<Spreads>,
-}
 
 impl Conclusions {
     /// Draws the conclusions from set number `set` of the data, given the best evaluation of its

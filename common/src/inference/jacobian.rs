@@ -1,6 +1,6 @@
 //! Derivatives of the logarithms of both moments, from differences on common germs.
 
-use super::is_of;
+use crate::conclusions::Sensitivity;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation, Moments};
@@ -12,17 +12,6 @@ pub struct Jacobian {
     pub free: Vec<Parameter>,
     /// Their columns: derivatives of ln v and ln Δ.
     pub columns: Vec<[f64; 2]>,
-}
-
-/// Derivatives of both moments along one parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensitivity {
-    /// The parameter.
-    pub parameter: Parameter,
-    /// Relative change of the mean for a relative change of the parameter, ∂ ln v / ∂ ln p.
-    pub mean: f64,
-    /// The same for the coefficient of variation, ∂ ln Δ / ∂ ln p.
-    pub coefficient_of_variation: f64,
 }
 
 /// Returns the Jacobian at the best point of set number `set`; `None` if a derivative was not
@@ -40,7 +29,7 @@ pub fn jacobian(
         if matches!(range, Range::Fixed(_)) {
             continue;
         }
-        let varied = |row: &&Evaluation| is_of(row, set) && row.role.varied == Some(parameter);
+        let varied = |row: &&Evaluation| row.is_for(set) && row.role.varied == Some(parameter);
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;

@@ -1,6 +1,7 @@
 //! Singular value decomposition of a Jacobian with two rows, and its consequences.
 
-use super::{Direction, Jacobian};
+use super::jacobian::Jacobian;
+use crate::conclusions::Direction;
 
 /// A singular value below this fraction of the largest counts as rounding error.
 const RANK: f64 = 1e-6;

@@ -1,5 +1,6 @@
 //! Errors of the logarithms of both moments, for the data and for the model.
 
+use crate::conclusions::NoiseErrors;
 #[cfg(doc)]
 use crate::data_statistics::CONFIDENCE;
 use crate::job::Data;
@@ -17,15 +18,6 @@ pub struct Noise {
     pub data: Option<([[f64; 2]; 2], usize)>,
     /// Variances of the model's moments by sampling.
     pub model: [f64; 2],
-}
-
-/// Relative standard errors of both moments.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NoiseErrors {
-    /// Errors due to the noise of the data; `None` if only their moments are known.
-    pub data: Option<Moments>,
-    /// Errors due to sampling.
-    pub sampling: Moments,
 }
 
 /// Returns the noise of set number `set` of the data, and of a model's estimate.

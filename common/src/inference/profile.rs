@@ -5,24 +5,13 @@
 //! about one per cent, so a profile shows where the data can be matched, but not small differences
 //! from them.
 
+use crate::conclusions::Profile;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::Moments;
 
 /// Number of points of a profile, from bound to bound.
 pub const PROFILE_POINTS: usize = 11;
-
-/// The profile of one parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Profile {
-    /// The parameter.
-    pub parameter: Parameter,
-    /// Its values, equidistant from the lower bound to the upper, in its unit.
-    pub values: Vec<f64>,
-    /// The lowest cost with the parameter at each value and the other free ones anywhere within
-    /// their bounds; infinite if no such point is admissible.
-    pub costs: Vec<f64>,
-}
 
 /// Returns the profile of each free parameter, given the best point and its moments.
 pub fn profiles(

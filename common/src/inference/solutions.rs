@@ -1,52 +1,15 @@
 //! Solutions of searches from several starts: a sample of the points that match the data equally
 //! well.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::is_of;
+use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::{Parameter, Point};
 use crate::results::Evaluation;
 
-/// The best point of the search from one start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solution {
-    /// Number of the start, from 0.
-    pub start: u32,
-    /// The point.
-    pub point: Point,
-    /// Its cost.
-    pub cost: f64,
-    /// Number of evaluations of this search.
-    pub evaluations: u64,
-}
-
-/// Smallest, largest and mean value of a quantity over several solutions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Spread {
-    /// Smallest value.
-    pub smallest: f64,
-    /// Largest value.
-    pub largest: f64,
-    /// Mean value.
-    pub mean: f64,
-}
-
-/// Spreads over a set of points.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Spreads {
-    /// Spread of each parameter.
-    pub parameters: [Spread; 7],
-    /// Spreads of the entries of the elasticity matrix on and above the diagonal, row by row, with
-    /// row and column from 0 (Pa, Kelvin-Mandel).
-    pub entries: Vec<(usize, usize, Spread)>,
-}
-
 /// Returns the best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
-    for row in history.iter().filter(|row| is_of(row, set) && row.role.varied.is_none()) {
+    for row in history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none()) {
         let cost = row.cost.unwrap_or(f64::INFINITY);
         let here = Solution { start: row.role.start, point: row.point, cost, evaluations: 1 };
         match solutions.last_mut().filter(|last| last.start == row.role.start) {

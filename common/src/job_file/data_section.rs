@@ -5,8 +5,9 @@ use std::path::Path;
 use crate::check::{self, DATA_FORMS};
 use crate::document::{Value, entry_path};
 use crate::job::{Data, Group, JobKind};
+use crate::origin::Origin;
 use crate::reader::{Reader, Table};
-use crate::velocities::{self, Measured, Origin};
+use crate::velocities::{self, Measured};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 

@@ -6,10 +6,10 @@ use crate::case::{Case, Setup};
 use crate::document::entry_path;
 use crate::job::{Data, JobSpecification, Range};
 use crate::layers::Fluid;
+use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
 use crate::settings::Method;
-use crate::velocities::Origin;
 
 use super::{Quantity, short};
 

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{finite, present};
-use crate::data_statistics::{Interval, KolmogorovTest};
+use crate::moments::{Interval, KolmogorovTest};
 use crate::results::{self, BestPoint, DataSummary};
 
 /// One of the two moments of a set of velocities.
@@ -145,8 +145,8 @@ impl MomentIntervals {
     }
 }
 
-impl From<crate::data_statistics::MomentIntervals> for MomentIntervals {
-    fn from(found: crate::data_statistics::MomentIntervals) -> Self {
+impl From<crate::moments::MomentIntervals> for MomentIntervals {
+    fn from(found: crate::moments::MomentIntervals) -> Self {
         let ends = |interval: Interval| [interval.low, interval.high];
         Self {
             mean: ends(found.mean),

@@ -11,7 +11,7 @@ async fn listener() -> (Bound, std::net::SocketAddr) {
     (Bound::Tcp(listener), address)
 }
 
-/// On a clock that jumps whenever everybody waits.
+/// The clock is paused, and jumps whenever all tasks wait.
 #[tokio::test(start_paused = true)]
 async fn a_connection_that_says_nothing_ends_and_one_that_spoke_may_be_silent() {
     let (bound, address) = listener().await;
@@ -43,7 +43,7 @@ async fn there_are_no_more_connections_than_places() {
     let first = Connection::new(Either::Right(io), Certificate::Absent, place);
     assert_eq!(places.available_permits(), 0);
     drop(first);
-    // The place is free again.
+    // The permit is free again.
     let (_, place) = accept(&bound, &places).await.unwrap();
     drop(place);
 }

@@ -7,22 +7,22 @@ use tonic::{Code, Status};
 
 use super::*;
 
-/// Every method, and what it asks for.
-const NEEDS: [(&str, Need); 14] = [
-    ("/grpc.health.v1.Health/Check", Need::Nothing),
-    ("/osteon.v1.Jobs/Get", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/List", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/ListExpelled", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/ListWorkers", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/Watch", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/Fetch", Need::Role(Role::Read)),
-    ("/osteon.v1.Jobs/Submit", Need::Role(Role::Submit)),
-    ("/osteon.v1.Jobs/Cancel", Need::Role(Role::Submit)),
-    ("/osteon.v1.Jobs/Prune", Need::Role(Role::Admin)),
-    ("/osteon.v1.Jobs/DrainWorker", Need::Role(Role::Admin)),
-    ("/osteon.v1.Jobs/Backup", Need::Role(Role::Admin)),
-    ("/osteon.v1.Workers/Attach", Need::Worker),
-    ("/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Need::Known),
+/// Every method and its requirement.
+const NEEDS: [(&str, Requirement); 14] = [
+    ("/grpc.health.v1.Health/Check", Requirement::Nothing),
+    ("/osteon.v1.Jobs/Get", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/List", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/ListExpelled", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/ListWorkers", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/Watch", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/Fetch", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/Submit", Requirement::Role(Role::Submit)),
+    ("/osteon.v1.Jobs/Cancel", Requirement::Role(Role::Submit)),
+    ("/osteon.v1.Jobs/Prune", Requirement::Role(Role::Admin)),
+    ("/osteon.v1.Jobs/DrainWorker", Requirement::Role(Role::Admin)),
+    ("/osteon.v1.Jobs/Backup", Requirement::Role(Role::Admin)),
+    ("/osteon.v1.Workers/Attach", Requirement::Worker),
+    ("/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Requirement::Known),
 ];
 
 #[test]
@@ -31,15 +31,15 @@ fn every_method_asks_for_something() {
         assert_eq!(need(path), expected, "{path}");
     }
     for (path, expected) in [
-        // What is made later asks for the most until it is thought about.
-        ("/osteon.v1.Jobs/Later", Need::Role(Role::Admin)),
-        ("/osteon.v1.Workers/Later", Need::Worker),
-        ("/osteon.v1.Else/Get", Need::Known),
-        ("/grpc.health.v1.Healthy/Check", Need::Known),
-        ("/osteon.v1.Jobs", Need::Known),
-        ("//grpc.health.v1.Health/Check", Need::Known),
-        ("/", Need::Known),
-        ("", Need::Known),
+        // A method that is added later has the strictest requirement until one is chosen for it.
+        ("/osteon.v1.Jobs/Later", Requirement::Role(Role::Admin)),
+        ("/osteon.v1.Workers/Later", Requirement::Worker),
+        ("/osteon.v1.Else/Get", Requirement::Known),
+        ("/grpc.health.v1.Healthy/Check", Requirement::Known),
+        ("/osteon.v1.Jobs", Requirement::Known),
+        ("//grpc.health.v1.Health/Check", Requirement::Known),
+        ("/", Requirement::Known),
+        ("", Requirement::Known),
     ] {
         assert_eq!(need(path), expected, "{path}");
     }
@@ -63,7 +63,7 @@ fn no_method_of_the_services_escaped_the_table() {
     }
 }
 
-/// A list with one token of each role, and the tokens.
+/// Returns a list with one token of each role, and the tokens.
 fn tokens() -> (Tokens, [Token; 3]) {
     let roles = [Role::Read, Role::Submit, Role::Admin];
     let made = roles.map(|_| Token::generate().unwrap());
@@ -79,12 +79,12 @@ fn tokens() -> (Tokens, [Token; 3]) {
     (Tokens::read(&path).unwrap(), made)
 }
 
-/// `Ok` or the code of the refusal.
+/// Returns `Ok`, or the code of the refusal.
 fn code(
     policy: &Policy,
     certificate: Certificate,
     presented: Presented<'_>,
-    need: Need,
+    need: Requirement,
 ) -> Result<(), Code> {
     let decided = decide(policy, certificate, presented, need);
     decided.map(drop).map_err(|denied| Status::from(denied).code())
@@ -106,11 +106,11 @@ fn who_may_call_what_is_a_table() {
     let none = [Err(Unknown), Err(Unknown), Err(Unknown)];
     let of = |rest: [Result<(), Code>; 3]| [none, rest].concat();
     let table = [
-        (Need::Nothing, vec![Ok(()); 6]),
-        (Need::Known, of([Ok(()); 3])),
-        (Need::Role(Role::Read), of([Ok(()); 3])),
-        (Need::Role(Role::Submit), of([Err(Weak), Ok(()), Ok(())])),
-        (Need::Role(Role::Admin), of([Err(Weak), Err(Weak), Ok(())])),
+        (Requirement::Nothing, vec![Ok(()); 6]),
+        (Requirement::Known, of([Ok(()); 3])),
+        (Requirement::Role(Role::Read), of([Ok(()); 3])),
+        (Requirement::Role(Role::Submit), of([Err(Weak), Ok(()), Ok(())])),
+        (Requirement::Role(Role::Admin), of([Err(Weak), Err(Weak), Ok(())])),
     ];
     for policy in [Policy::Tokens(list.clone()), Policy::Tls(list.clone())] {
         for (need, expected) in &table {
@@ -125,9 +125,13 @@ fn who_may_call_what_is_a_table() {
             let found = code(&Policy::Everybody, Certificate::Absent, presented, need);
             assert_eq!(found, Ok(()), "{need:?} {name}");
         }
-        // Without TLS there are no certificates, and a worker is whom an administrator trusts.
-        let found =
-            code(&Policy::Tokens(list.clone()), Certificate::Absent, presented, Need::Worker);
+        // Without TLS there are no certificates, and only an administrator is trusted as a worker.
+        let found = code(
+            &Policy::Tokens(list.clone()),
+            Certificate::Absent,
+            presented,
+            Requirement::Worker,
+        );
         let expected = match name {
             "admin" => Ok(()),
             "read" | "submit" => Err(Weak),
@@ -146,28 +150,29 @@ fn a_certificate_makes_a_worker_and_nothing_else() {
         for (certificate, expected) in [
             (Certificate::Worker, Ok(())),
             (Certificate::Other, Err(Code::PermissionDenied)),
-            // No token takes the place of a certificate.
+            // A token does not replace a certificate.
             (Certificate::Absent, Err(Code::Unauthenticated)),
             (faulty, Err(Code::Unauthenticated)),
         ] {
-            let found = code(&policy, certificate, presented, Need::Worker);
+            let found = code(&policy, certificate, presented, Requirement::Worker);
             assert_eq!(found, expected, "{certificate:?} {presented:?}");
         }
     }
-    // Nor does a certificate take the place of a token.
+    // Nor does a certificate replace a token.
     for certificate in [Certificate::Worker, Certificate::Other] {
         for role in [Role::Read, Role::Submit, Role::Admin] {
-            let found = code(&policy, certificate, Presented::Nothing, Need::Role(role));
+            let found = code(&policy, certificate, Presented::Nothing, Requirement::Role(role));
             assert_eq!(found, Err(Code::Unauthenticated), "{certificate:?} {role:?}");
         }
-        assert_eq!(code(&policy, certificate, Presented::Nothing, Need::Known), Ok(()));
+        assert_eq!(code(&policy, certificate, Presented::Nothing, Requirement::Known), Ok(()));
     }
-    // Whoever shows a certificate that is not in order is told so, whatever the token.
+    // A caller whose certificate is not valid receives that reason, whatever its token.
     let token = Presented::Token(admin.reveal());
-    for need in [Need::Known, Need::Role(Role::Read), Need::Role(Role::Admin)] {
+    for need in [Requirement::Known, Requirement::Role(Role::Read), Requirement::Role(Role::Admin)]
+    {
         assert_eq!(code(&policy, faulty, token, need), Err(Code::Unauthenticated), "{need:?}");
     }
-    assert_eq!(code(&policy, faulty, Presented::Nothing, Need::Nothing), Ok(()));
+    assert_eq!(code(&policy, faulty, Presented::Nothing, Requirement::Nothing), Ok(()));
 }
 
 #[test]

@@ -1,15 +1,15 @@
-//! Who computes what next.
+//! Dispatch: decides which worker computes what next.
 //!
-//! Workers are served in the order of how little they hold, clients in the order of how little
-//! computing time they have had, and jobs of one client by priority and in turn, batch by batch.
-//! `sizing.rs` decides how large a batch is. The order of service is:
+//! Workers are served in ascending order of the batches they hold, clients in ascending order of
+//! the computing time they have received, and the jobs of a client by priority, then in turn, batch
+//! by batch. `sizing.rs` decides how large a batch is. The order of service is:
 //!
 //! 1. quarantined realizations, each alone on a worker (`poison.rs`). A worker that is reserved for
-//!    one gets no new work;
+//!    one gets no other new work;
 //! 2. duplicates of overdue batches (`overdue.rs`);
-//! 3. audits and tie-breaks (`audits.rs`), then the queues of the evaluations under way;
-//! 4. where workers are idle: duplicates of late batches, speculative batches (`idle.rs`), and
-//!    duplicates of the batches that are out longest (`duplicates.rs`).
+//! 3. audits and tie-breakers (`audits.rs`), then the queues of the evaluations under way;
+//! 4. for idle workers: duplicates of late batches, speculative batches (`idle.rs`), and duplicates
+//!    of the batches that have been out longest (`duplicates.rs`).
 //!
 //! A worker on probation gets one realization at a time.
 
@@ -32,7 +32,7 @@ mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
 
-/// Hands out batches while workers may take more and work waits, then duplicates.
+/// Sends batches while workers can accept more and work waits, then duplicates.
 pub(crate) fn hand_out(turn: &mut Turn) {
     if turn.state.draining {
         return;
@@ -47,19 +47,20 @@ pub(crate) fn hand_out(turn: &mut Turn) {
     duplicates::of_slow_ones(turn);
 }
 
-/// Gives the first worker that may have something what it may have, and says whether there is one.
-/// The workers in `kept` get nothing.
+/// Sends one check or batch to the first free worker that is eligible for it, and returns whether
+/// there was one. The workers in `kept` receive nothing.
 fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let mut free = schedule::free_workers(turn.state, kept);
     let first = free.first().and_then(|first| turn.state.workers.get(first));
     if !schedule::checks_wait(turn.state) && first.is_some_and(|first| turn.state.is_sound(first)) {
-        // What one of them may not have, no other may.
+        // Without checks, all sound workers are eligible for the same batches, so the first is
+        // enough.
         free.truncate(1);
     }
     free.into_iter().any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker))
 }
 
-/// Gives a worker a batch of the job whose turn it is.
+/// Sends a worker a batch of the job that is next in turn.
 fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(job) = schedule::next_job(turn.state) else {
         return false;
@@ -72,7 +73,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     };
     let size = if turn.state.is_sound(attached) {
         sizing::batch_size(turn.state, attached, job, evaluation.queued())
-    } else if !turn.state.probation.rests(&attached.name, turn.now)
+    } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)
     {
         1

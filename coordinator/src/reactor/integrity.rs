@@ -1,4 +1,4 @@
-//! Which answers count, and which workers.
+//! Decides which answers and which workers count.
 
 pub(super) mod answers;
 pub(super) mod bans;

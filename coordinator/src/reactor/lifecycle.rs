@@ -1,4 +1,4 @@
-//! Jobs, their records and workers come and go.
+//! Life cycles of jobs, their records and workers.
 
 pub(super) mod jobs;
 pub(super) mod prune;

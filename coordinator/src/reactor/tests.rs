@@ -1,5 +1,5 @@
-//! Events against a recording sink: after each, exactly the expected effects, and nothing else;
-//! after each, the whole state fits together.
+//! Events applied to a state: each must cause exactly the expected effects, and leave the whole
+//! state consistent.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,10 +29,10 @@ mod replay;
 mod speculation;
 mod workers;
 
-/// A minute.
+/// One minute.
 const MINUTE: Duration = Duration::from_secs(60);
 
-/// A coordinator with a clock that the test moves.
+/// A coordinator with a clock that the test advances.
 struct Rig {
     state: State,
     now: Duration,
@@ -40,20 +40,20 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        // Speculative batches would be in the way of most stories.
+        // Speculative batches would disturb most tests.
         let config = Config { active_jobs_max: 2, speculation: false, ..Config::default() };
         Self { state: State::new(config, Duration::ZERO), now: Duration::ZERO }
     }
 
-    /// The same where idle workers compute points ahead of a search.
+    /// Returns a coordinator with speculation, where idle workers compute candidate points.
     fn speculating() -> Self {
         let mut rig = Self::new();
         rig.state.config.speculation = true;
         rig
     }
 
-    /// A rig with a propagation of so many realizations, job 1, and workers 1, 2, … of so many
-    /// threads, who hold what they got.
+    /// Returns a rig with a propagation of so many realizations, job 1, and workers 1, 2, … with
+    /// these numbers of threads, which hold their first batches.
     fn with(realizations: u64, threads: &[u32]) -> Self {
         let mut rig = Self::new();
         rig.accept(propagation(realizations));
@@ -71,25 +71,26 @@ impl Rig {
         job
     }
 
-    /// What an event brings about, in words.
+    /// Applies an event and describes its effects.
     fn event(&mut self, event: Event) -> Vec<String> {
         let effects = react(&mut self.state, event, self.now);
         if let Err(insane) = sanity_check(&self.state) {
             panic!("{insane}\n{:#?}", self.state);
         }
-        // What is only told to the log has tests of its own.
+        // Notices for the log have tests of their own.
         let acts = effects.iter().filter(|effect| !matches!(effect, Effect::Note(_)));
         acts.map(described).collect()
     }
 
-    /// Asserts that an event brings about these effects and nothing else.
+    /// Asserts that an event causes exactly these effects.
     #[track_caller]
     fn check(&mut self, event: Event, expected: &[&str]) {
         let shown = format!("{event:?}");
         assert_eq!(self.event(event), expected, "after {shown}");
     }
 
-    /// Lets time pass and asserts what a tick then brings about, snapshots and signs of life aside.
+    /// Advances the time and asserts the effects of the next tick, without snapshots and
+    /// heartbeats.
     #[track_caller]
     fn check_after(&mut self, time: Duration, expected: &[&str]) {
         let mut effects = self.pass(time);
@@ -97,8 +98,8 @@ impl Rig {
         assert_eq!(effects, expected);
     }
 
-    /// Lets time pass, looking at it as often as a coordinator that does not stand still; at once
-    /// if it is long.
+    /// Advances the time, with ticks at the interval of heartbeats; in one step if the time is
+    /// long.
     fn pass(&mut self, time: Duration) -> Vec<String> {
         let end = self.now + time;
         let step = if time > MINUTE / 2 { time } else { self.state.config.heartbeat };
@@ -112,7 +113,7 @@ impl Rig {
         effects
     }
 
-    /// A worker is heard of.
+    /// Applies a heartbeat of a worker.
     fn hear(&mut self, worker: u64) {
         self.check(Event::Heartbeat { worker: WorkerId(worker) }, &[]);
     }
@@ -161,12 +162,12 @@ fn hello(worker: u64, threads: u32) -> Event {
     hello_of(worker, 42, threads)
 }
 
-/// A worker that runs in `process`.
+/// Returns the hello event of a worker that runs in `process`.
 fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
     hello_on("node", worker, process, threads)
 }
 
-/// A worker that runs in `process` on `host`.
+/// Returns the hello event of a worker that runs in `process` on `host`.
 fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
     let hello = Hello {
         version: version::VERSION.to_owned(),
@@ -179,7 +180,7 @@ fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
     Event::Hello { worker: WorkerId(worker), hello }
 }
 
-/// An answer whose velocities follow from the indices, computed in `elapsed_s`.
+/// Returns an answer whose velocities follow from the indices, computed in `elapsed_s`.
 fn answer_in(elapsed_s: f64, worker: u64, batch: u64, first: u64, count: u64) -> Event {
     let solved = |index| Solved { outcome: velocity(index), estimated_error: 0.0 };
     let solved = (first..first + count).map(solved).collect();
@@ -226,7 +227,7 @@ fn described(effect: &Effect) -> String {
         }
         Effect::Answer { token, answer } => format!("answer {token}: {}", answered(answer)),
         Effect::Publish { job, .. } => format!("publish {job}"),
-        Effect::Despair { error, waited } => format!("despair after {waited:?}: {error}"),
+        Effect::GiveUp { error, waited } => format!("give_up after {waited:?}: {error}"),
         Effect::Stop => "stop".to_owned(),
     }
 }

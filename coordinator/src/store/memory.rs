@@ -1,4 +1,4 @@
-//! A store that lasts as long as its handles: for runs that keep nothing, and for tests.
+//! A store that lasts as long as its handles: for runs that save nothing, and for tests.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,7 +9,7 @@ use super::{BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError
 use crate::ids::JobId;
 use crate::worker_name::WorkerName;
 
-/// A store in memory. Clones share their content, as two openings of one file would.
+/// A store in memory. Clones share their contents, as if one file were opened twice.
 #[derive(Debug, Clone, Default)]
 pub struct MemoryStore(Arc<Mutex<Content>>);
 
@@ -23,13 +23,13 @@ struct Content {
 }
 
 impl MemoryStore {
-    /// An empty store.
+    /// Returns an empty store.
     pub fn new() -> Self {
         Self::default()
     }
 
     fn content(&self) -> MutexGuard<'_, Content> {
-        // No change panics half-way.
+        // No change can panic half-way.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -56,7 +56,7 @@ impl Store for MemoryStore {
         Ok(self.content().evaluations.get(&(job, number)).cloned())
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
         let mut content = self.content();
         content.evaluations.retain(|(of, _), _| *of != job);
         if let Some(stored) = content.jobs.get_mut(&job) {
@@ -98,7 +98,7 @@ impl Store for MemoryStore {
         Ok(self.content().summaries.get(&job).cloned())
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         let mut content = self.content();
         content.last_forgotten = content.last_forgotten.max(jobs.iter().max().copied());
         content.jobs.retain(|job, _| !jobs.contains(job));

@@ -1,8 +1,9 @@
-//! A store in one SQLite file that any tool opens.
+//! A store in one SQLite file that any SQLite tool can open.
 //!
-//! Write-ahead log (on network file systems a rollback journal) with an exclusive lock, set first:
-//! no shared memory is needed and a second coordinator is refused. `synchronous = FULL`: a record that is reported is on the disk. Each
-//! row has a BLAKE3 checksum of its other columns.
+//! It uses a write-ahead log (on network file systems a rollback journal) with an exclusive lock,
+//! which is set first: no shared memory is needed and a second coordinator is refused. With
+//! `synchronous = FULL`, a record is on the disk before it is reported. Each row has a BLAKE3
+//! checksum of its other columns.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -39,8 +40,8 @@ use columns::{
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 
-/// The number in the file's header, changed with the tables or not at all, that holds the highest
-/// identifier of a forgotten job.
+/// The header field of the file that holds the highest identifier of a deleted job. It is part of
+/// the database, so it changes in one transaction with the tables.
 const LAST_FORGOTTEN: &str = "user_version";
 
 /// A store in a SQLite file.
@@ -48,34 +49,34 @@ const LAST_FORGOTTEN: &str = "user_version";
 pub struct SqliteStore {
     connection: Connection,
     path: PathBuf,
-    /// Held until the end; says whose the store is.
+    /// Held until the store is closed; names the process that uses the store.
     lock: File,
-    /// Which jobs were acknowledged.
+    /// Mark of the acknowledged jobs.
     mark: RefCell<Mark>,
 }
 
 impl Drop for SqliteStore {
     fn drop(&mut self) {
-        // A name that is left there does no harm: what counts is the lock.
+        // A name that remains in the file does no harm: only the lock counts.
         let _ = self.lock.set_len(0);
     }
 }
 
 impl SqliteStore {
-    /// Opens the store in `directory`, making both if need be.
+    /// Opens the store in `directory`, creating both if necessary.
     ///
     /// # Errors
-    /// When the directory cannot be made or written, another coordinator has the store open, a
-    /// version of osteon with another format or another program wrote it, it is damaged, jobs that
-    /// were acknowledged are missing, or SQLite refuses.
+    /// When the directory cannot be created or written, another coordinator has the store open, a
+    /// version of osteon with another format or another program wrote it, it is damaged,
+    /// acknowledged jobs are missing, or SQLite reports an error.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         Self::open_with(directory, LostJobs::Refuse)
     }
 
-    /// As [`open`](Self::open), and what to do when acknowledged jobs are missing.
+    /// As [`open`](Self::open); `lost` decides what happens when acknowledged jobs are missing.
     ///
     /// # Errors
-    /// As [`open`](Self::open); missing jobs that are accepted are none.
+    /// As [`open`](Self::open), except that missing jobs may be accepted.
     pub fn open_with(directory: &Path, lost: LostJobs) -> Result<Self, StoreError> {
         let acknowledged = |connection: &Connection, path: &Path| {
             let known = last_known(connection).map_err(|source| opening::refusal(path, source))?;
@@ -93,10 +94,10 @@ impl SqliteStore {
         Ok(Self { connection, path, lock, mark })
     }
 
-    /// Makes a directory for a store, if there is none: other users cannot enter it.
+    /// Creates a directory for a store, if there is none; other users cannot access it.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When it cannot be created.
     pub fn make_directory(directory: &Path) -> std::io::Result<()> {
         opening::make_directory(directory)
     }
@@ -109,7 +110,7 @@ impl SqliteStore {
         StoreError::Damaged { path: self.path.clone(), job, record }
     }
 
-    /// Shows `visit` the jobs that meet a condition.
+    /// Calls `visit` with the jobs that satisfy a condition.
     fn read_jobs(
         &self,
         condition: &str,
@@ -130,7 +131,7 @@ impl SqliteStore {
         Ok(())
     }
 
-    /// How many evaluations there are of a job.
+    /// Returns the number of evaluations of a job.
     fn evaluations(&self, job: JobId) -> Result<u64, StoreError> {
         let sql = "SELECT count(*), max(number) FROM evaluation WHERE job = ?1";
         let read = |row: &Row<'_>| Ok((row.get(0)?, row.get(1)?));
@@ -159,7 +160,7 @@ impl SqliteStore {
             let (Some(status), failed) = (status, failure.as_ref().and_then(known)) else {
                 return Ok(None);
             };
-            // A failure has a kind, and nothing else has one.
+            // A failed job has a kind of failure, and no other job has one.
             if failed.is_some() != failure.is_some()
                 || failed.is_some() != (status == Status::Failed)
             {
@@ -191,7 +192,7 @@ impl SqliteStore {
         }
     }
 
-    /// Gives the room of what was removed back to the disk. What fails here loses nothing.
+    /// Returns the space of deleted records to the disk. If this fails, nothing is lost.
     fn give_back(&self) -> rusqlite::Result<()> {
         {
             let mut vacuum = self.connection.prepare("PRAGMA incremental_vacuum")?;
@@ -201,7 +202,7 @@ impl SqliteStore {
         self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
     }
 
-    /// Removes jobs and all that belongs to them; their identifiers are never given again.
+    /// Deletes jobs and all their records; their identifiers are never assigned again.
     fn remove_jobs(&self, jobs: &[JobId]) -> rusqlite::Result<()> {
         let transaction = self.connection.unchecked_transaction()?;
         for table in ["summary", "ending", "evaluation"] {
@@ -259,11 +260,11 @@ impl Store for &SqliteStore {
         }
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
         let Some(record) = self.job(job)? else {
             return Ok(());
         };
-        let begin_again = || -> rusqlite::Result<()> {
+        let reset_job = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
             transaction.execute("DELETE FROM evaluation WHERE job = ?1", params![job.0])?;
             let encoded: Vec<u8> = transaction.query_row(
@@ -278,7 +279,7 @@ impl Store for &SqliteStore {
             )?;
             transaction.commit()
         };
-        begin_again().map_err(|source| self.refused(source))
+        reset_job().map_err(|source| self.refused(source))
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -299,10 +300,10 @@ impl Store for &SqliteStore {
             columns.name,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        // From here on the job may be acknowledged; its client hears of it after this.
+        // From here on the job counts as acknowledged; its client is answered after this.
         self.mark.borrow_mut().acknowledge(record.job).inspect_err(|_| {
-            // It is refused. The mark may name it all the same, so the database must know of it: as a
-            // job that was forgotten. If that fails too it is a job that nobody asks for.
+            // The job is refused, but the mark may name it all the same. So the database records it
+            // as deleted; if that fails too, it stays as a job that nobody asks for.
             if let Err(error) = self.remove_jobs(&[record.job]) {
                 tracing::error!(job = %record.job, %error, "a refused job stays in the store");
             }
@@ -373,10 +374,10 @@ impl Store for &SqliteStore {
         }
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         self.remove_jobs(jobs).map_err(|source| self.refused(source))?;
         if let Err(error) = self.give_back() {
-            tracing::warn!(%error, "the room of removed jobs is not given back yet");
+            tracing::warn!(%error, "the disk space of deleted jobs is not released yet");
         }
         Ok(())
     }
@@ -454,7 +455,8 @@ impl Store for &SqliteStore {
     }
 }
 
-/// The highest identifier that the database knows, be it of a job that was forgotten; 0: none.
+/// Returns the highest identifier in the database, including those of deleted jobs; 0 if there is
+/// none.
 fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
     let stored: Option<u64> = if connection.table_exists(None, "job")? {
         connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?
@@ -472,8 +474,8 @@ fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
     connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }
 
-/// What is shown of a job whose end is damaged: one such row must not keep all others from being
-/// served. Nothing is written: a copy of the file may have it.
+/// Returns the end that is shown for a job whose end is damaged: one such row must not keep all
+/// others from being served. Nothing is written, because a copy of the file may have the right end.
 fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
     tracing::error!(%error, "a job is shown as failed; the others are served");
     let ending = Ending {
@@ -485,7 +487,7 @@ fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
     EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }
 
-/// The job of a row, and its identifier; `None` if it is damaged.
+/// Returns the job of a row, and its identifier; `None` if the row is damaged.
 fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
     let job = JobId(row.get(0)?);
     let (request_id, fingerprint, client, name): (String, String, String, String) =

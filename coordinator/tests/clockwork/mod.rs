@@ -1,5 +1,5 @@
-//! A coordinator and its workers in virtual time: realizations, messages and the store take times
-//! that are fixed beforehand. What is measured is a function of the schedule alone.
+//! A coordinator and its workers in virtual time: realizations, messages and the store take fixed
+//! times. What is measured is a function of the schedule alone.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -10,7 +10,7 @@ use osteon_coordinator::config::Config;
 use osteon_coordinator::effect::{Effect, Record};
 use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::reactor::react;
 use osteon_coordinator::sanity::sanity_check;
 use osteon_coordinator::state::State;
@@ -20,46 +20,46 @@ use osteon_proto::batch::Work;
 
 use crate::fake;
 
-/// One realization on one thread, on average.
+/// Average time of one realization on one thread.
 const REALIZATION: Duration = Duration::from_millis(10);
-/// A message, one way.
+/// Time of a message, one way.
 const MESSAGE: Duration = Duration::from_micros(200);
-/// A record until it is durable.
+/// Time until a record is durable.
 const RECORD: Duration = Duration::from_millis(2);
 const TICK: Duration = Duration::from_millis(100);
-/// No run takes longer than this.
+/// Maximum duration of a run.
 const DAY: Duration = Duration::from_secs(86_400);
 
-enum Happening {
+enum Occurrence {
     Tick,
-    /// Something reaches the coordinator.
+    /// An event reaches the coordinator.
     Event(Event),
     /// A batch reaches a worker.
     Batch(WorkerId, BatchId, Work),
-    /// A worker is told to forget a batch.
+    /// The revocation of a batch reaches a worker.
     Revoked(WorkerId, BatchId),
-    /// A thread of a worker ends a realization of a batch.
+    /// A thread of a worker finishes a realization of a batch.
     Realized(WorkerId, BatchId),
     Write(Record),
 }
 
-/// How long realizations take.
+/// Distribution of the times of realizations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Times {
-    /// All as long.
+    /// All equal.
     Equal,
-    /// From half of the average to half as much again, each time the same one.
+    /// Between 0.5 and 1.5 times the average, always the same for the same realization.
     Spread,
 }
 
-/// A worker: batches begin in the order in which they come, one of whose realizations is given up
-/// between two.
+/// A worker: batches begin in the order of their arrival. The remaining realizations of a revoked
+/// batch are dropped; those that have begun run to their end.
 struct Worker {
     idle_threads: u32,
-    /// What is not begun of each batch.
+    /// Number of realizations of each batch that have not begun.
     queue: VecDeque<(BatchId, u32)>,
     batches: BTreeMap<BatchId, Held>,
-    /// It never answers one in so many of its batches.
+    /// It never answers one in this many of the batches; `None`: it answers all.
     swallows: Option<u64>,
 }
 
@@ -69,9 +69,9 @@ struct Held {
     realized: u32,
 }
 
-/// How a job ended.
+/// The end of a job.
 pub(crate) struct Ended {
-    /// When, since all were submitted.
+    /// Time since all jobs were submitted.
     pub(crate) at: Duration,
     pub(crate) result: JobResult,
 }
@@ -81,30 +81,30 @@ pub(crate) struct Clockwork {
     realization: Duration,
     now: Duration,
     number: u64,
-    agenda: BTreeMap<(Duration, u64), Happening>,
+    agenda: BTreeMap<(Duration, u64), Occurrence>,
     state: State,
     store: MemoryStore,
     workers: BTreeMap<WorkerId, Worker>,
     unfinished: BTreeSet<JobId>,
     ends: BTreeMap<JobId, (Duration, EndRecord)>,
-    /// Batches that were sent.
+    /// Number of batches that were sent.
     pub(crate) sent: u64,
-    /// Batches that were never answered.
+    /// Number of batches that were never answered.
     pub(crate) swallowed: u64,
 }
 
 impl Clockwork {
-    /// Workers of so many threads.
+    /// Returns workers with these numbers of threads.
     pub(crate) fn new(threads: &[u32], times: Times) -> Self {
         Self::with_config(threads, times, Config::default())
     }
 
-    /// The same at a coordinator with other settings.
+    /// The same with other settings of the coordinator.
     pub(crate) fn with_config(threads: &[u32], times: Times, config: Config) -> Self {
         Self::with(threads, times, REALIZATION, config)
     }
 
-    /// Workers of so many threads, whose realizations take so long on average.
+    /// Returns workers with these numbers of threads, whose realizations take this long on average.
     pub(crate) fn with(
         threads: &[u32],
         times: Times,
@@ -137,16 +137,16 @@ impl Clockwork {
             let hello = Hello { slots: threads, ..fake::hello(process) };
             clockwork.react(Event::Hello { worker, hello });
         }
-        clockwork.after(TICK, Happening::Tick);
+        clockwork.after(TICK, Occurrence::Tick);
         clockwork
     }
 
-    /// A worker gives signs of life and never answers one in `n` of its batches.
+    /// Makes a worker that sends heartbeats never answer one in `n` of the batches.
     pub(crate) fn swallow(&mut self, worker: u64, n: u64) {
         self.workers.get_mut(&WorkerId(worker)).unwrap().swallows = Some(n);
     }
 
-    /// Runs jobs, each of a client of its own, to their ends.
+    /// Runs jobs to their ends, each for a client of its own.
     pub(crate) fn run(&mut self, specifications: &[JobSpecification]) -> Vec<Ended> {
         for (number, specification) in (1..).zip(specifications) {
             self.unfinished.insert(JobId(number));
@@ -164,29 +164,29 @@ impl Clockwork {
         }
         let mut ended = Vec::new();
         for (at, end) in std::mem::take(&mut self.ends).into_values() {
-            let result = leftover::read(&mut self.store, &end).unwrap().result;
+            let result = job_output::read(&mut self.store, &end).unwrap().result;
             ended.push(Ended { at, result });
         }
         ended
     }
 
-    fn after(&mut self, time: Duration, happening: Happening) {
+    fn after(&mut self, time: Duration, happening: Occurrence) {
         self.number += 1;
         self.agenda.insert((self.now + time, self.number), happening);
     }
 
-    fn happen(&mut self, happening: Happening) {
+    fn happen(&mut self, happening: Occurrence) {
         match happening {
-            Happening::Tick => {
-                self.after(TICK, Happening::Tick);
+            Occurrence::Tick => {
+                self.after(TICK, Occurrence::Tick);
                 let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
                 for worker in workers {
                     self.react(Event::Heartbeat { worker });
                 }
                 self.react(Event::Tick);
             }
-            Happening::Event(event) => self.react(event),
-            Happening::Batch(worker, batch, work) => {
+            Occurrence::Event(event) => self.react(event),
+            Occurrence::Batch(worker, batch, work) => {
                 self.sent += 1;
                 let known = self.workers.get_mut(&worker).unwrap();
                 if known.swallows.is_some_and(|n| self.sent.is_multiple_of(n)) {
@@ -197,17 +197,17 @@ impl Clockwork {
                 known.batches.insert(batch, Held { work, begun: Duration::MAX, realized: 0 });
                 self.begin(worker);
             }
-            Happening::Revoked(worker, batch) => {
+            Occurrence::Revoked(worker, batch) => {
                 let known = self.workers.get_mut(&worker).unwrap();
                 known.queue.retain(|(queued, _)| *queued != batch);
                 known.batches.remove(&batch);
             }
-            Happening::Realized(worker, batch) => {
+            Occurrence::Realized(worker, batch) => {
                 self.workers.get_mut(&worker).unwrap().idle_threads += 1;
                 self.realized(worker, batch);
                 self.begin(worker);
             }
-            Happening::Write(record) => {
+            Occurrence::Write(record) => {
                 let event = fake::written(&mut self.store, &record);
                 if let Record::End { end, .. } = record {
                     self.unfinished.remove(&end.job);
@@ -218,7 +218,7 @@ impl Clockwork {
         }
     }
 
-    /// Idle threads begin what waits.
+    /// Begins waiting realizations on idle threads.
     fn begin(&mut self, worker: WorkerId) {
         let known = self.workers.get_mut(&worker).unwrap();
         let mut begun = Vec::new();
@@ -235,7 +235,7 @@ impl Clockwork {
             }
         }
         for (batch, time) in begun {
-            self.after(time, Happening::Realized(worker, batch));
+            self.after(time, Occurrence::Realized(worker, batch));
         }
     }
 
@@ -250,7 +250,7 @@ impl Clockwork {
             let solved = fake::solved(&held.work);
             known.batches.remove(&batch);
             let answer = Event::Answered { worker, batch, solved, elapsed_s };
-            self.after(MESSAGE, Happening::Event(answer));
+            self.after(MESSAGE, Occurrence::Event(answer));
         }
     }
 
@@ -260,12 +260,12 @@ impl Clockwork {
         for effect in effects {
             match effect {
                 Effect::Send { worker, batch, work } => {
-                    self.after(MESSAGE, Happening::Batch(worker, batch, work));
+                    self.after(MESSAGE, Occurrence::Batch(worker, batch, work));
                 }
                 Effect::Revoke { worker, batch } => {
-                    self.after(MESSAGE, Happening::Revoked(worker, batch));
+                    self.after(MESSAGE, Occurrence::Revoked(worker, batch));
                 }
-                Effect::Store(record) => self.after(RECORD, Happening::Write(record)),
+                Effect::Store(record) => self.after(RECORD, Occurrence::Write(record)),
                 Effect::Close { worker, reason } => panic!("{worker} is closed: {reason}"),
                 _ => {}
             }
@@ -273,7 +273,7 @@ impl Clockwork {
     }
 }
 
-/// How long the realization of a batch takes that has `left` after it.
+/// Returns the time of the realization of a batch that has `left` realizations after it.
 fn time(times: Times, realization: Duration, work: &Work, left: u32) -> Duration {
     let index = work.first + u64::from(work.count - 1 - left);
     let noise = work.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));

@@ -1,6 +1,7 @@
-//! A cheap stand-in for physics: moments that depend on the point as those of a bone do, and a
-//! failure now and then. Deterministic: a function of point, seed and index. And what stands around
-//! a coordinator that a test drives by hand: who submits, who works, what is written and read.
+//! A cheap substitute for the physics: moments that depend on the point like those of a bone, and
+//! an occasional failure. It is deterministic: a function of point, seed and index. Also helpers
+//! around a coordinator that a test drives directly: submissions, workers, and the store's writes
+//! and reads.
 
 use std::sync::Arc;
 
@@ -29,7 +30,7 @@ const RANGES: [(f64, f64, f64); 7] = [
     (0.15, 0.02, 0.3),
 ];
 
-/// A small identification.
+/// Returns a small identification.
 pub(crate) fn identification(
     realizations: u64,
     max_evaluations: u64,
@@ -51,7 +52,7 @@ pub(crate) fn identification(
     }
 }
 
-/// A propagation at the start.
+/// Returns a propagation at the start values.
 pub(crate) fn propagation(realizations: u64, seed: u64) -> JobSpecification {
     JobSpecification {
         kind: JobKind::Propagation,
@@ -60,7 +61,8 @@ pub(crate) fn propagation(realizations: u64, seed: u64) -> JobSpecification {
     }
 }
 
-/// A client without a name submits a job, under a request id unless that is empty.
+/// Returns the submission of a job by a client without a name, with a request id unless it is
+/// empty.
 pub(crate) fn submission(specification: &JobSpecification, request_id: &str) -> Request {
     Request::Submit {
         specification: Arc::new(specification.clone()),
@@ -71,19 +73,20 @@ pub(crate) fn submission(specification: &JobSpecification, request_id: &str) -> 
     }
 }
 
-/// A worker with one thread attaches; its stay has the number of its process.
+/// Returns the event that a worker with one thread attaches; its stay has the number of its
+/// process.
 pub(crate) fn attached(process: u32) -> Event {
     Event::Hello { worker: WorkerId(process.into()), hello: hello(process) }
 }
 
-/// What a worker with one thread says first.
+/// Returns the introduction of a worker with one thread.
 pub(crate) fn hello(process: u32) -> Hello {
     let WorkerHello { version, fingerprint, threads, host, process, instance } =
         wire_hello(process);
     Hello { version, fingerprint, slots: threads, host, process, instance }
 }
 
-/// The same as it is sent.
+/// Returns the same introduction as a message.
 pub(crate) fn wire_hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: VERSION.to_owned(),
@@ -95,7 +98,7 @@ pub(crate) fn wire_hello(process: u32) -> WorkerHello {
     }
 }
 
-/// Puts a record into the store.
+/// Puts a record into the store, and returns the event that reports it.
 pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
     match record {
         Record::Job(record) => store.put_job(record),
@@ -108,17 +111,17 @@ pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
     Event::Stored { job, key }
 }
 
-/// Reads an evaluation from the store.
+/// Reads an evaluation from the store, and returns the event that reports it.
 pub(crate) fn read(store: &mut dyn Store, job: JobId, number: u64) -> Event {
     Event::Read { job, number, found: Ok(store.evaluation(job, number).unwrap()) }
 }
 
-/// All realizations of a batch.
+/// Returns all realizations of a batch.
 pub(crate) fn solved(work: &Work) -> Vec<Solved> {
     (work.first..work.first + u64::from(work.count)).map(|index| realization(work, index)).collect()
 }
 
-/// The realization at one index.
+/// Returns the realization at one index.
 fn realization(work: &Work, index: u64) -> Solved {
     let noise = mix(work.germs.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if noise.is_multiple_of(29) {
@@ -132,7 +135,7 @@ fn realization(work: &Work, index: u64) -> Solved {
     Solved { outcome: Ok(velocity), estimated_error: 1e-5 * (noise % 1000) as f64 / velocity }
 }
 
-/// A well mixed function of one number (splitmix64).
+/// Returns a well mixed function of one number (splitmix64).
 pub(crate) fn mix(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -140,7 +143,7 @@ pub(crate) fn mix(number: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Result of a specification, computed in one loop without any coordinator.
+/// Returns the result of a specification, computed in one loop without a coordinator.
 pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
     let mut search = Driven::new(Arc::new(specification.clone()));
     let mut told = Vec::new();
@@ -156,7 +159,7 @@ pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
     }
 }
 
-/// What a job leaves, given the outcomes of all its evaluations.
+/// Returns the output of a job, given the outcomes of all its evaluations.
 pub(crate) fn left_by(
     search: &Driven,
     specification: &JobSpecification,
@@ -175,7 +178,7 @@ pub(crate) fn left_by(
     summary.result(specification, ending, &Program::this(None), best(summary.best), groups)
 }
 
-/// All outcomes at one point, with the median and the largest of their estimated errors.
+/// Returns all outcomes at one point, with the median and the largest of their estimated errors.
 pub(crate) fn evaluation(
     specification: &JobSpecification,
     point: Point,
@@ -194,7 +197,7 @@ pub(crate) fn evaluation(
     errors.sort_by(f64::total_cmp);
     let middle = errors.len() / 2;
     let estimated_error = errors.last().map(|&largest| EstimatedError {
-        // Half-way between both middle ones where there are two.
+        // For an even number of errors, the mean of the two middle ones.
         median: match errors.len() % 2 {
             0 => 0.5_f64.mul_add(errors[middle] - errors[middle - 1], errors[middle - 1]),
             _ => errors[middle],

@@ -1,4 +1,4 @@
-//! Submissions that begin and do not go on.
+//! Submissions that begin and then stall.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -13,15 +13,15 @@ use tonic::transport::Channel;
 
 use crate::fake;
 
-/// A job whose submission is large enough to take a place.
+/// Returns a job whose submission is large enough to need a permit.
 pub(crate) fn large() -> JobSpecification {
     let count = SMALL_SUBMISSION_BYTES_MAX as u32 / 4;
     let data = Some(Data::Velocities((0..count).map(|i| 3900.0 + f64::from(i % 10)).collect()));
     JobSpecification { data, ..fake::identification(100, 10, 7) }
 }
 
-/// Begins a submission that says to have `length` bytes and does not go on, until it is answered
-/// or its deadline is over.
+/// Begins a submission that announces `length` bytes and then stalls, until it is answered or its
+/// deadline has passed.
 pub(crate) async fn begin_submission(
     mut channel: Channel,
     length: u32,
@@ -41,7 +41,7 @@ pub(crate) async fn begin_submission(
     drop(channel.call(request).await);
 }
 
-/// Bytes, and then nothing more.
+/// A body that sends these bytes and never ends.
 struct Begun(Option<Bytes>);
 
 impl http_body::Body for Begun {

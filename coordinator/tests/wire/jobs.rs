@@ -1,15 +1,15 @@
-//! Identifications with all that a result may have.
+//! Identifications that use every feature of a result.
 
 use osteon_common::job::{Data, Group, JobSpecification, Objective, Prior, Search};
 
 use crate::fake;
 
-/// Velocities around a mean (m/s), evenly over a width (m/s).
+/// Returns velocities around a mean (m/s), evenly distributed over a width (m/s).
 fn velocities(mean: f64, width: f64, count: u32) -> Vec<f64> {
     (0..count).map(|k| mean + width * (f64::from(k) / f64::from(count - 1) - 0.5)).collect()
 }
 
-/// The name of each, and what is to be computed.
+/// Returns the jobs with their names.
 pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
     let plain = fake::identification(300, 60, 7);
     let search = Search { sensitivities: true, ..plain.search };

@@ -1,4 +1,4 @@
-//! What a client that knows nothing but the wire gets of an identification.
+//! The results of an identification that a client can get from the messages alone.
 
 use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
@@ -17,11 +17,11 @@ struct Parts {
     result: ResultMessage,
     history: Vec<HistoryBlock>,
     groups: Vec<GroupResult>,
-    /// By the number of their group.
+    /// Realizations with the number of their group.
     realizations: Vec<(Option<u32>, Vec<Outcome>)>,
 }
 
-/// Runs a job, and fetches it.
+/// Runs a job, and fetches its output.
 async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
     let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
     let mut client = client(&coordinator).await;
@@ -49,7 +49,7 @@ async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
     left
 }
 
-/// The result that a client makes of the parts.
+/// Returns the result that a client makes of the parts.
 fn result(parts: &Parts) -> JobResult {
     let of = |group: Option<u32>| {
         let found = parts.realizations.iter().find(|(of, _)| *of == group);
@@ -124,7 +124,7 @@ async fn messages_hold_the_uncertainty() {
         let velocities: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.ok()).collect();
         let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
         let found = group.best.as_ref().unwrap().velocity.unwrap().moments.unwrap().mean;
-        // Both sum in double precision, in another order.
+        // Both sum in double precision, in different orders.
         assert!((mean / found - 1.0).abs() < 1e-12, "{mean}, {found}");
     }
 }

@@ -1,4 +1,4 @@
-//! What clients hear, and what jobs leave.
+//! Checks of the answers to clients and of the output of jobs.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
 use osteon_coordinator::effect::Answer;
 use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::leftover;
+use osteon_coordinator::job_output;
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
 use osteon_search::{Ending, Search, Step};
@@ -51,7 +51,7 @@ impl World {
     }
 
     pub(super) fn check_result(&mut self, record: &JobRecord, end: &EndRecord) {
-        let left = leftover::read(&mut self.store, end).unwrap();
+        let left = job_output::read(&mut self.store, end).unwrap();
         let seed = record.specification.monte_carlo.seed;
         let lied = self.lies.iter().any(|(_, of)| *of == seed);
         let expected = if end.ending.status == Status::Cancelled {
@@ -67,10 +67,10 @@ impl World {
             fake::plain_run(&record.specification)
         };
         self.count_ahead(&record.specification, &left.history, lied);
-        // Who is never caught may deceive.
+        // A faulty worker that is never found out may change a result.
         if !self.deceived.contains(&record.job) {
             self.counts.repaired += u64::from(lied && end.ending.status != Status::Failed);
-            // As text: an unknown standard error is NaN, which equals nothing.
+            // Compared as text: an unknown standard error is NaN, which is not equal to itself.
             assert_eq!(format!("{:?}", left.result), format!("{expected:?}"));
         }
     }
@@ -91,7 +91,7 @@ impl World {
         let on_path =
             history.iter().filter_map(|row| Some((row, sent.remove(&point_key(&row.point))?)));
         let ahead = on_path.filter(|(row, durable)| *durable < row.number).count() as u64;
-        // On the path that comes of a lie a point may be asked for sooner.
+        // On a path that results from a wrong answer a point may be asked for sooner.
         assert!(
             ahead == 0 || self.config.speculation || lied,
             "nobody wanted points to be computed ahead"
@@ -105,7 +105,7 @@ impl World {
     }
 }
 
-/// What the loop has found when it is broken off after so many evaluations.
+/// Returns the result of the plain loop when it is stopped after so many evaluations.
 fn broken_run(specification: &JobSpecification, evaluations: usize, ending: &Ending) -> JobResult {
     let mut search = Search::new(Arc::new(specification.clone()));
     let mut told = Vec::new();

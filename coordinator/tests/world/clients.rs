@@ -12,15 +12,15 @@ pub(super) struct Client {
     pub(super) specification: Arc<JobSpecification>,
     pub(super) request_id: String,
     pub(super) job: Option<JobId>,
-    /// It will want its job ended at some time.
+    /// It will cancel its job at some time.
     pub(super) cancels: bool,
-    /// It has not heard yet that its job has ended.
+    /// It has not received the end of its job yet.
     pub(super) wants_end: bool,
-    /// Its job has ended, was looked at, and is forgotten.
+    /// Its job has ended, was checked, and is deleted.
     pub(super) pruned: bool,
 }
 
-/// An identification, one in three by `newton`, which takes two realizations at least.
+/// Returns an identification, one in three by `newton`, which needs at least two realizations.
 fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobSpecification {
     let mut specification = fake::identification(realizations, evaluations, seed);
     if method == 0 {
@@ -28,7 +28,7 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
         let by = Search::by(SearchMethod::Newton);
         specification.search = Search { max_evaluations: evaluations, ..by };
     }
-    // One in four for two groups, one in four from two starts, one in two with derivatives.
+    // One in four has two groups, one in four has two starts, one in two has derivatives.
     if seed.is_multiple_of(4) {
         let group = |name: &str, velocity: f64| Group {
             name: name.to_owned(),
@@ -42,7 +42,7 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
     specification
 }
 
-/// One to three clients with small jobs.
+/// Returns one to three clients with small jobs.
 pub(super) fn some(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Vec<Client> {
     (0..1 + draw(3))
         .map(|number| {

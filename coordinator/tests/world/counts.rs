@@ -1,8 +1,8 @@
-//! What schedules have seen.
+//! Counts of the events that schedules have provoked.
 
 use std::time::Duration;
 
-/// How often what happened.
+/// Number of occurrences of each kind of event.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
     pub(crate) lost: u64,
@@ -11,15 +11,15 @@ pub(crate) struct Counts {
     pub(crate) late: u64,
     pub(crate) restarts: u64,
     pub(crate) refusals: u64,
-    /// Clean ends of the coordinator.
+    /// Clean stops of the coordinator.
     pub(crate) stops: u64,
     /// Jobs that were cancelled before their end.
     pub(crate) cancelled: u64,
     /// Jobs that failed because two answers differed.
     pub(crate) exposed: u64,
-    /// Times without any write.
+    /// Outages of the store, in which every write failed.
     pub(crate) outages: u64,
-    /// Batches of which somebody has answered every realization before.
+    /// Batches all of whose realizations had been answered before.
     pub(crate) checked: u64,
     /// Wrong answers.
     pub(crate) lies: u64,
@@ -31,23 +31,23 @@ pub(crate) struct Counts {
     pub(crate) confirmed: u64,
     /// Restarts with banned workers in the store.
     pub(crate) remembered: u64,
-    /// Jobs that ended right although somebody had lied in them.
+    /// Jobs that ended correctly although there were wrong answers in them.
     pub(crate) repaired: u64,
-    /// Points that were computed before their search asked for them, and are on its path.
+    /// Points on the path of a search that were computed speculatively.
     pub(crate) ahead: u64,
-    /// Points that were computed and are not on the path of their search.
+    /// Points that were computed speculatively and are not on the path of their search.
     pub(crate) dropped: u64,
-    /// Jobs forgotten.
+    /// Deleted jobs.
     pub(crate) pruned: u64,
     /// Stored evaluations that were damaged.
     pub(crate) damaged: u64,
-    /// Times in which the coordinator stood still.
+    /// Pauses of the coordinator.
     pub(crate) pauses: u64,
-    /// Deaths of a node that dies over whatever it gets.
+    /// Losses of workers on a node where they are lost over everything they get.
     pub(crate) bad_deaths: u64,
-    /// Batches that a worker with signs of life never answered.
+    /// Batches that a worker with heartbeats never answered.
     pub(crate) swallowed: u64,
-    /// How long a schedule without a bad node took, in its own time.
+    /// Longest simulated time of a schedule without a bad node.
     pub(crate) longest: Duration,
 }
 

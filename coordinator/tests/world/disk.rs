@@ -1,15 +1,15 @@
-//! The store: writes that come late, fail, or are lost with the coordinator.
+//! The store: writes that are late, fail, or are lost with the coordinator.
 
 use osteon_coordinator::effect::Record;
-use osteon_coordinator::event::{Event, Request, Retention, Unread};
+use osteon_coordinator::event::{Event, ReadFailure, Request, Retention};
 use osteon_coordinator::ids::{JobId, Token};
 use osteon_coordinator::store::Store as _;
 
-use super::{Happening, World};
+use super::{Occurrence, World};
 use crate::fake;
 
 impl World {
-    /// Looks at a record when the coordinator has decided on it.
+    /// Examines a record that the coordinator has decided to write.
     pub(super) fn look_at(&mut self, record: &Record) {
         match record {
             Record::Ban(record) => {
@@ -19,12 +19,12 @@ impl World {
                 self.counts.banned += u64::from(self.banned.insert(process));
             }
             Record::End { end, .. } => {
-                // Written again, it was decided on before.
+                // The decision was checked when it was written first.
                 if self.ends.insert(end.job, end.clone()).is_some_and(|before| before == *end) {
                     return;
                 }
                 let of_job = self.clients.iter().find(|client| client.job == Some(end.job));
-                // Of a job whose client has not heard of it nothing is known here.
+                // The simulation knows the seed of a job only when its client has been answered.
                 let seed = of_job.map(|client| client.specification.monte_carlo.seed);
                 let at_large = |(liar, of): &(u32, u64)| {
                     seed.is_none_or(|seed| seed == *of) && !self.banned.contains(liar)
@@ -41,7 +41,7 @@ impl World {
                     let same = before.outcomes == record.outcomes;
                     self.counts.replaced += u64::from(!same);
                     self.counts.confirmed += u64::from(same);
-                    // Of what is damaged nobody knows what it was.
+                    // The contents of a damaged record are unknown.
                     let damaged = self.damaged.contains(&(record.job, record.number));
                     assert!(damaged || *is_last != same, "{record:?}");
                 }
@@ -57,10 +57,10 @@ impl World {
         } else {
             self.written(record)
         };
-        self.within(5, Happening::Report(event));
+        self.within(5, Occurrence::Report(event));
     }
 
-    /// A record is durable.
+    /// Handles a record that has become durable.
     pub(super) fn written(&mut self, record: &Record) -> Event {
         match record {
             Record::Evaluation { record, is_last } => {
@@ -81,26 +81,26 @@ impl World {
 
     pub(super) fn read(&mut self, job: JobId, number: u64) {
         let event = if self.refuses() {
-            let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+            let found = Err(ReadFailure::Refused { error: "the cable is out".to_owned() });
             Event::Read { job, number, found }
         } else if self.draw(10) == 0 {
             self.counts.damaged += 1;
             self.damaged.insert((job, number));
-            Event::Read { job, number, found: Err(Unread::Damaged) }
+            Event::Read { job, number, found: Err(ReadFailure::Damaged) }
         } else {
             fake::read(&mut self.store, job, number)
         };
-        self.within(5, Happening::Report(event));
+        self.within(5, Occurrence::Report(event));
     }
 
-    /// Somebody wants ended jobs forgotten, once every client has heard of its own.
+    /// Requests the deletion of ended jobs, once every client has been answered.
     pub(super) fn prune(&mut self) {
         if self.clients.iter().all(|client| client.job.is_some()) {
             let token = Token(self.number());
             let retention = Retention::default();
             self.react(Event::Requested { token, request: Request::Prune(retention) });
         }
-        self.within(3000, Happening::Prune);
+        self.within(3000, Occurrence::Prune);
     }
 
     pub(super) fn forget(&mut self, token: Option<Token>, jobs: Vec<JobId>) {
@@ -110,10 +110,10 @@ impl World {
             self.forget_now(&jobs);
             Ok(())
         };
-        self.within(5, Happening::Report(Event::Pruned { token, jobs, outcome }));
+        self.within(5, Occurrence::Report(Event::Pruned { token, jobs, outcome }));
     }
 
-    /// Looks at what ended jobs left, and forgets it.
+    /// Checks the output of ended jobs, and deletes it.
     pub(super) fn forget_now(&mut self, jobs: &[JobId]) {
         for stored in self.store.jobs().unwrap() {
             let job = stored.record.job;
@@ -129,7 +129,7 @@ impl World {
                 }
             }
         }
-        self.store.forget_jobs(jobs).unwrap();
+        self.store.delete_jobs(jobs).unwrap();
     }
 
     fn refuses(&mut self) -> bool {

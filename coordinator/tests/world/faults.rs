@@ -1,47 +1,46 @@
-//! A node that is not in order, and a coordinator that stops or stands still.
+//! A faulty node, and a coordinator that stops or pauses.
 
 use std::time::Duration;
 
 use osteon_coordinator::event::{Event, Hello};
 use osteon_coordinator::ids::{BatchId, WorkerId};
 
-use super::{HOUR, Happening, Worker, World};
+use super::{HOUR, Occurrence, Worker, World};
 use crate::fake;
 
-/// Numbers of processes of the bad node are above this one.
+/// Process numbers of the bad node are above this one.
 const BAD_PROCESSES: u32 = 1_000_000;
-/// And those of workers that do not answer above this one.
+/// Process numbers of workers that do not answer are above this one.
 const SILENT_PROCESSES: u32 = 2_000_000;
 
 impl World {
-    /// Whether there is a bad node, and when the coordinator is told to stop or stands still.
+    /// Decides whether there is a bad node, and when the coordinator is stopped or pauses.
     pub(super) fn plan_faults(&mut self) {
         if self.draw(4) == 0 {
-            self.within(500, Happening::ArriveBad);
+            self.within(500, Occurrence::ArriveBad);
             self.most = HOUR;
         }
         if self.draw(3) == 0 {
-            // Half of them never answer anything.
+            // Half of them never answer.
             let swallows = [1, 1, 2, 5][self.draw(4) as usize];
-            self.within(500, Happening::ArriveSilent(SILENT_PROCESSES, swallows));
+            self.within(500, Occurrence::ArriveSilent(SILENT_PROCESSES, swallows));
         }
         if self.draw(3) == 0 {
-            self.within(3000, Happening::Drain);
+            self.within(3000, Occurrence::Drain);
         }
         for _ in 0..self.draw(4) {
-            self.within(3000, Happening::Pause);
+            self.within(3000, Occurrence::Pause);
         }
     }
 
-    /// The coordinator stands still for longer than silence may last. Whatever comes meanwhile it
-    /// finds when it goes on, after it has looked at the time. Some workers have given it up by
-    /// then, and attach again.
+    /// Pauses the coordinator for longer than a lease. It receives what arrives meanwhile when it
+    /// continues, after its first tick. Some workers have given it up by then, and attach again.
     pub(super) fn pause(&mut self) {
         self.counts.pauses += 1;
         let until = self.now + self.config.expiry + Duration::from_millis(1 + self.draw(3000));
         let later = self.agenda.split_off(&(until, 0));
         for ((_, number), happening) in std::mem::replace(&mut self.agenda, later) {
-            let number = if matches!(happening, Happening::Tick) { 0 } else { number };
+            let number = if matches!(happening, Occurrence::Tick) { 0 } else { number };
             self.agenda.insert((until, number), happening);
         }
         self.now = until;
@@ -55,20 +54,21 @@ impl World {
                 && !self.banned.contains(&process)
                 && self.draw(2) == 0
             {
-                self.after(1, Happening::GiveUp(worker));
+                self.after(1, Occurrence::GiveUp(worker));
             }
         }
     }
 
-    /// A worker gives up a coordinator that was silent, and looks for it again.
+    /// Makes a worker give up a silent coordinator, and connect again.
     pub(super) fn give_up(&mut self, worker: WorkerId) {
         if let Some(gone) = self.workers.remove(&worker) {
             self.react(Event::StreamEnded { worker });
-            self.within(400, Happening::Return(gone.process));
+            self.within(400, Occurrence::Return(gone.process));
         }
     }
 
-    /// A process that gives signs of life, and never answers one in `swallows` of its batches.
+    /// Attaches a process that sends heartbeats, and never answers one in `swallows` of its
+    /// batches.
     pub(super) fn arrive_silent(&mut self, process: u32, swallows: u64) {
         let worker = WorkerId(self.number());
         let hello = Hello { host: "silent".to_owned(), slots: 2, ..fake::hello(process) };
@@ -77,7 +77,7 @@ impl World {
         self.react(Event::Hello { worker, hello });
     }
 
-    /// Whether a batch is one of those that its worker never answers.
+    /// Returns whether a batch is one of those that its worker never answers.
     pub(super) fn swallows(&mut self, worker: WorkerId, batch: BatchId) -> bool {
         let swallows = self.workers[&worker].swallows;
         let swallowed = swallows > 0 && batch.0.is_multiple_of(swallows);
@@ -85,7 +85,7 @@ impl World {
         swallowed
     }
 
-    /// A process on a node that is not in order.
+    /// Attaches a process on a faulty node.
     pub(super) fn arrive_bad(&mut self) {
         let number = self.number();
         let (worker, process) = (WorkerId(number), BAD_PROCESSES + number as u32);

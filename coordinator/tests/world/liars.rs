@@ -1,4 +1,4 @@
-//! Workers whose answers are wrong.
+//! Workers that return wrong answers.
 
 use std::collections::BTreeSet;
 
@@ -9,8 +9,8 @@ use osteon_proto::batch::Work;
 use super::World;
 use crate::fake;
 
-/// Processes that lie, if any do. They are of the first workers: those that come in the place of
-/// others are honest.
+/// Returns the processes that return wrong answers, if any. They are among the first workers: those
+/// that replace others are honest.
 pub(super) fn some(draw: &mut impl FnMut(u64) -> u64) -> BTreeSet<u32> {
     match draw(6) {
         0 => [1].into(),
@@ -21,7 +21,7 @@ pub(super) fn some(draw: &mut impl FnMut(u64) -> u64) -> BTreeSet<u32> {
 }
 
 impl World {
-    /// The process of a worker that arrives: a new one, or one that was here and comes back.
+    /// Returns the process of a worker that arrives: a new one, or one that was attached before.
     pub(super) fn process(&mut self) -> u32 {
         let gone = |process: &u32| {
             let here = self.workers.values().any(|worker| worker.process == *process);
@@ -38,13 +38,13 @@ impl World {
         }
     }
 
-    /// What a worker answers: liars lie in every third batch.
+    /// Returns a worker's answer: liars answer every third batch wrongly.
     pub(super) fn answer(&mut self, worker: WorkerId, batch: BatchId, work: &Work) -> Event {
         let mut solved = fake::solved(work);
         let process = self.workers[&worker].process;
         if self.liars.contains(&process) && self.draw(3) == 0 {
             let at = self.draw(solved.len() as u64) as usize;
-            // No two liars agree.
+            // No two liars give the same answer.
             if self.draw(4) == 0 {
                 solved[at].estimated_error += f64::from(process);
             } else {
@@ -59,7 +59,7 @@ impl World {
         self.liars.contains(&self.workers[&worker].process)
     }
 
-    /// A worker answers a batch that is settled again, and differently.
+    /// Makes a worker answer a settled batch again, and differently.
     pub(super) fn lie(&mut self, worker: WorkerId, batch: BatchId, work: &Work) {
         let Some(known) = self.workers.get(&worker) else {
             return;

@@ -1,4 +1,4 @@
-//! The world around a simulated coordinator.
+//! The simulated environment of a coordinator.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -29,63 +29,64 @@ mod liars;
 pub(crate) use counts::Counts;
 
 const TICK: Duration = Duration::from_millis(100);
-/// No schedule takes longer than this, in its own time.
+/// Maximum simulated time of a schedule.
 const HOUR: Duration = Duration::from_secs(3600);
-/// Nor one without a bad node longer than this: the longest outage of the store, and a few minutes. It
-/// is less than the time after which a worker that does not answer has lost its lease.
+/// Maximum simulated time of a schedule without a bad node: the longest outage of the store, and a
+/// few minutes. It is less than the time after which a worker that does not answer loses its lease.
 const MINUTES: Duration = Duration::from_secs(300);
-/// Lone realizations may lose this many workers and no more: a third fails the job, rightly.
+/// Upper limit for the workers lost over a quarantined realization: a third loss rightly fails the
+/// job.
 const LOST_ALONE_MAX: u32 = 2;
 
-/// Something that will happen.
-enum Happening {
+/// A scheduled event.
+enum Occurrence {
     Tick,
-    /// A client submits its job until it hears that it is accepted.
+    /// A client submits its job, and repeats that until the job is accepted.
     Submit(usize),
     /// A worker attaches.
     Arrive,
     /// A process attaches again.
     Return(u32),
-    /// The coordinator stands still.
+    /// The coordinator pauses.
     Pause,
-    /// A worker does not wait for the coordinator any longer.
+    /// A worker no longer waits for the coordinator.
     GiveUp(WorkerId),
-    /// A worker attaches that dies over whatever it gets.
+    /// A worker attaches that is lost over everything it gets.
     ArriveBad,
-    /// A process attaches that gives signs of life, and never answers one in so many batches.
+    /// A process attaches that sends heartbeats, and never answers one in so many batches.
     ArriveSilent(u32, u64),
     /// A worker's message arrives.
     Message(WorkerId, Event),
-    /// A worker answers a batch that is settled again, and differently.
+    /// A worker answers a settled batch again, and differently.
     Lie(WorkerId, BatchId, Work),
     /// A worker's stream breaks.
     Break(WorkerId),
-    /// A record reaches the disk, or does not.
+    /// A record reaches the disk, or fails to.
     Write(Record),
     /// An evaluation is read.
     Read(JobId, u64),
-    /// Ended jobs are forgotten.
+    /// Ended jobs are deleted.
     Forget(Option<Token>, Vec<JobId>),
-    /// Somebody wants ended jobs forgotten.
+    /// A client requests the deletion of ended jobs.
     Prune,
     /// A report of the store arrives.
     Report(Event),
     /// The coordinator is killed and starts again.
     Restart,
-    /// The coordinator is told to stop; when it has, it starts again.
+    /// The coordinator is requested to stop, and is started again when it has.
     Drain,
-    /// A client wants its job ended, until it hears that it has.
+    /// A client cancels its job, and repeats that until it has ended.
     Cancel(usize),
 }
 
 #[derive(Default)]
 struct Worker {
     process: u32,
-    /// It computes nothing and says nothing, but its stream stands.
+    /// It computes and sends nothing, but its stream stays open.
     stalled: bool,
-    /// It dies over whatever it gets.
+    /// It is lost over everything it gets.
     bad: bool,
-    /// It never answers one in so many of its batches; 0: it answers all.
+    /// It never answers one in this many of its batches; 0: it answers all.
     swallows: u64,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
@@ -94,34 +95,34 @@ struct Worker {
 pub(crate) struct World {
     random: u64,
     now: Duration,
-    agenda: BTreeMap<(Duration, u64), Happening>,
+    agenda: BTreeMap<(Duration, u64), Occurrence>,
     state: State,
     config: Config,
     store: MemoryStore,
     clients: Vec<Client>,
     submissions: BTreeMap<Token, usize>,
     cancellations: BTreeMap<Token, usize>,
-    /// How long it may take.
+    /// Maximum simulated time.
     most: Duration,
-    /// When the store takes nothing.
+    /// Period in which the store refuses everything.
     outage: Range<Duration>,
-    /// Processes that lie now and then, some of them on second thoughts only.
+    /// Processes that return wrong answers now and then, some only when they answer a second time.
     liars: BTreeSet<u32>,
-    /// Who has lied about realizations of which seed.
+    /// Processes that gave wrong answers, with the seeds of the jobs.
     lies: BTreeSet<(u32, u64)>,
-    /// Who is banned.
+    /// Banned processes.
     banned: BTreeSet<u32>,
-    /// Seed, point and indices of batches that were answered in this life of the coordinator.
+    /// Seed, point and indices of batches that were answered in this run of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
     /// Seed of each job.
     seeds: BTreeMap<JobId, u64>,
-    /// How many evaluations of the job with a seed are durable.
+    /// Number of durable evaluations of the job with each seed.
     durable: BTreeMap<u64, u64>,
-    /// How many were, of each seed, when a point was sent first.
+    /// That number when each point of a seed was sent first.
     first_sent: BTreeMap<(u64, u64), u64>,
     /// Evaluations that were found damaged in the store.
     damaged: BTreeSet<(JobId, u64)>,
-    /// Jobs that end while somebody who lied in them is not found out.
+    /// Jobs that ended before a worker with wrong answers in them was found out.
     deceived: BTreeSet<JobId>,
     /// The last decision on the end of each job.
     ends: BTreeMap<JobId, EndRecord>,
@@ -133,7 +134,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// Runs one schedule to its end and checks what it left.
+    /// Runs one schedule to its end and checks the results.
     pub(crate) fn run(seed: u64) -> Counts {
         let mut world = Self::new(seed);
         while !world.done() {
@@ -170,7 +171,7 @@ impl World {
         let clients = clients::some(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
-        // Long: a client has given up by then, and so have many programs.
+        // Long enough that clients and many programs have given up.
         let outage = (draw(8) == 0).then(|| (draw(1000), 10_000 + draw(60_000)));
         let outage = outage.map_or(Duration::ZERO..Duration::ZERO, |(from, length)| {
             Duration::from_millis(from)..Duration::from_millis(from + length)
@@ -205,20 +206,20 @@ impl World {
             lost_alone: BTreeMap::new(),
             number: 1,
         };
-        world.agenda.insert((TICK, 0), Happening::Tick);
+        world.agenda.insert((TICK, 0), Occurrence::Tick);
         for client in 0..world.clients.len() {
-            world.within(500, Happening::Submit(client));
+            world.within(500, Occurrence::Submit(client));
             if world.clients[client].cancels {
-                world.within(3000, Happening::Cancel(client));
+                world.within(3000, Occurrence::Cancel(client));
             }
         }
         for _ in 0..workers {
-            world.within(500, Happening::Arrive);
+            world.within(500, Occurrence::Arrive);
         }
-        restarts.into_iter().for_each(|at| world.after(at, Happening::Restart));
+        restarts.into_iter().for_each(|at| world.after(at, Occurrence::Restart));
         world.plan_faults();
         if let Some(at) = prune {
-            world.after(at, Happening::Prune);
+            world.after(at, Occurrence::Prune);
         }
         world
     }
@@ -233,12 +234,12 @@ impl World {
         self.number
     }
 
-    fn after(&mut self, ms: u64, happening: Happening) {
+    fn after(&mut self, ms: u64, happening: Occurrence) {
         let number = self.number();
         self.agenda.insert((self.now + Duration::from_millis(ms), number), happening);
     }
 
-    fn within(&mut self, ms: u64, happening: Happening) {
+    fn within(&mut self, ms: u64, happening: Occurrence) {
         let ms = 1 + self.draw(ms);
         self.after(ms, happening);
     }
@@ -249,53 +250,53 @@ impl World {
             return false;
         }
         let jobs = self.store.clone().jobs().unwrap();
-        let on_its_way = |happening: &Happening| matches!(happening, Happening::Forget(..));
+        let on_its_way = |happening: &Occurrence| matches!(happening, Occurrence::Forget(..));
         jobs.iter().all(|job| job.end.is_some()) && !self.agenda.values().any(on_its_way)
     }
 
-    fn happen(&mut self, happening: Happening) {
+    fn happen(&mut self, happening: Occurrence) {
         match happening {
-            Happening::Tick => self.tick(),
-            Happening::Submit(client) => self.submit(client),
-            Happening::Arrive => self.arrive(),
-            Happening::ArriveBad => self.arrive_bad(),
-            Happening::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
-            Happening::Return(process) => self.attach(process),
-            Happening::Pause => self.pause(),
-            Happening::GiveUp(worker) => self.give_up(worker),
-            Happening::Message(worker, event) => {
+            Occurrence::Tick => self.tick(),
+            Occurrence::Submit(client) => self.submit(client),
+            Occurrence::Arrive => self.arrive(),
+            Occurrence::ArriveBad => self.arrive_bad(),
+            Occurrence::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
+            Occurrence::Return(process) => self.attach(process),
+            Occurrence::Pause => self.pause(),
+            Occurrence::GiveUp(worker) => self.give_up(worker),
+            Occurrence::Message(worker, event) => {
                 if self.workers.get(&worker).is_some_and(|worker| !worker.stalled) {
                     self.message(worker, event);
                 }
             }
-            Happening::Break(worker) => {
+            Occurrence::Break(worker) => {
                 let bad = self.workers.get(&worker).map(|worker| worker.bad);
                 self.counts.bad_deaths += u64::from(bad == Some(true));
                 if bad.is_none() {
                 } else if bad == Some(true) || self.may_die(worker) {
-                    self.bury(worker);
+                    self.remove_lost(worker);
                     self.react(Event::StreamEnded { worker });
                 } else {
                     self.answer_all(worker);
                 }
             }
-            Happening::Write(record) => self.write(&record),
-            Happening::Report(event) => self.react(event),
-            Happening::Restart => {
+            Occurrence::Write(record) => self.write(&record),
+            Occurrence::Report(event) => self.react(event),
+            Occurrence::Restart => {
                 self.counts.restarts += 1;
                 self.restart();
             }
-            Happening::Drain => self.react(Event::Drain),
-            Happening::Lie(worker, batch, work) => self.lie(worker, batch, &work),
-            Happening::Cancel(client) => self.cancel(client),
-            Happening::Read(job, number) => self.read(job, number),
-            Happening::Forget(token, jobs) => self.forget(token, jobs),
-            Happening::Prune => self.prune(),
+            Occurrence::Drain => self.react(Event::Drain),
+            Occurrence::Lie(worker, batch, work) => self.lie(worker, batch, &work),
+            Occurrence::Cancel(client) => self.cancel(client),
+            Occurrence::Read(job, number) => self.read(job, number),
+            Occurrence::Forget(token, jobs) => self.forget(token, jobs),
+            Occurrence::Prune => self.prune(),
         }
     }
 
     fn tick(&mut self) {
-        self.after(TICK.as_millis() as u64, Happening::Tick);
+        self.after(TICK.as_millis() as u64, Occurrence::Tick);
         let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
         for worker in workers {
             let silent = self.now - self.workers[&worker].heard > self.config.expiry;
@@ -304,7 +305,7 @@ impl World {
                 known.heard = self.now;
                 self.react(Event::Heartbeat { worker });
             } else if silent && !self.may_die(worker) {
-                // It comes back to life in the last moment.
+                // It revives at the last moment.
                 let known = self.workers.get_mut(&worker).unwrap();
                 known.stalled = false;
                 known.heard = self.now;
@@ -320,7 +321,7 @@ impl World {
         let holds: Vec<_> = known.holds.iter().map(|(batch, work)| (*batch, *work)).collect();
         for (batch, work) in holds {
             let answer = self.answer(worker, batch, &work);
-            self.within(50, Happening::Message(worker, answer));
+            self.within(50, Occurrence::Message(worker, answer));
         }
     }
 
@@ -334,9 +335,9 @@ impl World {
                 *name = format!("client {}", client % 2);
                 *priority = client as u32;
             }
-            // Until it hears of acceptance, a client asks again.
+            // A client repeats its request until the job is accepted.
             self.react(Event::Requested { token, request });
-            self.within(2000, Happening::Submit(client));
+            self.within(2000, Occurrence::Submit(client));
         }
     }
 
@@ -373,7 +374,8 @@ impl World {
         self.react(event);
     }
 
-    /// Whether the coordinator may lose this worker without a third lone death of a realization.
+    /// Returns whether the coordinator may lose this worker without a third loss over a quarantined
+    /// realization.
     fn may_die(&mut self, worker: WorkerId) -> bool {
         let holds = &self.workers[&worker].holds;
         let Some(work) = holds.values().next().filter(|work| holds.len() == 1 && work.count == 1)
@@ -386,30 +388,30 @@ impl World {
         *lost <= LOST_ALONE_MAX
     }
 
-    /// A worker is gone; another comes in its place.
-    fn bury(&mut self, worker: WorkerId) {
+    /// Removes a lost worker; another one replaces it.
+    fn remove_lost(&mut self, worker: WorkerId) {
         let gone = self.workers.remove(&worker).unwrap();
         self.counts.lost += 1;
         self.replace(&gone);
     }
 
-    /// Another worker comes in the place of one that is gone.
+    /// Schedules the arrival of a worker that replaces a lost one.
     fn replace(&mut self, gone: &Worker) {
         let other = match gone.swallows {
-            0 if gone.bad => Happening::ArriveBad,
-            0 => Happening::Arrive,
-            // It comes back, or another process of its host.
-            swallows => Happening::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
+            0 if gone.bad => Occurrence::ArriveBad,
+            0 => Occurrence::Arrive,
+            // It comes back itself, or as another process of its host.
+            swallows => Occurrence::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
         };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
 
-    /// The coordinator has stopped by itself, and starts again.
+    /// Restarts the coordinator after it has stopped by itself.
     fn stopped(&mut self) {
         self.counts.stops += 1;
         assert!(self.workers.is_empty(), "it stopped with workers attached");
-        let unstored = |happening: &Happening| matches!(happening, Happening::Write(_));
-        // Only what the store has refused may be left.
+        let unstored = |happening: &Occurrence| matches!(happening, Occurrence::Write(_));
+        // Only records that the store has refused may be left.
         let left = self.agenda.values().any(unstored);
         assert!(!left || self.counts.refusals > 0, "it stopped with a record on its way");
         self.restart();
@@ -424,30 +426,30 @@ impl World {
             self.cancellations.insert(token, client);
             self.react(Event::Requested { token, request: Request::Cancel(job) });
         }
-        self.within(2000, Happening::Cancel(client));
+        self.within(2000, Occurrence::Cancel(client));
     }
 
-    /// Kills the coordinator: what was on its way to the disk may or may not have reached it.
+    /// Kills the coordinator: records on their way to the disk may or may not have reached it.
     fn restart(&mut self) {
         let agenda = std::mem::take(&mut self.agenda);
         for (at, happening) in agenda {
             match happening {
-                Happening::Write(record) => {
+                Occurrence::Write(record) => {
                     if self.draw(2) == 0 {
                         self.written(&record);
                     }
                 }
-                Happening::Forget(_, jobs) => {
+                Occurrence::Forget(_, jobs) => {
                     if self.draw(2) == 0 {
                         self.forget_now(&jobs);
                     }
                 }
-                Happening::Message(..)
-                | Happening::Lie(..)
-                | Happening::Break(_)
-                | Happening::GiveUp(_)
-                | Happening::Read(..)
-                | Happening::Report(_) => {}
+                Occurrence::Message(..)
+                | Occurrence::Lie(..)
+                | Occurrence::Break(_)
+                | Occurrence::GiveUp(_)
+                | Occurrence::Read(..)
+                | Occurrence::Report(_) => {}
                 stays => {
                     self.agenda.insert(at, stays);
                 }
@@ -492,23 +494,23 @@ impl World {
                 }
                 Effect::Close { worker, .. } => {
                     self.counts.closed += 1;
-                    self.bury(worker);
+                    self.remove_lost(worker);
                 }
                 Effect::Store(record) => {
                     self.look_at(&record);
-                    self.within(20, Happening::Write(record));
+                    self.within(20, Occurrence::Write(record));
                 }
-                Effect::Read { job, number } => self.within(10, Happening::Read(job, number)),
-                Effect::Prune { token, jobs } => self.within(20, Happening::Forget(token, jobs)),
+                Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
+                Effect::Prune { token, jobs } => self.within(20, Occurrence::Forget(token, jobs)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
-                Effect::Despair { .. } => panic!("nobody lacks patience"),
+                Effect::GiveUp { .. } => panic!("nobody lacks patience"),
                 Effect::Stop => self.stopped(),
             }
         }
     }
 
-    /// A worker gets a batch; the dice say what becomes of it.
+    /// Handles a batch sent to a worker; a random number decides its fate.
     fn sent(&mut self, worker: WorkerId, batch: BatchId, work: Work) {
         self.counts.checked += u64::from(self.answered_batches.contains(&key(&work)));
         let (seed, point, ..) = key(&work);
@@ -519,7 +521,7 @@ impl World {
         assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
         if bad {
-            self.within(50, Happening::Break(worker));
+            self.within(50, Occurrence::Break(worker));
             return;
         }
         if self.swallows(worker, batch) {
@@ -527,32 +529,32 @@ impl World {
         }
         let right = self.answer(worker, batch, &work);
         match self.draw(100) {
-            0..3 => self.within(100, Happening::Break(worker)),
+            0..3 => self.within(100, Occurrence::Break(worker)),
             3..5 => self.workers.get_mut(&worker).unwrap().stalled = true,
-            5..10 => self.within(4000, Happening::Message(worker, right)),
+            5..10 => self.within(4000, Occurrence::Message(worker, right)),
             10..13 => {
-                self.within(100, Happening::Message(worker, right.clone()));
-                self.within(300, Happening::Message(worker, right));
+                self.within(100, Occurrence::Message(worker, right.clone()));
+                self.within(300, Occurrence::Message(worker, right));
             }
             13 => {
                 let wrong = Work { count: work.count + 1, ..work };
                 let event = self.answer(worker, batch, &wrong);
-                self.within(100, Happening::Message(worker, event));
+                self.within(100, Occurrence::Message(worker, event));
             }
             14 => {
-                self.within(50, Happening::Message(worker, Event::WorkerDrains { worker }));
-                self.within(100, Happening::Message(worker, right));
+                self.within(50, Occurrence::Message(worker, Event::WorkerDrains { worker }));
+                self.within(100, Occurrence::Message(worker, right));
             }
             15..17 if self.has_second_thoughts(worker) => {
-                self.within(100, Happening::Message(worker, right));
-                self.within(300, Happening::Lie(worker, batch, work));
+                self.within(100, Occurrence::Message(worker, right));
+                self.within(300, Occurrence::Lie(worker, batch, work));
             }
-            _ => self.within(150, Happening::Message(worker, right)),
+            _ => self.within(150, Occurrence::Message(worker, right)),
         }
     }
 }
 
-/// What a batch is about.
+/// Returns seed, point and indices of a batch.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
     (work.germs.seed, point_key(&work.point), work.first, work.count)
 }

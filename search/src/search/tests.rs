@@ -168,7 +168,7 @@ fn replay_of_any_part(specification: &JobSpecification) {
     for length in 0..=told.len() {
         let mut search = Search::new(Arc::new(specification.clone()));
         for (point, outcomes) in &told[..length] {
-            search.retell(*point, outcomes.clone(), ERRORS).unwrap();
+            search.replay(*point, outcomes.clone(), ERRORS).unwrap();
         }
         assert_eq!(search.evaluations(), length as u64);
         for (point, outcomes) in &told[length..] {
@@ -189,7 +189,7 @@ fn a_replay_of_another_path_is_refused() {
     told[3].0.0[1] += 1.0;
     let mut search = Search::new(Arc::new(specification));
     let mut retold =
-        told.into_iter().map(|(point, outcomes)| search.retell(point, outcomes, ERRORS));
+        told.into_iter().map(|(point, outcomes)| search.replay(point, outcomes, ERRORS));
     assert_eq!(retold.find_map(Result::err).unwrap().number, 3);
 }
 
@@ -327,7 +327,7 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
     let mut again = Search::new(specification);
     while let Step::Evaluate(point) = search.ask() {
         search.tell(explained(&asked, &point), ERRORS);
-        again.retell(point, explained(&asked, &point), ERRORS).unwrap();
+        again.replay(point, explained(&asked, &point), ERRORS).unwrap();
     }
     let result = search.result(&ending(&search), &Program::this(None));
     assert_eq!(result.status, Status::Converged);

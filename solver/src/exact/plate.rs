@@ -1,17 +1,17 @@
 //! Admittance of the plate by doubling.
 //!
-//! A sublayer of thickness d = h/2ⁿ has, from its transfer matrix, the dynamic stiffness `[t_top;
-//! t_bottom] = K [u_top; u_bottom]` (outward tractions). For every triclinic tensor K_bb = K_ttᵀ,
-//! K_tb and K_bt are symmetric, and K_bt(k) = K_tb(-k). Two equal layers, one on the other, form
-//! one of twice the thickness: with A = K_tt, D = -K_tb, U = -K_bt
+//! A sublayer of thickness d = h/2ⁿ has, from its transfer matrix, the dynamic stiffness
+//! `[t_top; t_bottom] = K [u_top; u_bottom]` (outward tractions). For every triclinic tensor
+//! K_bb = K_ttᵀ, K_tb and K_bt are symmetric, and K_bt(k) = K_tb(-k). Two equal layers, one on the
+//! other, form one of twice the thickness: with A = K_tt, D = -K_tb, U = -K_bt
 //!
 //! ```text
 //! S = A + Aᵀ,   A ← A - D S⁻¹ U,   D ← D S⁻¹ D,   U ← U S⁻¹ U
 //! ```
 //!
 //! S is complex symmetric. As s has a positive real part, its factorization needs no pivoting. The
-//! last doubling closes the lower face with the marrow and eliminates directly to the scalar 1/Y, Y
-//! = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
+//! last doubling closes the lower face with the marrow and eliminates directly to the scalar 1/Y,
+//! Y = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
 //!
 //! Matrix entries are written out, and closures are avoided: code that the compiler does not inline
 //! and unroll is not kept in registers, nor compiled for the instruction set (see [`crate::isa`]).

@@ -21,7 +21,7 @@ const PRESSURES_MAX: f64 = 5e6;
 /// is rounded.
 const TO_BE_SAFE: f64 = 1.01;
 
-/// Pressures at the receivers.
+/// Kernel that computes the pressures at the receivers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traces {
     /// Times, s, from 0 on.

@@ -51,7 +51,7 @@ pub(super) struct Plan {
     pub(super) wavenumber_limit: f64,
     /// Highest frequency that the mesh resolves, Hz.
     pub(super) band: f64,
-    /// End of the last window, s.
+    /// Returns the end of the last window, s.
     pub(super) end: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Who computes a batch a second time, and who decides between two answers that differ.
+//! Chooses the workers for audits and tie-breakers.
 
 use super::{batches, poison};
 use crate::batch::{Assignment, Purpose};
@@ -8,7 +8,8 @@ use crate::ids::{JobId, WorkerId};
 use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 
-/// Gives a worker something to check, if there is something that it may: disputes first.
+/// Sends a worker a tie-breaker or an audit that it is eligible for, if there is one; disputes come
+/// first.
 pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone()) else {
         return false;
@@ -39,8 +40,8 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
     false
 }
 
-/// The first dispute of a job that this worker is to decide: of those that may, nobody can be
-/// expected to do better.
+/// Returns the first dispute of a job that this worker shall decide: one for which no eligible
+/// worker has a better reputation.
 fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let worker = state.workers.get(&worker)?;
@@ -53,7 +54,7 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
     evaluation.disputes.iter().position(is_for)
 }
 
-/// Has a worker decide a dispute.
+/// Sends a worker the tie-breaker of a dispute.
 fn hand_dispute(turn: &mut Turn, job: JobId, at: usize, worker: WorkerId) -> bool {
     let Some(evaluation) = turn.state.evaluation_mut(job) else {
         return false;

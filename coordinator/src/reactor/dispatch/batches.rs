@@ -1,4 +1,4 @@
-//! A batch is sent, taken back, or loses its worker.
+//! Sends batches, revokes them, and returns the indices of lost workers' batches to the queue.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::job::Speculation;
 use crate::reactor::turn::Turn;
 use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 
-/// Workers that may be lost over one audit before it is given up.
+/// Number of workers that may be lost over one audit before it is given up.
 const LOST_MAX: u32 = 3;
 
 /// Sends a batch to a worker and returns its number, if its evaluation is under way.
@@ -45,7 +45,8 @@ pub(crate) fn send(
     Some(id)
 }
 
-/// Charges the client of a batch for the time that it will take, as far as that is known.
+/// Charges the client of a batch for its expected computing time, or for the target time of a batch
+/// if the rate of the worker is unknown.
 pub(crate) fn charge(state: &mut State, id: BatchId) {
     let target = state.config.batch_target.as_secs_f64();
     let Some(batch) = state.batches.get_mut(&id) else {
@@ -63,7 +64,7 @@ pub(crate) fn charge(state: &mut State, id: BatchId) {
     state.shares.charge(&job.record.client, batch.charged);
 }
 
-/// Takes back a batch, telling its worker to forget it.
+/// Revokes a batch.
 pub(crate) fn revoke(turn: &mut Turn, batch: BatchId) {
     if let Some(revoked) = turn.state.settle(batch) {
         turn.effects.push(Effect::Revoke { worker: revoked.worker, batch });
@@ -71,7 +72,7 @@ pub(crate) fn revoke(turn: &mut Turn, batch: BatchId) {
     }
 }
 
-/// Takes back every batch of a job, and drops its speculative evaluations.
+/// Revokes every batch of a job, and drops its speculative evaluations.
 pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     let of_job = turn.state.batches.iter().filter(|(_, batch)| batch.assignment.job == job);
     let batches: Vec<BatchId> = of_job.map(|(id, _)| *id).collect();
@@ -83,7 +84,8 @@ pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     }
 }
 
-/// Hands the indices of a lost worker's batch back, unless a duplicate of it lives.
+/// Returns the indices of a lost worker's batch to the queue, unless a duplicate of it is still
+/// out.
 pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWorker) {
     let assignment = state.batches.get(&batch).map(|batch| (batch.purpose, batch.assignment));
     if let Some((Purpose::TieBreak, assignment)) = assignment {
@@ -101,7 +103,7 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWor
         return;
     };
     let indices = assignment.indices;
-    evaluation.lost_over |= loss.cause != Cause::Announced;
+    evaluation.has_crashed_worker |= loss.cause != Cause::Announced;
     if !duplicates.is_empty() {
         if purpose == Purpose::Exclusive {
             evaluation.count_crash(indices.first, loss);
@@ -115,8 +117,8 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWor
     }
 }
 
-/// Takes back the speculative batches of a worker that has no room for `count` realizations beside
-/// them.
+/// Revokes the speculative batches of a worker that has no free slots for `count` more realizations
+/// beside them.
 pub(crate) fn preempt_if_full(turn: &mut Turn, worker: WorkerId, count: u64) {
     let Some(attached) = turn.state.workers.get(&worker) else {
         return;
@@ -127,7 +129,7 @@ pub(crate) fn preempt_if_full(turn: &mut Turn, worker: WorkerId, count: u64) {
     }
 }
 
-/// Takes back the speculative batches of a worker.
+/// Revokes the speculative batches of a worker.
 pub(crate) fn preempt(turn: &mut Turn, worker: WorkerId) {
     let Some(attached) = turn.state.workers.get(&worker) else {
         return;
@@ -149,7 +151,7 @@ pub(crate) fn realizations_held(state: &State, worker: &Worker) -> u64 {
     held.map(|batch| batch.assignment.indices.count).sum()
 }
 
-/// Queues the audit of a lost worker again, until too many workers were lost over it.
+/// Queues a lost worker's audit again, unless too many workers were lost over it.
 fn give_back_audit(state: &mut State, batch: &Batch, loss: &LostWorker) {
     let crashed = u32::from(loss.cause != Cause::Announced);
     let Assignment { indices, .. } = batch.assignment;
@@ -167,7 +169,7 @@ fn give_back_audit(state: &mut State, batch: &Batch, loss: &LostWorker) {
     }
 }
 
-/// Notes that a worker was lost which was to decide a dispute.
+/// Notes that the worker of a tie-breaker was lost.
 fn tie_breaker_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &LostWorker) {
     if let Some(evaluation) = state.evaluation_of_mut(assignment)
         && let Some(dispute) =

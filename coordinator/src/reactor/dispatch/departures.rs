@@ -1,4 +1,4 @@
-//! A worker leaves the list of those that are attached.
+//! Removes workers that depart.
 
 use crate::close_reason::CloseReason;
 use crate::effect::Effect;
@@ -7,7 +7,7 @@ use crate::notice::{Departure, Notice};
 use crate::reactor::turn::Turn;
 use crate::state::{DEPARTED_MAX, Departed, Worker};
 
-/// Closes the stream of a worker that wanted to leave and holds nothing any more.
+/// Closes the stream of a draining worker that holds no batch any more.
 pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
     let drained = |worker: &Worker| worker.draining && worker.in_flight.is_empty();
     if turn.state.workers.get(&worker).is_some_and(drained) {
@@ -17,8 +17,8 @@ pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
     }
 }
 
-/// Removes a worker from the state and returns it: later events of it mean nothing. The caller gives
-/// back the batches that it held.
+/// Removes a worker from the state and returns it: its later events are ignored. The caller returns
+/// the batches that it held to the queue.
 pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<Worker> {
     let gone = turn.state.workers.remove(&worker)?;
     if turn.state.workers.is_empty() {

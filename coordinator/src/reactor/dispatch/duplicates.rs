@@ -1,4 +1,4 @@
-//! Duplicates of slow batches for workers that have nothing to do: the first answer wins.
+//! Duplicates of slow batches for idle workers: the first answer counts.
 
 use super::{batches, eta, schedule};
 use crate::batch::Batch;
@@ -6,12 +6,12 @@ use crate::ids::{BatchId, WorkerId};
 use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 
-/// A batch that takes so many times as long as it should is duplicated before anything is computed
-/// speculatively.
+/// A batch that has taken this many times its expected time is duplicated before anything is
+/// computed speculatively.
 const LATE: u32 = 2;
 
-/// Gives each worker that nobody else has work for a duplicate of a late batch, beginning with the
-/// batch that is out longest.
+/// Sends each otherwise idle worker a duplicate of a late batch, starting with the batch that has
+/// been out longest.
 pub(crate) fn of_late_ones(turn: &mut Turn) {
     let now = turn.now;
     let idle = |state: &State, worker: &Worker| schedule::held(state, worker) == 0;
@@ -21,13 +21,14 @@ pub(crate) fn of_late_ones(turn: &mut Turn) {
     duplicate(turn, idle, late);
 }
 
-/// Gives each worker that holds nothing a duplicate of the batch that is out longest.
+/// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
 pub(crate) fn of_slow_ones(turn: &mut Turn) {
     duplicate(turn, |_, worker| worker.in_flight.is_empty(), |_, _| true);
 }
 
-/// Gives each worker that is `idle` a duplicate of the batch that is out longest of those that are
-/// `worth` it. Batches younger than half the target time are about to be answered and are not.
+/// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
+/// `worth` it. Batches younger than half the target time are about to be answered and are not
+/// duplicated.
 fn duplicate(
     turn: &mut Turn,
     idle: impl Fn(&State, &Worker) -> bool,
@@ -52,7 +53,7 @@ fn duplicate(
     }
 }
 
-/// The batches that may be duplicated before they are overdue, in the order they were sent.
+/// Returns the batches that may be duplicated before they are overdue, in the order they were sent.
 fn open(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
     let batches = state.batches.iter().map(|(id, batch)| (*id, batch));
     batches.filter(|(_, batch)| batch.may_be_duplicated())

@@ -1,4 +1,4 @@
-//! When batches should be answered (their ETA), by the rates of their workers.
+//! Expected completion times (ETAs) of batches, from the rates of their workers.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use crate::fairness;
 use crate::ids::JobId;
 use crate::state::State;
 
-/// Returns when the last batch of what each search waits for should be answered.
+/// Returns the ETA of the last batch of each evaluation that a search waits for.
 pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {
     let mut etas = BTreeMap::new();
     let asked_for = state.batches.values().filter(|it| it.purpose != Purpose::Speculative);
@@ -21,10 +21,10 @@ pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {
     etas
 }
 
-/// Returns when a batch should be answered.
+/// Returns the ETA of a batch.
 fn of_batch(state: &State, batch: &Batch) -> Option<Duration> {
     let worker = state.workers.get(&batch.worker)?;
-    // Two of more than half a worker's slots are computed one after the other.
+    // Two batches of more than half a worker's slots each are computed one after the other.
     let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.slots.into();
     if !large(batch) {
         return Some(batch.sent + expected(state, batch));
@@ -35,7 +35,7 @@ fn of_batch(state: &State, batch: &Batch) -> Option<Duration> {
     Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
 }
 
-/// Returns the time that a batch should take, or zero if nothing is known of it.
+/// Returns the expected time of a batch, or zero if its rate is unknown.
 pub(crate) fn expected(state: &State, batch: &Batch) -> Duration {
     let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
     let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));

@@ -1,8 +1,8 @@
-//! Speculative batches for idle slots, and when these slots had better wait.
+//! Speculative batches for idle slots, and the cases in which these slots stay idle instead.
 //!
-//! A realization that is begun is not given up before its end, so a slot that is wanted in a
-//! moment waits for that: it waits where the evaluation of the same job is about to be complete,
-//! since then another point may be likelier, and where another job is about to want it.
+//! A realization that has begun is not interrupted, so a slot that will soon be needed stays idle
+//! until then: when the evaluation of the same job is about to be complete, since another point may
+//! be likelier afterwards, and when another job is about to need the slot.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -22,10 +22,10 @@ use crate::job::{Job, Stage};
 use crate::reactor::turn::Turn;
 use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 
-/// When the last batch of what each search waits for should be answered.
+/// ETA of the last batch of each evaluation that a search waits for.
 type Etas = BTreeMap<JobId, Duration>;
 
-/// Hands out speculative batches to the workers with idle slots.
+/// Sends speculative batches to the workers with idle slots.
 pub(crate) fn hand_out(turn: &mut Turn) {
     if next(turn.state).is_none() {
         return;
@@ -47,8 +47,9 @@ pub(crate) fn hand_out(turn: &mut Turn) {
     }
 }
 
-/// Chooses the point to compute speculatively next, and its job: what a search will ask for as soon as a record is durable, then
-/// of all jobs that which is likeliest among its job's, then as for other work.
+/// Chooses the point to compute speculatively next, and its job. First come points that a search
+/// will certainly ask for, once a record is durable. Then come points by their rank among the
+/// candidates of their job; among equal ranks the order is that of other work.
 fn next(state: &State) -> Option<(JobId, Point)> {
     let of_job = |id: &JobId| {
         let job = state.jobs.get(id)?;
@@ -58,7 +59,7 @@ fn next(state: &State) -> Option<(JobId, Point)> {
         };
         let place =
             job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
-                Some(begun) => !begun.queue.is_empty() && !begun.lost_over,
+                Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
                 None => has_room(),
             })?;
         let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });
@@ -70,7 +71,8 @@ fn next(state: &State) -> Option<(JobId, Point)> {
     Some((id, *point))
 }
 
-/// Whether the idle slots of a worker had better wait; `slots` are idle in all.
+/// Returns whether the idle slots of a worker should stay idle; `slots` is the number of idle slots
+/// of all workers.
 fn waits(
     state: &State,
     id: JobId,
@@ -84,7 +86,7 @@ fn waits(
         return true;
     };
     let spare = spare(state, attached);
-    // What is begun on each slot is not given up before it ends.
+    // A realization that has begun is not interrupted.
     let begun = spare.min(queued(job, point)) as f64;
     let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
     let takes = fairness::slot_time(seconds, 1);
@@ -93,13 +95,14 @@ fn waits(
         || slots < spare + wanted_by_others(state, id, now + takes, etas)
 }
 
-/// Counts the realizations of a point that nobody computes.
+/// Returns the number of realizations of a point that nobody computes yet.
 fn queued(job: &Job, point: &Point) -> u64 {
     let realizations = job.record.specification.monte_carlo.realizations;
     job.speculation.at(point).map_or(realizations, Evaluation::queued)
 }
 
-/// Counts the slots that jobs other than `but` will want before `until`, besides those they have.
+/// Returns the number of slots that jobs other than `but` will need before `until`, beyond those
+/// they have.
 fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
     let wanted = |id: &JobId| {
         let job = state.jobs.get(id)?;
@@ -119,13 +122,14 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
     state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
 }
 
-/// Whether all of the point is handed out that a job will ask for when its record is durable.
+/// Returns whether every batch of the point that a job asks for next, when its record is durable,
+/// has been sent.
 fn has_next(job: &Job) -> bool {
     let next = job.speculation.candidates.first().and_then(|next| job.speculation.at(next));
     next.is_some_and(|next| next.queue.is_empty())
 }
 
-/// Gives the idle slots of a worker a batch of a point.
+/// Sends a batch of a point to the idle slots of a worker.
 fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
     let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
     else {
@@ -143,13 +147,13 @@ fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
     batches::send(turn, worker, assignment, Purpose::Speculative);
 }
 
-/// Takes indices of a point, whose evaluation is begun now if it was not; returns them with the
-/// number of the attempt.
+/// Takes indices of a point, beginning its evaluation if necessary; returns them with the number of
+/// the attempt.
 fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
     let attempt = state.new_attempt();
     let job = state.jobs.get_mut(&id)?;
     if job.speculation.at(&point).is_none() {
-        // The soonest that it may become; which decides no more than what is audited.
+        // The lowest number that it may get. The number only decides which batches are audited.
         let number = job.search.evaluations() + 1;
         let realizations = job.record.specification.monte_carlo.realizations;
         job.speculation.evaluations.push(Evaluation::new(number, attempt, point, realizations));
@@ -158,7 +162,7 @@ fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, I
     Some((evaluation.attempt, evaluation.take(size)?))
 }
 
-/// Counts the slots of a worker that nobody has work for.
+/// Returns the number of slots of a worker that no other work needs.
 fn spare(state: &State, worker: &Worker) -> u64 {
     let holds = |purpose| state.held_for(worker, purpose).next().is_some();
     let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;

@@ -1,11 +1,10 @@
-//! Batches that are out much longer than they should be, whatever they are computed for, and the
-//! workers that hold them.
+//! Batches of any purpose that are out much longer than expected, and the workers that hold them.
 //!
-//! A worker may give signs of life and never answer. So what is overdue is given to another worker
-//! too, and the first answer counts; if that one is overdue in its turn, to one more. Each waits
-//! twice as long as the one before, so that realizations that are slow everywhere are computed a
-//! few times at most. Where other work waits, a job has one such duplicate out at a time: its answer
-//! shows how long the others should take.
+//! A worker may send heartbeats and never answer. So another worker gets a duplicate of an overdue
+//! batch, and the first answer counts; if the duplicate becomes overdue too, a third worker gets
+//! one. Each duplicate may take twice as long as the one before, so that realizations that are slow
+//! everywhere are computed only a few times. Where other work waits, a job has one such duplicate
+//! out at a time: its answer shows how long the others should take.
 //!
 //! A worker that misses batches in a row is on probation until it answers one (`probation.rs`).
 
@@ -23,31 +22,31 @@ use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
 
-/// No batch is overdue before. A worker, a network or a machine may falter for a second or two
-/// without anything being wrong.
+/// No batch is overdue before this time. A worker, a network or a machine may pause for a second or
+/// two without being faulty.
 const OVERDUE_MIN: Duration = Duration::from_secs(3);
-/// Nor before it has taken so many times as long as it should: a machine may have other things to
-/// do, and one point may take some times as long as another.
+/// No batch is overdue before it has taken this many times its expected time: a machine may have
+/// other things to do, and one point may take several times as long as another.
 const OVERDUE_FACTOR: u32 = 4;
-/// How many batches may have the same indices at a time. The last of so many would be sent after six minutes at the
-/// soonest.
+/// Maximum number of batches with the same indices at a time. The last of them would be sent after
+/// six minutes at the earliest.
 pub(crate) const DUPLICATES_MAX: usize = 8;
-/// Duplicates that are sent on one event; the others follow on the next.
+/// Maximum number of duplicates that are sent on one event; the others follow on the next.
 const SENT_AT_ONCE_MAX: usize = 64;
-/// So many batches in a row that others answered, over [`OVERDUE_MIN`] at least, put a worker on
-/// probation. It holds two at a time, so one moment of standing still is not enough.
+/// A worker is on probation after this many consecutive batches that others answered, over at least
+/// [`OVERDUE_MIN`]. It holds two at a time, so a single pause is not enough.
 const MISSED_MAX: u32 = 3;
-/// A worker that holds something overdue for so long is on probation too: there may be nobody else
-/// to answer it.
+/// A worker whose batch is overdue, and has been out for this long, is on probation too: there may
+/// be no other worker to answer the batch.
 const SILENT_MAX: Duration = Duration::from_secs(60);
 
-/// Looks for batches that are overdue.
+/// Finds batches that are overdue.
 pub(crate) fn tick(turn: &mut Turn) {
     turn.state.probation.forget(turn.now);
     let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
     let late: Vec<BatchId> = late.copied().collect();
     for id in &late {
-        accuse(turn.state, *id, turn.now);
+        suspect_silent(turn.state, *id, turn.now);
     }
     let waits = |id: &BatchId| {
         turn.state.batches.get(id).is_some_and(|batch| {
@@ -62,26 +61,27 @@ pub(crate) fn tick(turn: &mut Turn) {
     }
 }
 
-/// Whether a batch should have been answered long ago.
+/// Returns whether a batch is overdue.
 fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
     state.batches.get(&id).is_some_and(|batch| {
         let waited = now.saturating_sub(batch.begun);
         let factor = 2_u32.saturating_pow(batch.retries);
-        // Most are young; of the others it is found out how long they should take.
+        // Most batches are young; the expected time is computed only for the others.
         waited >= OVERDUE_MIN * factor
             && waited >= expected(state, id).unwrap_or_default() * OVERDUE_FACTOR * factor
     })
 }
 
-/// Whether the answer to a batch may be hoped for: it is not overdue, or its worker is not known for
-/// not answering.
+/// Returns whether an answer to a batch may still be expected: the batch is not overdue, or its
+/// worker is not on probation.
 pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
     let worker = state.batches.get(&id).and_then(|batch| state.workers.get(&batch.worker));
     worker.is_some_and(|worker| !state.probation.has(&worker.name) || !is_overdue(state, id, now))
 }
 
-/// Time that a batch should take with what its worker was sent before it, by the rate of the worker
-/// and by the pace of the job, whichever is slower; `None` if nothing is known of the job.
+/// Returns the expected time of a batch, together with those that its worker was sent before it, by
+/// the rate of the worker or the pace of the job, whichever is slower; `None` if the pace of the
+/// job is unknown.
 fn expected(state: &State, id: BatchId) -> Option<Duration> {
     let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
     let alone = |id: &BatchId| {
@@ -95,12 +95,12 @@ fn expected(state: &State, id: BatchId) -> Option<Duration> {
     Some(before + alone(&id)?)
 }
 
-/// Puts a worker on probation that holds something overdue for too long.
-fn accuse(state: &mut State, id: BatchId, now: Duration) {
+/// Puts a worker on probation that has held an overdue batch for too long.
+fn suspect_silent(state: &mut State, id: BatchId, now: Duration) {
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
-    // While nobody has answered anything, it may be that it takes so long.
+    // Before the first answer of the job, its realizations may simply take this long.
     let long = now.saturating_sub(batch.begun) >= SILENT_MAX && expected(state, id).is_some();
     if let Some(worker) =
         state.workers.get(&batch.worker).filter(|worker| long && state.is_sound(worker))
@@ -110,8 +110,8 @@ fn accuse(state: &mut State, id: BatchId, now: Duration) {
     }
 }
 
-/// Takes back an audit that two workers did not answer in time, or one where nobody else is there for
-/// it who holds nothing overdue: an answer that nobody checks is believed.
+/// Gives up an audit that two workers did not answer in time, or that no other worker without
+/// overdue batches can compute: the answer is then accepted unchecked.
 fn give_up_audit(turn: &mut Turn, id: BatchId) {
     let Some(batch) = turn.state.batches.get(&id) else {
         return;
@@ -130,8 +130,8 @@ fn give_up_audit(turn: &mut Turn, id: BatchId) {
     }
 }
 
-/// Has other workers compute what is overdue, before anything else is handed out. Adds those to
-/// `kept` that must not be refilled, so that they hold nothing soon.
+/// Sends duplicates of overdue batches, before any other work is sent. Adds workers to `kept` that
+/// must not receive further batches, so that they soon hold none.
 pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
     if turn.state.overdue.is_empty() {
         return;
@@ -144,7 +144,7 @@ pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
             continue;
         };
         let (job, alone) = (batch.assignment.job, batch.purpose == Purpose::Exclusive);
-        // Since time was looked at last it may have become known that the job is slow.
+        // Since the last tick an answer may have shown that the job is slow.
         if sent >= SENT_AT_ONCE_MAX
             || (free.is_empty() && !alone)
             || !is_overdue(turn.state, id, turn.now)
@@ -152,47 +152,51 @@ pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
         {
             continue;
         }
-        let Some(taker) = (if alone {
+        let Some(choose_worker) = (if alone {
             taker_alone(turn.state, id, turn.now)
         } else {
-            taker(turn.state, id, &free, turn.now)
+            choose_worker(turn.state, id, &free, turn.now)
         }) else {
             continue;
         };
-        if alone && holds_anything(turn.state, taker) {
-            kept.insert(taker);
+        if alone && holds_anything(turn.state, choose_worker) {
+            kept.insert(choose_worker);
         } else {
-            send(turn, id, taker);
-            free.retain(|free| *free != taker);
+            send(turn, id, choose_worker);
+            free.retain(|free| *free != choose_worker);
             sent += 1;
         }
     }
 }
 
-/// Whether a job has a duplicate of an overdue batch out that is not overdue itself.
+/// Returns whether a job has a duplicate of an overdue batch out that is not overdue itself.
 fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
-    let scout = state.jobs.get(&job).and_then(|job| job.scout);
-    scout.is_some_and(|scout| state.batches.contains_key(&scout) && !is_overdue(state, scout, now))
+    let newest_overdue_duplicate =
+        state.jobs.get(&job).and_then(|job| job.newest_overdue_duplicate);
+    newest_overdue_duplicate.is_some_and(|newest_overdue_duplicate| {
+        state.batches.contains_key(&newest_overdue_duplicate)
+            && !is_overdue(state, newest_overdue_duplicate, now)
+    })
 }
 
 fn holds_anything(state: &State, worker: WorkerId) -> bool {
     state.workers.get(&worker).is_none_or(|worker| schedule::held(state, worker) > 0)
 }
 
-/// Chooses the one of these workers that is to have a duplicate of a batch.
-fn taker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
-    let rank = |(worker, taker): &(&Worker, WorkerId)| {
+/// Chooses which of the workers in `free` gets a duplicate of a batch.
+fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
+    let rank = |(worker, choose_worker): &(&Worker, WorkerId)| {
         let doubtful = worker.missed.count > 0 || !worker.has_answered;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
-        (on_probation, doubtful, of_holder, schedule::held(state, worker), *taker)
+        (on_probation, doubtful, of_holder, schedule::held(state, worker), *choose_worker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
-    fit.min_by_key(rank).map(|(_, taker)| taker)
+    fit.min_by_key(rank).map(|(_, choose_worker)| choose_worker)
 }
 
-/// Chooses the worker that is to have a duplicate of an exclusive batch, be it busy or not.
+/// Chooses the worker that gets a duplicate of an exclusive batch, whether it is busy or not.
 fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let batch = state.batches.get(&id)?;
     let crashes =
@@ -202,33 +206,41 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     if poison::crash_limit_reached(state, crashes, |_| true) {
         return None;
     }
-    let rank = |(taker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
-        let reputation = poison::reputation(state, worker, crashes);
-        (reputation, is_of_holder(state, id, worker), schedule::held(state, worker), **taker)
-    };
+    let rank =
+        |(choose_worker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
+            let reputation = poison::reputation(state, worker, crashes);
+            (
+                reputation,
+                is_of_holder(state, id, worker),
+                schedule::held(state, worker),
+                **choose_worker,
+            )
+        };
     let fit =
         |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
-    fit.min_by_key(rank).map(|(taker, _)| *taker)
+    fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
 }
 
-/// Whether a worker is to have a duplicate of a batch: it may, and leaves nothing unanswered itself.
+/// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue
+/// batch itself.
 fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
     let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
     let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
     trusted && may_have(state, id, &worker.name) && !late()
 }
 
-/// Whether a worker on probation is tried with a duplicate of a batch. An audit is not worth it.
+/// Returns whether a worker on probation is tried with a duplicate of a batch. Audits are not used
+/// for that.
 fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
     let purpose = state.batches.get(&id).map(|batch| batch.purpose);
     !worker.draining
         && worker.in_flight.is_empty()
-        && !state.probation.rests(&worker.name, now)
+        && !state.probation.is_paused(&worker.name, now)
         && matches!(purpose, Some(Purpose::Fill | Purpose::Exclusive | Purpose::TieBreak))
 }
 
-/// The names of the workers that hold a batch and its duplicates.
+/// Returns the names of the workers that hold a batch and its duplicates.
 fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
     let others = state.batches.get(&id).into_iter().flat_map(|batch| &batch.duplicates).copied();
     let batches = others.chain([id]).filter_map(|id| state.batches.get(&id));
@@ -239,8 +251,9 @@ fn is_of_holder(state: &State, id: BatchId, worker: &Worker) -> bool {
     holders(state, id).any(|holder| holder.host() == worker.name.host())
 }
 
-/// Whether a worker may have a duplicate of a batch: who holds one may not, nor who is to be checked by
-/// it, nor who has already said what is to be decided.
+/// Returns whether a worker is eligible for a duplicate of a batch. A worker that holds the batch
+/// or a duplicate is not, nor is the worker that the batch audits, nor one that has voted in the
+/// dispute that it decides.
 fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(batch) = state.batches.get(&id) else {
         return false;
@@ -292,12 +305,12 @@ fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
         }
     }
     if let Some(job) = turn.state.jobs.get_mut(&assignment.job) {
-        job.scout = Some(duplicate);
+        job.newest_overdue_duplicate = Some(duplicate);
     }
 }
 
-/// A batch is taken back from its worker because another has answered it, or because nobody waits
-/// for it any longer: that counts, if the worker should have answered it long ago.
+/// Counts a batch as missed if its worker should have answered it long ago. Called when it is
+/// revoked because another worker has answered it, or because it is no longer needed.
 pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
     let Some(batch) = state.batches.get(&id) else {
         return;
@@ -323,8 +336,8 @@ pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
     }
 }
 
-/// Puts a worker on probation that does not answer what it was sent at `sent`, or notes one more
-/// reason for it.
+/// Puts a worker on probation that does not answer the batch sent at `sent`, or notes one more
+/// reason for its probation.
 pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
     if state.probation.miss(name, sent, now) {
         tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
@@ -332,7 +345,7 @@ pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Durati
     }
 }
 
-/// A worker has answered a batch that it holds.
+/// Notes that a worker has answered a batch that it holds.
 pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
     let Some(worker) = state.workers.get_mut(&worker) else {
         return;

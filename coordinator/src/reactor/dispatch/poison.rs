@@ -1,10 +1,10 @@
 //! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
 //! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
-//! A bad node that has just come back is the one with nothing to do, so being idle is no
-//! recommendation: a quarantined realization goes to the worker with the best reputation, and waits
-//! for it. One over which a worker was lost goes to the worker that has been there longest among
-//! these, so that a node that comes and goes never has it while another is there.
+//! A bad node that has just come back holds nothing, so being idle says nothing for a worker: a
+//! quarantined realization goes to the worker with the best reputation, and waits for it. One over
+//! which a worker was lost goes to the worker that has been attached longest among these, so that a
+//! node that comes and goes does not get it while another worker is there.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -25,16 +25,17 @@ use crate::reactor::turn::Turn;
 use crate::state::{State, Worker};
 use crate::worker_name::WorkerName;
 
-/// How long the crashes of a host are remembered when no more come.
+/// Time for which the crashes of a host are remembered when no more come.
 const MEMORY: Duration = Duration::from_secs(600);
 
-/// How little may be expected of a worker, the least last: whether its host's workers are lost over
-/// whatever they hold, whether it does not answer what it holds (which costs time, and fails no
-/// job), whether one was lost over this, whether it has not answered anything yet.
+/// Reputation of a worker for a task, lower is better. In order of weight: whether its host's
+/// workers are lost whatever they hold, whether it is on probation (which costs time, but fails no
+/// job), whether a worker of its host was lost over the task, whether it has not answered anything
+/// yet.
 pub(crate) type Reputation = (bool, bool, bool, bool);
 
-/// Hands out quarantined realizations, each alone to a worker that holds nothing. Returns the workers
-/// that are reserved: they get nothing else, so that they hold nothing soon.
+/// Sends quarantined realizations, each alone to a worker that holds nothing. Returns the workers
+/// that are reserved: they receive no other work, so that they soon hold nothing.
 pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
@@ -52,7 +53,7 @@ pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
     kept
 }
 
-/// Chooses the next quarantined realization of a job that may be handed out, and its worker.
+/// Chooses the next quarantined realization of a job that may be sent, and its worker.
 fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
@@ -62,12 +63,12 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let index = evaluation.quarantine.iter().find(open)?;
     let nobody = Crashes::default();
     let crashes = crashes(index).unwrap_or(&nobody);
-    Some((*index, taker(state, crashes, now)?))
+    Some((*index, choose_worker(state, crashes, now)?))
 }
 
-/// Chooses the worker of a realization over which these crashed, if there is one: a worker that has
-/// answered nothing yet shows first that it answers something else, if there is something else.
-fn taker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
+/// Chooses the worker of a realization over which `crashes` happened, if there is one. A worker
+/// that has not answered anything yet must first answer other work, if there is any.
+fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &Worker)| {
         let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
@@ -91,7 +92,8 @@ fn send(turn: &mut Turn, job: JobId, index: u64, worker: WorkerId) {
     batches::send(turn, worker, assignment, Purpose::Exclusive);
 }
 
-/// Forgets the crashes of a worker that is back: nothing that it held is to blame for its absence.
+/// Forgets the crashes of a worker that is back: the batches that it held are not to blame for its
+/// absence.
 pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
     if let Some(lost) = state.lost_in_a_row.get_mut(name.host()) {
         lost.workers.retain(|lost| lost != name);
@@ -101,7 +103,7 @@ pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
     }
 }
 
-/// Forgets the crashes of hosts that have lost nobody for long.
+/// Forgets the crashes of hosts that have not lost a worker for a long time.
 pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
     state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
 }
@@ -116,10 +118,11 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failur
     let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
     let specification = &state.jobs.get(&job)?.record.specification;
     let case = case_file(specification, &evaluation.point, index);
-    Some(Failure::LethalRealization { index, workers: crashes.count(), hosts, case })
+    Some(Failure::PoisonRealization { index, workers: crashes.count(), hosts, case })
 }
 
-/// A realization as a complete case file. What is no elasticity is never solved, and kills nobody.
+/// Returns a realization as a complete case file, or an empty text if its germs give no elasticity:
+/// such a realization is never solved, and crashes no worker.
 fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
     let ensemble = Ensemble::drawn(point, specification.monte_carlo.germs()).ok();
     let bone = ensemble.and_then(|ensemble| ensemble.bone(index).ok());
@@ -127,8 +130,8 @@ fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> Str
     case.map_or_else(String::new, |case| case_file::to_toml(&case))
 }
 
-/// Whether something that those in `of` may have is poison: the crash limit is reached, and the lost
-/// workers have stayed away for so long that they will not come back.
+/// Returns whether a task that the workers in `of` are eligible for is poison: the crash limit is
+/// reached, and the lost workers have stayed away for so long that they will not come back.
 pub(crate) fn is_poison(
     state: &State,
     crashes: &Crashes,
@@ -139,7 +142,8 @@ pub(crate) fn is_poison(
     crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
 }
 
-/// Whether no worker in `of` is to be risked any more for something over which these crashed.
+/// Returns whether no further worker in `of` shall be risked for a task over which `crashes`
+/// happened.
 pub(crate) fn crash_limit_reached(
     state: &State,
     crashes: &Crashes,
@@ -153,7 +157,7 @@ pub(crate) fn crash_limit_reached(
     crashes.reach_limit(|| state.workers.values().any(untried))
 }
 
-/// Returns how little may be expected of a worker at something over which these crashed.
+/// Returns the reputation of a worker for a task over which `crashes` happened.
 pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> Reputation {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);

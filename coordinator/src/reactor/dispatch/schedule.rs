@@ -1,4 +1,4 @@
-//! Which worker and which job come next.
+//! Order of workers and jobs.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -9,13 +9,13 @@ use crate::job::Job;
 use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
 use crate::store::JobRecord;
 
-/// Whether anything is to be handed out besides quarantined realizations.
+/// Returns whether anything besides quarantined realizations waits to be sent.
 pub(crate) fn work_waits(state: &State) -> bool {
     next_job(state).is_some() || checks_wait(state)
 }
 
-/// Lists the workers that may take more, those that hold least first; of equal ones the first. Those
-/// on probation come last, and only if they hold nothing.
+/// Returns the workers that can accept more, in ascending order of the batches they hold; ties go
+/// to the first. Those on probation come last, and only if they hold nothing.
 pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
     let exclusive = |worker| state.held_for(worker, Purpose::Exclusive).next().is_some();
     let free = state
@@ -33,13 +33,14 @@ pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<Work
     free.map(|(.., worker)| worker).collect()
 }
 
-/// Counts the batches that a worker holds, without speculative ones.
+/// Returns the number of batches that a worker holds, without speculative ones.
 pub(crate) fn held(state: &State, worker: &Worker) -> usize {
     worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
 }
 
-/// Chooses the job that is served next. Of the active jobs with work it takes: of the client that has had least computing time those with the
-/// highest priority, and of these the first after the one that was served last, in a circle.
+/// Chooses the job that is served next, among the active jobs with work. The client with the least
+/// computing time comes first; of its jobs those with the highest priority are served in turn,
+/// starting after the job that was served last.
 pub(crate) fn next_job(state: &State) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
         let job = state.jobs.get(id)?;
@@ -54,7 +55,7 @@ pub(crate) fn next_job(state: &State) -> Option<JobId> {
     with_work.map(rank).min().map(|(.., id)| id)
 }
 
-/// Whether anything waits to be checked.
+/// Returns whether any audit or dispute waits for a worker.
 pub(crate) fn checks_wait(state: &State) -> bool {
     let mut evaluations = state.active.iter().filter_map(|id| state.jobs.get(id)?.evaluation());
     evaluations.any(|evaluation| {

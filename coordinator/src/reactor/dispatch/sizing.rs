@@ -1,23 +1,24 @@
-//! How many realizations a worker gets at once: what it computes in the target time by its measured
-//! rate, and at most a quarter of its share of what remains of the evaluation, so that all workers
-//! end together. While its share allows, no batch is smaller than the worker's slots.
+//! Batch sizes. A worker gets as many realizations as it computes in the target time by its
+//! measured rate, but at most a quarter of its share of the remaining ones, so that all workers
+//! finish together. While its share allows, no batch is smaller than the worker's slots.
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
 use crate::ids::JobId;
 use crate::state::{State, Worker};
 
-/// Realizations for each slot in a worker's first batch of a job: enough to measure its rate,
-/// little enough to be soon answered.
+/// Realizations for each slot in a worker's first batch of a job: enough to measure its rate, few
+/// enough to be answered soon.
 const FIRST_BATCH_PER_SLOT: u32 = 4;
-/// A batch holds at most one in so many of a worker's share of what remains, and more only to
-/// give each of the worker's slots one realization; never more than the share.
+/// A batch holds at most this fraction (1 over the constant) of a worker's share of the remaining
+/// realizations. It may hold more to give each of the worker's slots one realization, but never
+/// more than the share.
 const SHARE_DIVISOR: f64 = 4.0;
 
-/// Realizations of `job`, of which `queued` are left, that `attached` should get at once: what it
-/// computes in the target time, at most a quarter of its share. Both limits give way to one
-/// realization for each slot (a realization may take longer than the target, and a share may
-/// hold fewer than four for each slot), the share itself does not.
+/// Returns the number of realizations of `job`, of which `queued` are left, that `attached` gets at
+/// once: as many as it computes in the target time, at most a quarter of its share. Both limits
+/// give way to one realization for each slot (a realization may take longer than the target, and a
+/// share may hold fewer than four for each slot), but the share itself does not.
 pub(crate) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u64) -> u64 {
     let per_slot = mean_rate_per_slot(state, job);
     let weight = |worker: &Worker| {
@@ -31,11 +32,12 @@ pub(crate) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u
         Some(rate) => rate * state.config.batch_target.as_secs_f64(),
         None => f64::from(FIRST_BATCH_PER_SLOT) * slots,
     };
-    // `as` saturates, and takes NaN for 0.
+    // `as` saturates, and converts NaN to 0.
     (target.max(slots).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
 }
 
-/// Mean rate of one slot at `job` over the workers that are measured; 1 if none is.
+/// Returns the mean rate of one slot at `job` over the workers with a measured rate; 1 if there is
+/// none.
 fn mean_rate_per_slot(state: &State, job: JobId) -> f64 {
     let measured = state
         .workers

@@ -1,13 +1,14 @@
-//! Speculative evaluations: points that a search may ask for next, computed by workers that nobody
-//! else has work for.
+//! Speculative evaluations: points that a search may ask for next, computed by workers without
+//! other work.
 //!
-//! Nothing of it is stored, checked or shown before the search asks for the point; then what is
-//! there becomes the job's evaluation, and goes on as if it had been begun now. What the search
-//! can no longer ask for is dropped. So results, store and digest are those of a search without it.
+//! Nothing of a speculative evaluation is stored, checked or shown before the search asks for its
+//! point. Then its results become the job's evaluation, which continues as if it had just begun.
+//! Points that the search can no longer ask for are dropped. So results, store and digest are the
+//! same as without speculation.
 //!
-//! They take nothing from anybody: a worker gets a speculative batch only for slots that are idle, one
-//! at a time, and it is taken back (preempted) when there is anything else for these slots. That is
-//! why nobody is charged for it.
+//! Speculation takes no slot from other work: a worker gets a speculative batch only for idle
+//! slots, one at a time, and the batch is revoked (preempted) when there is other work for these
+//! slots. Therefore no client is charged for it.
 
 use std::sync::Arc;
 
@@ -26,12 +27,12 @@ use crate::state::State;
 use crate::worker_name::WorkerName;
 use osteon_search::same_point;
 
-/// The most candidates of each job.
+/// Maximum number of candidates of each job.
 pub(crate) const CANDIDATES_MAX: usize = 8;
-/// Evaluations with more realizations leave no worker idle for long; none is speculative.
+/// Evaluations with more realizations leave no worker idle for long; none of them is speculative.
 const REALIZATIONS_MAX: u64 = 20_000;
 
-/// Begins the evaluation of the point that a job's search asks for, with what is known of it.
+/// Begins the evaluation of the point that a job's search asks for, with any speculative results.
 pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     let attempt = turn.state.new_attempt();
     let Some(job) = turn.state.jobs.get_mut(&id) else {
@@ -43,7 +44,7 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     let evaluation = match known.map(|at| job.speculation.evaluations.remove(at)) {
         Some(mut known) => {
             known.number = number;
-            // Nobody could decide them before.
+            // Disputes could not be decided before.
             known.disputes.iter_mut().for_each(|dispute| dispute.since = turn.now);
             job.rate.add(known.filled(), turn.now);
             known
@@ -61,8 +62,8 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     keep(turn, id, candidates);
 }
 
-/// The outcomes of a job's evaluation are there, and on their way to the store: where its search
-/// will go is known, though it is not told yet.
+/// Updates the candidates of a job whose evaluation is complete and on its way to the store: the
+/// next points of its search are already known, although it has not received the outcomes yet.
 pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Arc<[Outcome]>) {
     let config = &turn.state.config;
     if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(config, job)) {
@@ -76,7 +77,7 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
     keep(turn, id, Vec::new());
 }
 
-/// Drops the speculative evaluations of a job with answers of a banned worker.
+/// Drops the speculative evaluations of a job that contain answers of a banned worker.
 pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     let involves = |evaluation: &Evaluation| {
         evaluation.workers.contains(name)
@@ -85,8 +86,7 @@ pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     retain(turn, id, |evaluation| !involves(evaluation));
 }
 
-/// Drops the speculative evaluations that were begun last, until the bound on realizations in memory
-/// is kept.
+/// Drops the newest speculative evaluations until the limit on realizations in memory is kept.
 pub(crate) fn keep_bound(turn: &mut Turn) {
     while realizations(turn.state) > turn.state.config.active_realizations_max {
         let newest = |id: &JobId| {
@@ -100,7 +100,7 @@ pub(crate) fn keep_bound(turn: &mut Turn) {
     }
 }
 
-/// Whether points of a job are computed speculatively.
+/// Returns whether points of a job are computed speculatively.
 fn speculates(config: &Config, job: &Job) -> bool {
     let specification = &job.record.specification;
     config.speculation
@@ -109,7 +109,7 @@ fn speculates(config: &Config, job: &Job) -> bool {
         && !job.cancelled
 }
 
-/// Makes the batches of an evaluation that was speculative batches as any other.
+/// Turns the speculative batches of an evaluation into ordinary ones.
 fn adopt_batches(state: &mut State, job: JobId, attempt: u64) {
     let of_attempt =
         |assignment: &Assignment| assignment.job == job && assignment.attempt == attempt;
@@ -123,7 +123,7 @@ fn adopt_batches(state: &mut State, job: JobId, attempt: u64) {
     }
 }
 
-/// Replaces the candidates of a job, and drops the evaluations of all others.
+/// Replaces the candidates of a job, and drops the evaluations of all other points.
 fn keep(turn: &mut Turn, id: JobId, candidates: Vec<Point>) {
     let stays =
         |evaluation: &Evaluation| candidates.iter().any(|at| same_point(at, &evaluation.point));
@@ -133,7 +133,7 @@ fn keep(turn: &mut Turn, id: JobId, candidates: Vec<Point>) {
     }
 }
 
-/// Drops the speculative evaluations of a job that do not meet `stays`.
+/// Drops the speculative evaluations of a job for which `stays` is false.
 fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&Evaluation) -> bool) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -157,7 +157,8 @@ fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&Evaluation) -> bool) {
     }
 }
 
-/// Counts the realizations of the evaluations of all active jobs, with speculative ones.
+/// Returns the number of realizations in the evaluations of all active jobs, speculative ones
+/// included.
 pub(crate) fn realizations(state: &State) -> u64 {
     let of_job = |id: &JobId| {
         let job = state.jobs.get(id)?;
@@ -168,7 +169,7 @@ pub(crate) fn realizations(state: &State) -> u64 {
 }
 
 impl Speculation {
-    /// The speculative evaluation of a point.
+    /// Returns the speculative evaluation of a point.
     pub(crate) fn at(&self, point: &Point) -> Option<&Evaluation> {
         self.evaluations.iter().find(|begun| same_point(&begun.point, point))
     }

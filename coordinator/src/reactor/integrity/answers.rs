@@ -1,4 +1,5 @@
-//! Answers to batches: they fill an evaluation, are compared, or decide a dispute.
+//! Answers to batches: each fills an evaluation, is compared with another answer, or decides a
+//! dispute.
 
 use std::time::Duration;
 
@@ -18,11 +19,12 @@ use crate::worker_name::WorkerName;
 
 /// Weight of the newest measurement in a worker's rate.
 const RATE_WEIGHT: f64 = 0.5;
-/// A shorter computing time than this is not believed, s.
+/// A reported computing time below this, in seconds, is not accepted.
 const ELAPSED_MIN_S: f64 = 1e-6;
 
-/// Takes a worker's answer. Of a batch that was settled before (a duplicate was faster, or the answer
-/// came twice) it is only compared with what is known; of an unknown batch it means nothing.
+/// Takes in a worker's answer. If the batch was settled before (a duplicate was faster, or the
+/// answer came twice), the answer is only compared with the known results; the answer to an unknown
+/// batch is ignored.
 pub(crate) fn answered(
     turn: &mut Turn,
     worker: WorkerId,
@@ -78,7 +80,7 @@ pub(crate) fn answered(
     departures::dismiss_if_drained(turn, worker);
 }
 
-/// Takes back the duplicates of a batch that is answered.
+/// Revokes the duplicates of a batch that was answered.
 fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
     for duplicate in duplicates {
         overdue::missed(turn.state, duplicate, turn.now);
@@ -108,7 +110,7 @@ fn fill(
     state.changed.insert(assignment.job);
 }
 
-/// Learns from an answer how fast its worker is at its job.
+/// Updates the rate of a worker and the pace of its job with an answer.
 fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let believed = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
@@ -123,7 +125,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let slots = worker.hello.slots;
     let took = fairness::slot_time(seconds, slots);
     if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
-        // Whatever a worker says, it has not computed for longer than it was waited for.
+        // A worker cannot have computed for longer than the time since the batch was sent.
         job.pace.learn(count, slots, seconds.min(waited_s));
     }
     if let Some(job) =

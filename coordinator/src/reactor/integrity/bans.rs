@@ -1,5 +1,5 @@
-//! Bans of workers that compute wrongly: such a worker is refused from now on, and what it answered
-//! is computed again.
+//! Bans of workers that return wrong answers: a banned worker is refused from then on, and the
+//! evaluations with its answers are computed again.
 
 use crate::close_reason::CloseReason;
 use crate::effect::{Effect, Record};
@@ -13,7 +13,7 @@ use crate::state::Banned;
 use crate::store::BanRecord;
 use crate::worker_name::WorkerName;
 
-/// Bans a worker for what was found in `job`; `reason` completes "it …".
+/// Bans a worker for a wrong answer found in `job`; `reason` completes the sentence "it …".
 pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String) {
     if turn.state.ban(name).is_some() {
         return;
@@ -32,7 +32,7 @@ pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String
     let stays = turn.state.workers.iter().filter(|(_, worker)| worker.name == *name);
     let stays: Vec<WorkerId> = stays.map(|(id, _)| *id).collect();
     for stay in stays {
-        // A realization is not to blame for the end of such a worker.
+        // Its batches are not to blame for the end of its stay.
         if let Some(worker) = turn.state.workers.get_mut(&stay) {
             worker.draining = true;
         }
@@ -41,7 +41,7 @@ pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String
     }
 }
 
-/// Takes the answers of a worker out of a job.
+/// Removes the answers of a worker from a job.
 fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     speculation::forget(turn, id, name);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
@@ -72,13 +72,15 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
         Stage::Storing { record, .. } => {
             job.restart_pending |= contributed || record.workers.contains(name);
             if job.restart_pending {
-                // Where the search goes after that is another matter.
+                // The search may continue elsewhere after its restart.
                 speculation::drop_all(turn, id);
             }
         }
         Stage::Finishing(_) if contributed => {
-            // What is on its way to the store as the end of a job has ended, unless it is refused.
-            let on_its_way = job.trouble.as_ref().is_none_or(|trouble| trouble.on_its_way);
+            // An end on its way to the store may be durable already; only a refused one can be
+            // taken back.
+            let on_its_way =
+                job.store_trouble.as_ref().is_none_or(|store_trouble| store_trouble.on_its_way);
             job.restart_pending = true;
             if !on_its_way {
                 jobs::reopen(turn, id);
@@ -88,7 +90,7 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     }
 }
 
-/// Begins the evaluation of a job again, from nothing.
+/// Restarts the evaluation of a job with a new attempt.
 fn compute_again(turn: &mut Turn, id: JobId) {
     batches::revoke_all(turn, id);
     let attempt = turn.state.new_attempt();
@@ -103,7 +105,7 @@ fn compute_again(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// The ban with this number is durable.
+/// Notes that the ban with this number is durable.
 pub(crate) fn stored(turn: &mut Turn, number: u64) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
@@ -112,21 +114,22 @@ pub(crate) fn stored(turn: &mut Turn, number: u64) {
     }
 }
 
-/// The ban with this number could not be stored; it is tried again.
+/// Notes that the ban with this number could not be stored; the write is repeated later.
 pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
         banned.refused = true;
         let since = banned.record.at;
-        records::despair_if_late(turn, since, error);
+        records::give_up_if_late(turn, since, error);
     }
 }
 
-/// Writes refused bans again whose time has come.
+/// Repeats the writes of refused bans that are due.
 pub(crate) fn store_again(turn: &mut Turn) {
     let retry_in = turn.state.config.store_retry;
     for banned in &mut turn.state.banned {
-        // What is on its way is reported; a second time it may still be on its way at the end.
+        // The store will report a write that is on its way. A second one could still be on its way
+        // at the end of a shutdown.
         if banned.refused && banned.store_at.is_some_and(|at| turn.now >= at) {
             banned.store_at = Some(turn.now + retry_in);
             banned.refused = false;

@@ -1,4 +1,5 @@
-//! Checks of answers against answers: batches that are computed twice, and disputes where two differ.
+//! Checks of answers against each other: batches that are computed twice, and disputes between
+//! answers that differ.
 
 use std::time::Duration;
 
@@ -17,8 +18,8 @@ use crate::reactor::turn::Turn;
 use crate::state::State;
 use crate::worker_name::WorkerName;
 
-/// Has a batch that `by` has just answered computed a second time, if it is chosen and there is
-/// somebody else.
+/// Queues an audit of a batch that `by` has just answered, if the batch is chosen for one and
+/// another worker can compute it.
 pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
     let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
     if !state.answers_batches(|name| name != by) {
@@ -32,7 +33,7 @@ pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName)
     }
 }
 
-/// Compares an answer with what is known of its indices.
+/// Compares an answer with the known results of its indices.
 pub(crate) fn compare(
     turn: &mut Turn,
     assignment: &Assignment,
@@ -64,7 +65,7 @@ pub(crate) fn compare(
     }
 }
 
-/// Takes the answer of a worker that was to decide.
+/// Takes in the answer of a tie-breaker.
 pub(crate) fn tie_broken(
     turn: &mut Turn,
     batch: BatchId,
@@ -86,7 +87,7 @@ pub(crate) fn tie_broken(
     }
 }
 
-/// Bans those who were not believed.
+/// Bans the workers that a verdict finds wrong.
 fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
     let Verdict { believed: [one, other], liars } = verdict;
     for Contradiction { index, answers: [(_, right), (liar, wrong)] } in liars {
@@ -100,11 +101,12 @@ fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
     }
 }
 
-/// Gives up what nobody is there to check, and what nobody survives to check. Without a check an
-/// answer is believed; two different answers without a third are the end of their job.
+/// Gives up audits that no other worker can compute, and fails jobs whose disputes cannot be
+/// decided. An answer whose audit is given up is accepted; two different answers without a third
+/// worker end their job.
 pub(crate) fn give_up(turn: &mut Turn) {
     if turn.state.draining {
-        // The next coordinator checks.
+        // The next coordinator checks them.
         return;
     }
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
@@ -131,7 +133,7 @@ fn give_up_audits(state: &mut State, job: JobId) {
     }
 }
 
-/// Why a job fails over its disputes, if it does.
+/// Returns the failure of a job with a dispute that cannot be decided, if there is one.
 fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let hopeless = |dispute: &&Dispute| {

@@ -1,4 +1,4 @@
-//! A job's way from acceptance to its end.
+//! Life cycle of a job, from acceptance to end.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -29,7 +29,8 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
         return;
     };
     let (number, point) = (evaluation.number, evaluation.point);
-    // Only what was there and is the same leaves the path behind it as it was.
+    // Only an evaluation that was stored before, with the same outcomes, leaves those after it
+    // valid.
     let is_last = evaluation.changes(&outcomes);
     let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
@@ -51,7 +52,7 @@ pub(crate) fn fail(turn: &mut Turn, id: JobId, failure: &Failure) {
     finish(turn, id, ending);
 }
 
-/// Ends a job for a client, at once or as soon as what is being stored is stored.
+/// Cancels a job for a client, at once or as soon as the record being stored is durable.
 pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -59,12 +60,13 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
     job.cancelled = true;
     match job.stage {
         Stage::Waiting if job.stored > 0 => {
-            // What it leaves is in the store: nothing of it is computed, it waits for nobody.
+            // Its output is in the store and is only read, not computed, so it need not wait for
+            // its turn.
             begin(turn, id);
         }
         Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
-        // The store does not give what it would leave besides.
-        Stage::Replaying { .. } if job.trouble.is_some() => {
+        // The store cannot read the evaluations that would still belong to its output.
+        Stage::Replaying { .. } if job.store_trouble.is_some() => {
             finish(turn, id, cancelled());
         }
         Stage::Accepting
@@ -74,9 +76,9 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// Begins waiting jobs while there is room: of the clients with the fewest active jobs, the
-/// highest priority first, of equal ones the oldest. A client without any active job finds room
-/// beyond the usual, so that no other client keeps it waiting.
+/// Begins waiting jobs while there is room. Jobs of the clients with the fewest active jobs come
+/// first, of these the highest priority, of equal ones the oldest. A client without any active job
+/// gets room beyond the limits, so that other clients cannot keep it waiting.
 pub(crate) fn begin_waiting(turn: &mut Turn) {
     while !turn.state.waiting.is_empty() && !turn.state.draining {
         let Some(id) = next_waiting(turn.state).filter(|job| has_room(turn.state, *job)) else {
@@ -86,7 +88,7 @@ pub(crate) fn begin_waiting(turn: &mut Turn) {
     }
 }
 
-/// Whether a waiting job may begin: there is room for its evaluation, and a place.
+/// Returns whether a waiting job may begin, by the limits on active realizations and active jobs.
 pub(crate) fn has_room(state: &State, id: JobId) -> bool {
     let realizations = |id: &JobId| {
         let job = state.jobs.get(id);
@@ -102,7 +104,7 @@ pub(crate) fn has_room(state: &State, id: JobId) -> bool {
     fits && (state.active.len() as u64) < beyond * state.config.active_jobs_max as u64
 }
 
-/// The job that begins next.
+/// Returns the job that begins next.
 fn next_waiting(state: &State) -> Option<JobId> {
     let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
     let rank = |(id, job): &(JobId, &Job)| {
@@ -125,7 +127,8 @@ fn begin(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// Goes where the search wants to go, after it was told what the store has.
+/// Takes the next step of a job's search: replays a stored evaluation, begins a new one, or ends
+/// the job.
 pub(crate) fn advance(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -147,30 +150,30 @@ pub(crate) fn advance(turn: &mut Turn, id: JobId) {
     finish(turn, id, ending);
 }
 
-/// Stores the end of a job; the world hears of it when it is durable.
+/// Stores the end of a job; clients see it when it is durable.
 pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     let search = &job.search;
-    // Of groups none is the job's.
+    // A grouped search has no best evaluation of the whole job.
     let best = search.best().filter(|_| !search.is_grouped());
     let program = Program::this(turn.state.config.commit);
     let record = EndRecord::new(id, ending, program, turn.now, search.evaluations(), best);
     let summary = Arc::new(search.summary());
     turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
     job.stage = Stage::Finishing(record);
-    job.trouble = None;
+    job.store_trouble = None;
     leave(turn, id);
 }
 
-/// Takes back an end that is not durable and not on its way to be: its answers are not to be
-/// relied on. The job waits for its turn and reads its stored evaluations again.
+/// Takes back an end that is neither durable nor on its way to the store, because answers in it are
+/// not reliable. The job waits for its turn and reads its stored evaluations again.
 pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.trouble = None;
+    job.store_trouble = None;
     job.restart_pending = false;
     job.workers.clear();
     job.search = Search::new(job.record.specification.clone());
@@ -179,7 +182,7 @@ pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
     begin_waiting(turn);
 }
 
-/// Takes a job out of everything that concerns jobs under way.
+/// Removes a job from the active jobs and the shares of its client.
 fn leave(turn: &mut Turn, id: JobId) {
     if turn.state.active.remove(&id)
         && let Some(job) = turn.state.jobs.get(&id)
@@ -195,12 +198,12 @@ fn leave(turn: &mut Turn, id: JobId) {
     begin_waiting(turn);
 }
 
-/// The end of a job whose client does not want it any more.
+/// Returns the end of a cancelled job.
 pub(crate) fn cancelled() -> Ending {
     Ending { status: Status::Cancelled, failure: None, reason: None }
 }
 
-/// Asks for the next stored evaluation of a job, unless a ban is not durable yet.
+/// Requests the next stored evaluation of a job, unless a ban is not durable yet.
 pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
     let may = !turn.state.ban_pending();
     if let Some(job) = turn.state.jobs.get_mut(&id) {

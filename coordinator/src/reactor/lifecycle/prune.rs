@@ -1,4 +1,4 @@
-//! Ended jobs that are forgotten: when a client wants it, and when they are old.
+//! Deletes ended jobs: on a client's request, and when they are old.
 
 use std::time::Duration;
 
@@ -8,13 +8,14 @@ use crate::ids::{JobId, Token};
 use crate::reactor::turn::Turn;
 use crate::state::State;
 
-/// How often it is looked for old jobs.
+/// Interval of the search for old jobs.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
-/// For so long after its start a coordinator forgets nothing unasked, unless jobs are kept for less:
-/// its clock may be far ahead of that of its earlier lives, and somebody has to see it.
+/// Time after the start during which a coordinator deletes no job on its own, unless jobs are kept
+/// for less: its clock may be far ahead of that of earlier runs, and the operator needs time to
+/// notice.
 const GRACE: Duration = Duration::from_secs(3600);
 
-/// Forgets the jobs that `retention` does not keep; the answer comes when that is durable.
+/// Deletes the jobs that `retention` does not keep; the client is answered when that is durable.
 pub(crate) fn requested(turn: &mut Turn, token: Token, retention: Retention) {
     let jobs = chosen(turn.state, retention, turn.now);
     if jobs.is_empty() {
@@ -24,7 +25,7 @@ pub(crate) fn requested(turn: &mut Turn, token: Token, retention: Retention) {
     }
 }
 
-/// Forgets the jobs that have been ended for longer than the operator wants to keep them.
+/// Deletes the jobs that ended longer ago than the operator keeps them.
 pub(crate) fn tick(turn: &mut Turn) {
     let Some(keep_for) = turn.state.config.keep_ended else {
         return;
@@ -37,7 +38,7 @@ pub(crate) fn tick(turn: &mut Turn) {
     let retention = Retention { keep_for: Some(keep_for), keep_last: None };
     let jobs = chosen(turn.state, retention, turn.now);
     let grace = GRACE.min(keep_for).saturating_sub(turn.now.saturating_sub(turn.state.started));
-    // No job that ended in this life can be older than that yet.
+    // Until then, no job that ended in this run can be older than that.
     if grace > Duration::ZERO {
         if is_first && !jobs.is_empty() {
             tracing::warn!(
@@ -54,7 +55,7 @@ pub(crate) fn tick(turn: &mut Turn) {
     }
 }
 
-/// The jobs are forgotten, or the store did not do it.
+/// Removes jobs that the store has deleted, or reports that it could not delete them.
 pub(crate) fn pruned(
     turn: &mut Turn,
     token: Option<Token>,
@@ -79,7 +80,7 @@ pub(crate) fn pruned(
     }
 }
 
-/// The ended jobs that are not kept, in the order of their identifiers.
+/// Returns the ended jobs that are not kept, in the order of their identifiers.
 fn chosen(state: &State, retention: Retention, now: Duration) -> Vec<JobId> {
     let Retention { keep_for, keep_last } = retention;
     let mut ended: Vec<(Duration, JobId)> =

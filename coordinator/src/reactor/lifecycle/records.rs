@@ -1,4 +1,4 @@
-//! What the store says of the records of a job: one is durable, or refused.
+//! Reports of the store about the records of a job: one is durable, or was refused.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -6,13 +6,13 @@ use std::time::Duration;
 use super::jobs;
 use crate::effect::{Answer, Effect, Record, RecordKey, Refusal};
 use crate::ids::JobId;
-use crate::job::{EndedJob, Job, RequestName, Stage, Trouble};
+use crate::job::{EndedJob, Job, RequestName, Stage, StoreRetry};
 use crate::notice::Notice;
 use crate::reactor::turn::Turn;
 use crate::snapshot;
 use crate::store::JobRecord;
 
-/// A record is durable: the job goes on.
+/// Notes that a record is durable, and continues the job.
 pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -20,7 +20,7 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
     match (key, &mut job.stage) {
         (RecordKey::Job, Stage::Accepting) => {
             job.stage = Stage::Waiting;
-            job.trouble = None;
+            job.store_trouble = None;
             turn.state.waiting.push_back(id);
             turn.effects.push(Effect::Note(accepted(&job.record)));
             for token in std::mem::take(&mut job.tokens) {
@@ -36,7 +36,7 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
             job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
             job.workers.append(&mut record.workers);
-            job.trouble = None;
+            job.store_trouble = None;
             job.search.tell(outcomes, estimated_error);
             if job.restart_pending {
                 jobs::restart(turn, id);
@@ -48,14 +48,15 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             ended(turn, id);
             return;
         }
-        // A report of a write that was repeated meanwhile.
+        // The report of a write that has been repeated meanwhile.
         _ => {}
     }
     turn.state.changed.insert(id);
 }
 
-/// A record could not be stored: a submission is refused, anything else is tried again, for as
-/// long as it takes: what is not durable has not happened, and a job ends in no other way.
+/// Handles a record that could not be stored. A submission is refused. Anything else is repeated
+/// for as long as necessary: a change takes effect only when it is durable, and a job ends in no
+/// other way.
 pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
     let retry_at = turn.now + turn.state.config.store_retry;
     let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| job.awaits() == Some(key)) else {
@@ -72,24 +73,26 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
         turn.state.jobs.remove(&id);
         return;
     }
-    let since = job.trouble.as_ref().map_or(turn.now, |trouble| trouble.since);
-    job.trouble = Some(Trouble { since, retry_at, error: error.clone(), on_its_way: false });
+    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
+    job.store_trouble =
+        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
     turn.state.changed.insert(id);
     if job.restart_pending && matches!(job.stage, Stage::Finishing(_)) {
         jobs::reopen(turn, id);
     }
-    despair_if_late(turn, since, error);
+    give_up_if_late(turn, since, error);
 }
 
-/// Says that the store takes or gives nothing any more, once it has refused for too long.
-pub(crate) fn despair_if_late(turn: &mut Turn, since: Duration, error: String) {
+/// Reports that the store no longer works, once it has refused for too long.
+pub(crate) fn give_up_if_late(turn: &mut Turn, since: Duration, error: String) {
     let waited = turn.now.saturating_sub(since);
-    if turn.state.config.store_patience.is_some_and(|patience| waited >= patience) {
-        turn.effects.push(Effect::Despair { error, waited });
+    if turn.state.config.store_give_up_after.is_some_and(|patience| waited >= patience) {
+        turn.effects.push(Effect::GiveUp { error, waited });
     }
 }
 
-/// Writes the present record of a job again, or asks again for the one it reads.
+/// Sends the current record of a job to the store again, or repeats the request for the one it
+/// reads.
 pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
     effects.push(match &job.stage {
         Stage::Storing { record, is_last } => {
@@ -110,7 +113,7 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
     });
 }
 
-/// The end of a job is durable.
+/// Notes that the end of a job is durable.
 fn ended(turn: &mut Turn, id: JobId) {
     let Some(Job { record, stage: Stage::Finishing(end), tokens, sequence, .. }) =
         turn.state.jobs.remove(&id)
@@ -134,7 +137,7 @@ fn ended(turn: &mut Turn, id: JobId) {
         let answer = Answer::Snapshot(snapshot.clone());
         turn.effects.push(Effect::Answer { token, answer });
     }
-    // At once, and not when the others are published: somebody waits for it.
+    // Published at once instead of with the other jobs, because clients wait for it.
     turn.effects.push(Effect::Publish { job: id, snapshot });
 }
 
@@ -149,7 +152,7 @@ fn accepted(record: &JobRecord) -> Notice {
 }
 
 impl Job {
-    /// The record whose report the job waits for.
+    /// Returns the key of the record whose report the job waits for.
     fn awaits(&self) -> Option<RecordKey> {
         match &self.stage {
             Stage::Accepting => Some(RecordKey::Job),

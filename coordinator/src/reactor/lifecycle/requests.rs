@@ -1,4 +1,4 @@
-//! What clients ask for.
+//! Client requests.
 
 use std::ops::Bound;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::state::State;
 use crate::store::JobRecord;
 use crate::worker_list;
 
-/// Most banned workers that are shown.
+/// Maximum number of banned workers that are listed.
 const BANNED_SHOWN_MAX: usize = 1000;
 
 pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
@@ -48,7 +48,7 @@ pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
     }
 }
 
-/// A job that a client wants computed.
+/// A submitted job.
 struct Submission {
     specification: Arc<JobSpecification>,
     request_id: String,
@@ -57,7 +57,7 @@ struct Submission {
     name: String,
 }
 
-/// Accepts a job; the answer comes when it is durable.
+/// Accepts a job; the client is answered when it is durable.
 fn submit(
     turn: &mut Turn,
     token: Token,
@@ -96,7 +96,7 @@ fn submit(
     Ok(None)
 }
 
-/// Whether a specification of so many bytes finds room beside those of the jobs that have not ended.
+/// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
 fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
     let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
         let records = state.jobs.values().map(|job| &job.record);
@@ -114,7 +114,7 @@ fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Memory that a specification takes, about.
+/// Returns the approximate memory of a specification, bytes.
 fn bytes(specification: &JobSpecification) -> u64 {
     let velocities = match &specification.data {
         Some(Data::Velocities(velocities)) => size_of_val(velocities.as_slice()),
@@ -166,7 +166,7 @@ fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Ans
     Answer::Page { snapshots: page.into_iter().map(|(_, snapshot)| snapshot).collect(), more_after }
 }
 
-/// Cancels a job; the answer comes when its end is durable.
+/// Cancels a job; the client is answered when its end is durable.
 fn cancel(turn: &mut Turn, token: Token, id: JobId) -> Option<Answer> {
     match turn.state.jobs.get_mut(&id) {
         Some(job) if !matches!(job.stage, Stage::Accepting) => {
@@ -188,7 +188,7 @@ fn fetch(state: &State, id: JobId) -> Answer {
     }
 }
 
-/// Sends a worker away; how it stands then.
+/// Drains a worker, and returns its snapshot.
 fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
     match workers::send_away(turn, worker) {
         Ok(()) => worker_list::of(turn.state, worker, turn.now)

@@ -1,5 +1,5 @@
-//! A state from what the store holds. Nothing of a job's path is read here, be it ever so long:
-//! a job that has not ended reads its stored evaluations when its turn comes.
+//! Restores a state from the store. The evaluations of jobs are not read here, however many there
+//! are: a job that has not ended reads its own when its turn comes.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::reactor::turn::Turn;
 use crate::state::{Banned, State};
 use crate::store::{BanRecord, JobRecord, Store, StoreError};
 
-/// What a store holds, its evaluations aside.
+/// Contents of a store, without evaluations.
 #[derive(Debug, Default)]
 pub struct Restored {
     ended: Vec<(JobId, EndedJob)>,
@@ -27,12 +27,12 @@ pub struct Restored {
 impl Restored {
     /// Reads a store. Blocks.
     ///
-    /// A job that has not ended and whose evaluations were computed with other numerics than this
-    /// program's begins again: results of two numerics never mix. Workers stay banned while
-    /// their answers may be in the evaluations of an unfinished job.
+    /// An unfinished job whose evaluations were computed with other numerics than this program's
+    /// begins again: results of different numerics are never mixed. Workers stay banned while their
+    /// answers may be in the evaluations of an unfinished job.
     ///
     /// # Errors
-    /// When the store cannot be read or does not take that, or an evaluation is missing in it.
+    /// When the store cannot be read or written, or an evaluation is missing in it.
     pub fn load(store: &mut dyn Store) -> Result<Self, StoreError> {
         let mut restored = Self::default();
         store.visit_jobs(&mut |stored| match stored.end {
@@ -53,7 +53,7 @@ impl Restored {
     }
 }
 
-/// Makes a job begin again if its numerics are not this program's.
+/// Restarts a job from the beginning if its evaluations were computed with other numerics.
 fn keep_numerics(
     store: &mut dyn Store,
     record: &mut JobRecord,
@@ -67,7 +67,7 @@ fn keep_numerics(
             now = %fingerprint,
             "the job was begun with other numerics; its evaluations are computed again"
         );
-        store.begin_again(record.job, &fingerprint)?;
+        store.reset_job(record.job, &fingerprint)?;
         record.fingerprint = fingerprint;
         *evaluations = 0;
     }
@@ -75,24 +75,24 @@ fn keep_numerics(
 }
 
 impl Restored {
-    /// How many jobs have not ended.
+    /// Returns the number of jobs that have not ended.
     pub fn unfinished(&self) -> usize {
         self.unfinished.len()
     }
 
-    /// How many jobs have ended.
+    /// Returns the number of jobs that have ended.
     pub fn ended(&self) -> usize {
         self.ended.len()
     }
 
-    /// How many workers are banned.
+    /// Returns the number of banned workers.
     pub fn banned(&self) -> usize {
         self.banned.len()
     }
 }
 
 impl State {
-    /// A coordinator that goes on with what was `restored`, as of `now`.
+    /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
         let Restored { ended, unfinished, banned, last_forgotten } = restored;

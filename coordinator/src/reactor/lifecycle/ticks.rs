@@ -1,4 +1,4 @@
-//! What the passing of time brings: lost leases, signs of life, writes tried again, snapshots.
+//! Periodic work: expired leases, heartbeats, repeated writes and snapshots.
 
 use std::time::Duration;
 
@@ -12,17 +12,17 @@ use crate::reactor::turn::Turn;
 use crate::snapshot;
 use crate::state::{State, Worker};
 
-/// Unfinished jobs are published this often even if nothing about them changed but time.
+/// Interval at which unfinished jobs are published even if nothing but the time has changed.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
 
-/// Takes a gap, in which this process did not run, out of all that silence is measured by: what came
-/// meanwhile is not read yet.
+/// Excludes a gap in which this process did not run from all measured silences: messages that
+/// arrived meanwhile have not been read yet.
 pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
     if gap <= state.config.heartbeat {
         return;
     }
-    tracing::warn!(?gap, "the coordinator stood still; nobody is blamed for it");
+    tracing::warn!(?gap, "the coordinator was paused; all leases are extended by the gap");
     let excused = |since: &mut Duration| *since = (*since + gap).min(now);
     for worker in state.workers.values_mut() {
         excused(&mut worker.last_seen);
@@ -44,7 +44,7 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
     }
 }
 
-/// Ends the leases of workers that were silent, or have not answered, for too long.
+/// Ends the leases of workers that have been silent, or have not answered, for too long.
 pub(crate) fn expire(turn: &mut Turn) {
     let expired: Vec<(WorkerId, CloseReason)> = turn
         .state
@@ -57,7 +57,7 @@ pub(crate) fn expire(turn: &mut Turn) {
     }
 }
 
-/// Returns why the lease of a worker has ended, if it has.
+/// Returns the reason why the lease of a worker has ended, if it has.
 fn expired(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
     let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
@@ -69,7 +69,7 @@ fn expired(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason>
     (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
 }
 
-/// Gives signs of life to workers that have had none for some time.
+/// Sends heartbeats to workers for which one is due.
 pub(crate) fn send_heartbeats(turn: &mut Turn) {
     for (&id, worker) in &mut turn.state.workers {
         if turn.now.saturating_sub(worker.heartbeat_sent) >= turn.state.config.heartbeat {
@@ -79,7 +79,7 @@ pub(crate) fn send_heartbeats(turn: &mut Turn) {
     }
 }
 
-/// Fails the jobs of realizations over which so many workers crashed that no more are risked.
+/// Fails jobs with poison realizations.
 pub(crate) fn fail_poisoned(turn: &mut Turn) {
     poison::forget_old_crashes(turn.state, turn.now);
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
@@ -90,20 +90,20 @@ pub(crate) fn fail_poisoned(turn: &mut Turn) {
     }
 }
 
-/// Writes refused records again whose time has come.
+/// Repeats the writes of refused records that are due.
 pub(crate) fn store_again(turn: &mut Turn) {
     for job in turn.state.jobs.values_mut() {
-        let Some(trouble) = &mut job.trouble else {
+        let Some(store_trouble) = &mut job.store_trouble else {
             continue;
         };
-        if turn.now >= trouble.retry_at && !trouble.on_its_way {
-            trouble.on_its_way = true;
+        if turn.now >= store_trouble.retry_at && !store_trouble.on_its_way {
+            store_trouble.on_its_way = true;
             records::store_again(job, &mut turn.effects);
         }
     }
 }
 
-/// Publishes the jobs that changed, and now and then all unfinished ones.
+/// Publishes the jobs that changed, and periodically all unfinished ones.
 pub(crate) fn publish(turn: &mut Turn) {
     if turn.now.saturating_sub(turn.state.published) >= PUBLISH_EVERY {
         turn.state.published = turn.now;

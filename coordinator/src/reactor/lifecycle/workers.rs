@@ -1,4 +1,4 @@
-//! Workers come, give signs of life, leave, and are lost.
+//! Attachment, heartbeats, draining and loss of workers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -15,7 +15,7 @@ use crate::notice::{Departure, Notice};
 use crate::rate::Rate;
 use crate::reactor::dispatch::{batches, departures, overdue, poison};
 use crate::reactor::turn::Turn;
-use crate::state::{Missed, State, Worker};
+use crate::state::{MissedBatches, State, Worker};
 use crate::worker_name::WorkerName;
 
 pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
@@ -24,7 +24,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
         return;
     }
     if let Err(reason) = admit(turn.state, &hello) {
-        // A name that is too long is not repeated as a whole.
+        // A name that is too long is shortened before it is shown.
         let host: String = hello.host.chars().take(NAME_BYTES_MAX).collect();
         let name = WorkerName::new(&host, hello.process, hello.instance);
         let refused = Notice::WorkerRefused { worker, name, reason: reason.clone() };
@@ -53,7 +53,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             last_seen: turn.now,
             answered: turn.now,
             has_answered: false,
-            missed: Missed::default(),
+            missed: MissedBatches::default(),
             heartbeat_sent: turn.now,
             in_flight: Vec::new(),
             settled: VecDeque::new(),
@@ -79,7 +79,8 @@ pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
     departures::dismiss_if_drained(turn, worker);
 }
 
-/// Sends a worker away: it gets nothing new, and leaves when it has answered what it holds.
+/// Drains a worker: it receives no new work, and leaves when it has answered the batches that it
+/// holds.
 ///
 /// # Errors
 /// When no such worker is attached.
@@ -93,7 +94,7 @@ pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal
     Ok(())
 }
 
-/// Closes a worker's stream; what it held goes to others.
+/// Closes a worker's stream; the batches that it held are reassigned.
 pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
     if matches!(reason, CloseReason::Unanswering { .. })
         && let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone())
@@ -104,12 +105,12 @@ pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
     lost(turn, worker, Departure::Closed(reason));
 }
 
-/// The stream of a worker ended; what it held goes to others.
+/// Handles the end of a worker's stream; the batches that it held are reassigned.
 pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
     lost(turn, worker, Departure::StreamEnded);
 }
 
-/// Forgets a worker; what it held goes to others. Later events of it mean nothing.
+/// Removes a worker; the batches that it held are reassigned. Its later events are ignored.
 fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
     let cause = cause(&why);
     let Some(gone) = departures::depart(turn, worker, why) else {
@@ -132,7 +133,7 @@ fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
     }
 }
 
-/// What the way in which a worker went says about it.
+/// Returns the cause of a loss, given the reason for the departure.
 fn cause(why: &Departure) -> Cause {
     let Departure::Closed(reason) = why else {
         return Cause::StreamBroke;
@@ -154,12 +155,13 @@ fn cause(why: &Departure) -> Cause {
     }
 }
 
-/// Begins the end: no new batch, every stream closed; records on their way are waited for.
+/// Begins the shutdown: no new batch is sent and every stream is closed, but records on their way
+/// are awaited.
 pub(crate) fn drain_all(turn: &mut Turn) {
     turn.state.draining = true;
     let workers: Vec<WorkerId> = turn.state.workers.keys().copied().collect();
     for worker in workers {
-        // A worker that is sent away is not to blame for what it held.
+        // A drained worker is not held responsible for its batches.
         if let Some(attached) = turn.state.workers.get_mut(&worker) {
             attached.draining = true;
         }

@@ -1,9 +1,9 @@
-//! Answers against answers: audits, disputes, bans.
+//! Comparison of answers: audits, disputes, bans.
 
 use super::*;
 
-/// A propagation of so many realizations with workers 1, 2, … of one thread, each on a host of
-/// its own; every batch is audited.
+/// Returns a rig with a propagation of so many realizations and workers 1, 2, … of one thread, each
+/// on a host of its own; every batch is audited.
 fn rig(realizations: u64, workers: u32) -> Rig {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 1.0;
@@ -14,7 +14,7 @@ fn rig(realizations: u64, workers: u32) -> Rig {
     rig
 }
 
-/// An answer of one realization that is `off` the right one.
+/// Returns an answer of one realization that differs by `off` from the right one.
 pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: Solved) -> Event {
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
@@ -28,7 +28,7 @@ pub(super) const ONE_BIT: Solved = Solved { outcome: Ok(1.0), estimated_error: 0
 #[test]
 fn an_audited_batch_is_computed_by_another_worker() {
     let mut rig = rig(1, 2);
-    // Worker 1 has the only realization; worker 2 gets it too, when it is answered.
+    // Worker 1 has the only realization; worker 2 gets its audit when it is answered.
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["store job 1 evaluation 0"]);
 }
@@ -37,7 +37,7 @@ fn an_audited_batch_is_computed_by_another_worker() {
 fn one_worker_alone_is_believed() {
     let mut rig = rig(1, 1);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    // Nor is a worker its own auditor when it has attached twice.
+    // A worker that has attached twice does not audit itself.
     let mut rig = self::rig(1, 1);
     rig.event(hello_of(2, 1, 1));
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
@@ -52,7 +52,7 @@ fn two_containers_may_have_host_and_process_in_common() {
     };
     let mut rig = rig(1, 0);
     rig.event(of_instance(1, 5));
-    // The same process once more, and one of another container.
+    // The same process once more, and a process of another container.
     rig.event(of_instance(2, 5));
     rig.check(of_instance(3, 6), &["welcome 3, lease 3"]);
     rig.check(answer(1, 1, 0, 1), &["send 3: batch 2 = 0+1"]);
@@ -88,13 +88,13 @@ fn a_third_worker_decides_against_the_first() {
     rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
-    // The liar filled the result: the evaluation begins again.
+    // The wrong answer filled the result: the evaluation begins again.
     assert_eq!(effects.len(), 3, "{effects:?}");
     let banned = format!("store expulsion 1: node (process 1) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
     assert!(effects[1].starts_with("close 1: this worker is expelled"), "{effects:?}");
     assert_eq!(effects[2], "send 2: batch 4 = 0+1");
-    // It stays out, and what it says later means nothing.
+    // The worker stays banned, and its later answers are ignored.
     rig.check(answer(1, 1, 0, 1), &[]);
     let refused = rig.event(hello_of(9, 1, 1));
     assert!(refused[0].starts_with("close 9: this worker is expelled"), "{refused:?}");
@@ -112,7 +112,7 @@ fn a_third_worker_decides_against_the_second() {
     let banned = format!("store expulsion 1: node (process 2) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
     assert!(effects[1].starts_with("close 2: this worker is expelled"), "{effects:?}");
-    // What it answered filled no result: nothing is computed again.
+    // Its answer filled no result: nothing is computed again.
     assert_eq!(effects[2], "store job 1 evaluation 0");
 }
 
@@ -158,7 +158,7 @@ fn a_third_worker_that_comes_in_time_decides() {
     let mut rig = rig(1, 2);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     rig.check(wrong(2, 2, 0, ONE_BIT), &[]);
-    // The process of one of the two is no third.
+    // Another stay of one of the two processes does not count as a third worker.
     rig.check(hello_of(3, 2, 1), &["welcome 3, lease 3"]);
     rig.check(hello_of(4, 4, 1), &["welcome 4, lease 4", "send 4: batch 3 = 0+1"]);
     let effects = rig.event(answer(4, 3, 0, 1));
@@ -170,11 +170,11 @@ fn a_third_worker_that_comes_in_time_decides() {
 fn a_copy_that_answers_differently_is_judged() {
     let mut rig = rig(2, 3);
     rig.state.config.audit_fraction = 0.0;
-    // Worker 1 has both, the others get copies.
+    // Worker 1 has both, the others get duplicates.
     let copies = ["send 2: batch 3 = 0+1", "send 3: batch 4 = 1+1"];
     rig.check_after(Duration::from_millis(100), &copies);
     rig.check(wrong(2, 3, 0, ONE_BIT), &["revoke 1: batch 1"]);
-    // The answer of worker 1 was on its way.
+    // The answer of worker 1 had been sent already.
     rig.check(answer(1, 1, 0, 1), &["send 3: batch 5 = 0+1"]);
     let effects = rig.event(answer(3, 5, 0, 1));
     assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");

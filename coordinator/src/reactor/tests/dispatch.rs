@@ -1,10 +1,10 @@
-//! Who gets what, and how much of it.
+//! Order of service and batch sizes.
 
 use super::*;
 use crate::reactor::dispatch::sizing::batch_size;
 
-/// Batch size for worker 1 of `threads`, measured at `rates` realizations per second, when
-/// `queued` are left.
+/// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
+/// per second, when `queued` realizations are left.
 fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64) {
     let mut rig = Rig::with(1, threads);
     for (worker, rate) in rig.state.workers.values_mut().zip(rates) {
@@ -17,25 +17,25 @@ fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64
 
 #[test]
 fn batches_take_the_target_time_and_leave_work_for_the_others() {
-    // Unknown: four realizations a thread.
+    // Unknown rate: four realizations per thread.
     check_size(&[2], &[None], 10_000, 8);
     check_size(&[64], &[None], 10_000, 256);
-    // Measured: 200 ms.
+    // Measured rate: 200 ms.
     check_size(&[2], &[Some(5000.0)], 10_000, 1000);
     check_size(&[1], &[Some(0.1)], 10_000, 1);
-    // Slow realizations: one for each thread, or threads stand idle.
+    // Slow realizations: one for each thread, so that no thread is idle.
     check_size(&[8], &[Some(8.0 / 0.3)], 10_000, 8);
     check_size(&[2], &[Some(0.1)], 10_000, 2);
     check_size(&[8, 8], &[Some(1.0), Some(1.0)], 6, 3);
-    // Never more than a message may carry.
+    // Never more than a message may hold.
     check_size(&[2], &[Some(1e12)], 10_000_000, 65_536);
-    // A quarter of the share of what remains; shares follow the rates.
+    // A quarter of the share of the remaining realizations; shares are proportional to the rates.
     check_size(&[2], &[Some(5000.0)], 400, 100);
     check_size(&[2, 2], &[Some(5000.0), Some(5000.0)], 400, 50);
     check_size(&[2, 2], &[Some(7500.0), Some(2500.0)], 400, 75);
     check_size(&[2, 2], &[Some(5000.0), None], 400, 50);
     check_size(&[2, 6], &[Some(5000.0), None], 400, 25);
-    // Towards the end one for each thread, as long as that is within the share.
+    // Near the end one for each thread, as long as that is within the share.
     check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 20, 8);
     check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 10, 5);
     check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 1, 1);
@@ -52,7 +52,7 @@ fn each_worker_holds_two_batches_and_no_more() {
         hello(2, 1),
         &["welcome 2, lease 2", "send 2: batch 3 = 16+4", "send 2: batch 4 = 20+4"],
     );
-    // 8 in 0.04 s are 200 a second, 40 in 200 ms.
+    // 8 in 0.04 s are 200 per second, 40 in 200 ms.
     rig.check(answer_in(0.04, 1, 1, 0, 8), &["send 1: batch 5 = 24+40"]);
 }
 
@@ -93,7 +93,7 @@ fn jobs_are_served_in_turn() {
     assert_eq!(jobs(&rig), [1, 2]);
 }
 
-/// Worker 1 holds both halves of a small job, worker 2 has nothing to do.
+/// Worker 1 holds both halves of a small job, worker 2 is idle.
 fn with_idle_worker() -> Rig {
     let mut rig = Rig::with(2, &[1]);
     rig.check(hello(2, 1), &["welcome 2, lease 2"]);
@@ -106,11 +106,11 @@ fn an_idle_worker_gets_a_copy_of_the_slowest_batch() {
     let mut rig = with_idle_worker();
     rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
     rig.check_after(Duration::from_millis(1), &[]);
-    // The copy is faster: the original is revoked, and the next slowest copied.
+    // The duplicate is faster: the original is revoked, and the next slowest batch duplicated.
     rig.check(answer(2, 3, 0, 1), &["revoke 1: batch 1", "send 2: batch 4 = 1+1"]);
-    // The original answers all the same: equal, and nothing comes of it.
+    // The original answers all the same: the answers agree, and nothing happens.
     rig.check(answer(1, 1, 0, 1), &[]);
-    // The other original is faster than its copy.
+    // The other original is faster than its duplicate.
     rig.check(answer(1, 2, 1, 1), &["revoke 2: batch 4", "store job 1 evaluation 0"]);
     rig.check(answer(2, 4, 1, 1), &[]);
 }
@@ -119,7 +119,8 @@ fn an_idle_worker_gets_a_copy_of_the_slowest_batch() {
 fn a_sign_of_life_hands_out_nothing() {
     let mut rig = with_idle_worker();
     rig.now += Duration::from_millis(1);
-    // Thousands of workers give one every two seconds; a copy is due, and waits for the next tick.
+    // With thousands of workers heartbeats are frequent; a duplicate is due, but waits for the next
+    // tick.
     for worker in [1, 2] {
         rig.hear(worker);
     }
@@ -130,8 +131,8 @@ fn a_sign_of_life_hands_out_nothing() {
 fn a_copy_outlives_its_original_and_the_other_way_round() {
     let mut rig = with_idle_worker();
     rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
-    // Only the batch without a copy goes back; it was alone in its batch, so it waits for a
-    // worker that holds nothing else.
+    // Only the batch without a duplicate is queued again; it was alone in its batch, so it waits
+    // for a worker that holds nothing else.
     rig.check(end_of_stream(1), &[]);
     rig.check(answer(2, 3, 0, 1), &["send 2: batch 4 = 1+1"]);
     rig.check(answer(2, 4, 1, 1), &["store job 1 evaluation 0"]);

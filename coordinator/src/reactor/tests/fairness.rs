@@ -1,4 +1,4 @@
-//! Clients share the workers; priorities are among the jobs of one.
+//! Clients share the workers; priorities apply among the jobs of one client.
 
 use super::*;
 
@@ -20,15 +20,15 @@ impl Rig {
         job
     }
 
-    /// Has worker 1, of one thread, answer its oldest batch, each realization in 10 ms times
-    /// `slowness`; whose batch it was.
+    /// Lets worker 1, of one thread, answer its oldest batch, each realization in 10 ms times
+    /// `slowness`; returns the job and size of the batch.
     fn answer_one(&mut self, slowness: impl Fn(JobId) -> f64) -> (JobId, u64) {
         let id = self.state.workers[&WorkerId(1)].in_flight[0];
         let assignment = self.state.batches[&id].assignment;
         let (first, count) = (assignment.indices.first, assignment.indices.count);
         let elapsed_s = 0.01 * slowness(assignment.job) * count as f64;
         self.now += Duration::from_secs_f64(elapsed_s);
-        // Not checked each time: the state is large here.
+        // Without the sanity check, because the state is large here.
         react(&mut self.state, answer_in(elapsed_s, 1, id.0, first, count), self.now);
         (assignment.job, count)
     }
@@ -39,7 +39,7 @@ fn large_evaluations_wait_for_room() {
     let mut rig = Rig::new();
     rig.state.config.active_jobs_max = 8;
     rig.state.config.active_realizations_max = 100;
-    // Alone, a job of any size finds room.
+    // A job of any size may begin if no other is active.
     let large = rig.accept_of("a", 0, 150);
     let second = rig.accept_of("a", 0, 1);
     let other = rig.accept_of("b", 0, 50);
@@ -82,15 +82,15 @@ fn what_waits_is_bounded_in_bytes() {
     let whose = |word: &str| Some(word.to_owned());
     assert_eq!(accepted("a", 6000), None);
     assert_eq!(accepted("a", 6000), None);
-    // A quarter for each client.
+    // One client may use a quarter.
     assert_eq!(accepted("a", 6000), whose("client's"));
     assert_eq!(accepted("a", 1), None);
     for client in ["b", "c", "d"] {
         assert_eq!(accepted(client, 12_000), None, "{client}");
     }
-    // A quarter is free, but not enough for that.
+    // A quarter is free, but that is not enough.
     assert_eq!(accepted("e", 12_000), whose("jobs"));
-    // What has ended makes room.
+    // A job that ends frees its bytes.
     let job = rig.state.jobs.keys().next_back().copied().unwrap();
     rig.event(stored(job.0, RecordKey::Job));
     rig.event(request(1, Request::Cancel(job)));
@@ -110,7 +110,8 @@ fn a_client_with_one_job_gets_as_much_as_one_with_many() {
     for _ in 0..50 {
         rig.answer_one(|_| 1.0);
     }
-    // It comes late, finds every place taken, and its realizations take ten times as long.
+    // It comes late, finds the limit on active jobs reached, and its realizations take ten times as
+    // long.
     let one = rig.accept_of("one", 0, 20_000);
     let slowness = |job| if job == one { 10.0 } else { 1.0 };
     let mut time = [0.0; 2];
@@ -146,7 +147,7 @@ fn waiting_jobs_begin_in_the_order_of_priority_and_need() {
         rig.accept_of("one", priority, 10);
     }
     assert_eq!(begun(&rig), [1, 2]);
-    // Beyond the usual there is room for clients that have nothing.
+    // Clients without active jobs may exceed the limit.
     rig.accept_of("second", 0, 10);
     rig.accept_of("third", 0, 10);
     rig.accept_of("fourth", 9, 10);

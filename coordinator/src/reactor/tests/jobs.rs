@@ -34,7 +34,7 @@ fn a_search_goes_to_its_next_point_when_the_last_is_durable() {
     rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1"]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     rig.check(stored(1, RecordKey::Evaluation(0)), &["send 1: batch 2 = 0+1"]);
-    // A report that comes twice means nothing.
+    // A repeated report is ignored.
     rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
 }
 
@@ -42,7 +42,7 @@ fn a_search_goes_to_its_next_point_when_the_last_is_durable() {
 fn a_submission_is_idempotent_by_its_request_id() {
     let mut rig = Rig::new();
     rig.check(submit(1, "r", propagation(2)), &["store job 1"]);
-    // Before and after it is durable.
+    // Before and after the job is durable.
     rig.check(submit(2, "r", propagation(2)), &[]);
     rig.check(stored(1, RecordKey::Job), &["answer 1: job 1", "answer 2: job 1"]);
     rig.check(submit(3, "r", propagation(2)), &["answer 3: job 1"]);
@@ -76,7 +76,7 @@ fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
     rig.check(stored(2, RecordKey::Job), &["answer 2: job 2"]);
     rig.check(of(3, "ann", 2), &["answer 3: job 1"]);
     rig.check(of(4, "bob", 3), &["answer 4: job 2"]);
-    // What belongs to one is refused to nobody else.
+    // An id of one client may be used by another.
     rig.check(of(5, "cem", 4), &["store job 3"]);
 }
 
@@ -99,7 +99,7 @@ fn another_record_is_written_again_until_it_is_durable() {
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(
         snapshot.waiting_for,
-        "the store does not take a record, it is tried again: the disk is full (since 1 s)"
+        "the store cannot write a record; retrying: the disk is full (since 1 s)"
     );
     rig.check_after(retry / 2, &["store job 1 evaluation 0"]);
     rig.check_after(Duration::ZERO, &[]);
@@ -128,13 +128,13 @@ fn an_end_that_is_not_durable_is_none() {
 #[test]
 fn a_store_that_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let mut rig = Rig::with(8, &[]);
-    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    rig.state.config.store_give_up_after = Some(Duration::from_secs(4));
     rig.event(request(7, Request::Cancel(JobId(1))));
     for _ in 0..2 {
         rig.check(store_failed(1, RecordKey::End), &[]);
         rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     }
-    rig.check(store_failed(1, RecordKey::End), &["despair after 4s: the disk is full"]);
+    rig.check(store_failed(1, RecordKey::End), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
@@ -144,7 +144,7 @@ fn a_cancelled_job_ends_when_its_end_is_durable() {
     let mut rig = Rig::with(8, &[1]);
     let cancel = || request(7, Request::Cancel(JobId(1)));
     rig.check(cancel(), &["store job 1 end: cancelled ", "revoke 1: batch 1", "revoke 1: batch 2"]);
-    // The answer to a revoked batch may be on its way.
+    // The answer to a revoked batch may have been sent already.
     rig.check(answer(1, 1, 0, 2), &[]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     rig.check(cancel(), &["answer 7: Ended Cancelled"]);
@@ -217,7 +217,7 @@ fn a_change_is_published_with_the_next_tick_and_only_then() {
     rig.check(Event::Tick, &[]);
     rig.check(answer(1, 1, 0, 4), &["send 1: batch 3 = 8+8"]);
     rig.check(Event::Tick, &["publish 1"]);
-    // Time alone changes what is shown once a second.
+    // If nothing but the time changes, a job is published once a second.
     rig.now += Duration::from_millis(999);
     rig.check(Event::Tick, &[]);
     rig.now += Duration::from_millis(1);

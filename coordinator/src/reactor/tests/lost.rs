@@ -12,7 +12,7 @@ use crate::batch::Assignment;
 fn the_batches_of_a_lost_worker_are_retried_in_halves() {
     let mut rig = Rig::with(64, &[2]);
     rig.check(end_of_stream(1), &[]);
-    // It held 0+8 and 8+8; every half is a batch of its own, whoever takes it.
+    // The worker held 0+8 and 8+8; every half becomes a batch of its own, whoever gets it.
     rig.check(
         hello(2, 2),
         &["welcome 2, lease 2", "send 2: batch 3 = 8+4", "send 2: batch 4 = 12+4"],
@@ -22,7 +22,7 @@ fn the_batches_of_a_lost_worker_are_retried_in_halves() {
     rig.check(answer(2, 5, 0, 4), &["send 2: batch 7 = 16+8"]);
 }
 
-/// A rig with job 1, of one realization, and job 2 of so many that there is always work.
+/// Returns a rig with job 1, of one realization, and job 2, of so many that there is always work.
 fn deadly() -> Rig {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
@@ -31,7 +31,8 @@ fn deadly() -> Rig {
     rig
 }
 
-/// Answers what a worker holds, and what it gets for that, a few times; never for job 1.
+/// Answers the batches that a worker holds, and their successors, a few times; never those of job
+/// 1.
 fn work(rig: &mut Rig, worker: u64) -> Vec<String> {
     let mut effects = Vec::new();
     for _ in 0..4 {
@@ -42,14 +43,14 @@ fn work(rig: &mut Rig, worker: u64) -> Vec<String> {
     effects
 }
 
-/// What a worker holds of a job.
+/// Returns the batches that a worker holds of a job.
 fn held(rig: &Rig, worker: u64, job: JobId) -> Vec<(u64, Assignment)> {
     let of_worker = rig.state.batches.iter().filter(|(_, it)| it.worker == WorkerId(worker));
     let batches = of_worker.map(|(id, batch)| (id.0, batch.assignment));
     batches.filter(|(_, assignment)| assignment.job == job).collect()
 }
 
-/// A process that is there for the first time works on a host, and dies as soon as it holds
+/// Attaches a new process on a host, which answers other work, and is lost as soon as it holds
 /// realization 0 of job 1 and nothing else.
 fn die(rig: &mut Rig, host: &str, worker: u64) {
     rig.event(hello_on(host, worker, worker as u32, 1));
@@ -58,7 +59,7 @@ fn die(rig: &mut Rig, host: &str, worker: u64) {
     assert_eq!(rig.event(end_of_stream(worker)), [""; 0]);
 }
 
-/// Lets time pass in which every worker is heard of; what happens then to job 1.
+/// Advances the time with heartbeats from every worker, and returns the effects on job 1.
 fn wait(rig: &mut Rig, time: Duration) -> Vec<String> {
     let workers: Vec<u64> = rig.state.workers.keys().map(|worker| worker.0).collect();
     for worker in workers {
@@ -71,13 +72,13 @@ fn wait(rig: &mut Rig, time: Duration) -> Vec<String> {
 
 const EXPIRY: Duration = Duration::from_secs(10);
 
-/// Workers on these hosts die over realization 0, the first together with other batches.
+/// Loses workers on these hosts over realization 0, the first together with other batches.
 fn check_deaths(hosts: &[&str], expected: Option<&str>) {
     let mut rig = deadly();
     for (worker, host) in (1..).zip(hosts) {
         die(&mut rig, host, worker);
     }
-    // They may come back.
+    // Until then they may come back.
     assert_eq!(wait(&mut rig, EXPIRY - Duration::from_millis(1)), [""; 0]);
     let effects = wait(&mut rig, Duration::from_millis(1));
     let reason = effects.first().and_then(|it| it.strip_prefix("store job 1 end: failed "));
@@ -88,14 +89,14 @@ fn check_deaths(hosts: &[&str], expected: Option<&str>) {
 #[test]
 fn a_realization_that_was_alone_on_three_lost_workers_fails_its_job() {
     check_deaths(&["a", "b", "c"], None);
-    let expected = "realization 0 was alone on 3 workers that vanished (b, c, d)";
+    let expected = "realization 0 was alone on 3 workers that were lost (b, c, d)";
     check_deaths(&["a", "b", "c", "d"], Some(expected));
-    // With one host only, three processes that had worked.
-    let expected = "realization 0 was alone on 3 workers that vanished (a)";
+    // With one host only, three processes that had answered something are enough.
+    let expected = "realization 0 was alone on 3 workers that were lost (a)";
     check_deaths(&["a"; 4], Some(expected));
 }
 
-/// The realization that others were lost over is computed by worker 5.
+/// Worker 5 computes the realization that others were lost over.
 fn worker_5_finishes_the_evaluation(rig: &mut Rig) {
     work(rig, 5);
     let batch = held(rig, 5, JobId(1))[0].0;
@@ -121,12 +122,12 @@ fn who_comes_back_in_time_did_not_die() {
         die(&mut rig, host, worker);
     }
     assert_eq!(wait(&mut rig, EXPIRY - Duration::from_millis(1)), [""; 0]);
-    // The process of worker 3 is back.
+    // The process of worker 3 comes back.
     rig.event(hello_on("c", 5, 3, 1));
     for _ in 0..5 {
         assert_eq!(wait(&mut rig, Duration::from_secs(5)), [""; 0]);
     }
-    // Its word is as good as another's.
+    // The answer of a returned worker counts like any other.
     worker_5_finishes_the_evaluation(&mut rig);
 }
 
@@ -135,7 +136,7 @@ fn pauses_of_the_coordinator_are_no_deaths() {
     let mut rig = deadly();
     for (worker, host) in [(1, "a"), (2, "b"), (3, "c"), (4, "d")] {
         die(&mut rig, host, worker);
-        // Its stream broke because the coordinator stood still; by now it is back.
+        // Its stream broke because the coordinator did not run; it has come back by now.
         rig.now += 2 * EXPIRY;
         assert_eq!(rig.event(Event::Tick), ["publish 1", "publish 2"]);
         rig.event(hello_on(host, 10 + worker, worker as u32, 1));
@@ -152,7 +153,7 @@ fn pauses_of_the_coordinator_are_no_deaths() {
 fn a_host_whose_workers_come_back_is_in_order() {
     let mut rig = deadly();
     for worker in 1..9 {
-        // One process: it is back each time. Another would not be.
+        // The same process attaches again each time; the other worker is a new process each time.
         rig.event(hello_on("a", worker, 1, 1));
         rig.event(hello_on("b", 10 + worker, worker as u32, 1));
         rig.event(end_of_stream(worker));
@@ -162,8 +163,8 @@ fn a_host_whose_workers_come_back_is_in_order() {
     }
 }
 
-/// A sound worker on `host` is attached; on `bad` one process after another starts, answers
-/// something if it `works`, and dies.
+/// Attaches a sound worker on `host`; on `bad` one process after another starts, answers something
+/// if it `works`, and is lost.
 fn check_bad_node(host: &str, bad: &str, works: bool) {
     let mut rig = deadly();
     rig.event(hello_on(bad, 1, 1, 1));
@@ -209,8 +210,8 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
         let effects = [wait(&mut rig, Duration::from_secs(1)), rig.event(end_of_stream(worker))];
         if process == 5 {
             let waits = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap().waiting_for;
-            let expected = "a sound worker for 1 realizations over which others vanished; the \
-                            last 3 workers of bad vanished with what they held";
+            let expected = "a reliable worker for 1 realizations over which others were lost; \
+                            the last 3 workers of bad were lost with their batches";
             assert_eq!(waits, expected);
         }
         let ended = effects.concat().into_iter().find(|it| it.starts_with("store job 1 end"));
@@ -218,10 +219,10 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
             break reason;
         }
     };
-    assert!(reason.contains("was alone on 10 workers that vanished (bad)"), "{reason}");
-    // Ten deaths in a row are no matter of seconds.
+    assert!(reason.contains("was alone on 10 workers that were lost (bad)"), "{reason}");
+    // Ten losses in a row take longer than a few seconds.
     assert!(rig.now > 5 * EXPIRY, "{:?}", rig.now);
-    // The case file is complete, and the realization to the bit.
+    // The case file is complete, and has the realization to the bit.
     let (_, text) = reason.split_once('\n').unwrap();
     let Case { setup, bone } = case_file::parse(text, Format::Toml).unwrap();
     let specification = propagation(1);
@@ -250,7 +251,7 @@ fn a_quarantined_realization_is_not_starved_by_the_queue_of_another_job() {
         rig.event(hello(worker, 1));
     }
     // Worker 1 is lost, and with it realization 0 of job 1 and the first four of job 2. Worker 2
-    // is not refilled, worker 3 is.
+    // gets no further batch, worker 3 does.
     rig.check(end_of_stream(1), &[]);
     rig.check(answer(2, 3, 4, 4), &[]);
     rig.check(answer(3, 5, 12, 4), &["send 3: batch 7 = 0+2"]);

@@ -1,11 +1,11 @@
-//! What is told to the log: one notice for each thing that an operator asks about.
+//! Notices: one log entry for each thing that operators ask about.
 
 use super::*;
 use crate::close_reason::CloseReason;
 use crate::notice::{Departure, Notice};
 
 impl Rig {
-    /// What an event tells to the log.
+    /// Returns the notices that an event causes.
     fn notices(&mut self, event: Event) -> Vec<Notice> {
         let effects = react(&mut self.state, event, self.now);
         let notices = effects.into_iter().filter_map(|effect| match effect {
@@ -76,7 +76,7 @@ fn a_worker_is_told_when_it_comes_and_when_it_goes_and_why() {
     let told = rig.notices(end_of_stream(1));
     assert_eq!(detached(&told), (1, 2, &Departure::StreamEnded));
     assert!(!detached(&told).2.is_orderly());
-    // One that is refused was never attached, and its going is no news.
+    // A refused worker was never attached, so its departure is not logged.
     let Event::Hello { worker, hello: mut foreign } = hello(2, 1) else { panic!("no hello") };
     foreign.fingerprint = "another".to_owned();
     foreign.host = "h".repeat(1000);

@@ -1,4 +1,4 @@
-//! Workers that give signs of life and do not answer.
+//! Workers that send heartbeats but do not answer.
 
 use super::checks::{ONE_BIT, wrong};
 use super::*;
@@ -8,11 +8,11 @@ use crate::job::Stage;
 use crate::worker_name::WorkerName;
 
 const SECOND: Duration = Duration::from_secs(1);
-/// No batch is overdue before.
+/// No batch is overdue before this time.
 const OVERDUE: Duration = Duration::from_secs(3);
 
-/// A propagation of so many realizations with workers 1, 2, … of one thread, each on a host of its
-/// own; such a fraction of the batches is audited.
+/// Returns a rig with a propagation of so many realizations and workers 1, 2, … of one thread, each
+/// on a host of its own; this fraction of the batches is audited.
 fn rig(realizations: u64, workers: u64, audit_fraction: f64) -> Rig {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = audit_fraction;
@@ -23,7 +23,7 @@ fn rig(realizations: u64, workers: u64, audit_fraction: f64) -> Rig {
     rig
 }
 
-/// A worker of one thread on a host of its own.
+/// Returns the hello event of a worker of one thread on a host of its own.
 fn on_its_own(worker: u64) -> Event {
     hello_on(&format!("host {worker}"), worker, worker as u32, 1)
 }
@@ -33,8 +33,8 @@ fn name(worker: u64) -> WorkerName {
 }
 
 impl Rig {
-    /// Lets time pass in which every worker is heard of, looking at it every 100 ms; what then
-    /// happens, snapshots and signs of life aside.
+    /// Advances the time in ticks of 100 ms, with heartbeats from every worker; returns the
+    /// effects, without snapshots and heartbeats.
     fn live(&mut self, time: Duration) -> Vec<String> {
         let end = self.now + time;
         let mut effects = Vec::new();
@@ -61,11 +61,11 @@ impl Rig {
 #[test]
 fn a_first_answer_that_is_overdue_twice_is_computed_by_a_third_worker() {
     let mut rig = rig(1, 3, 0.0);
-    // An idle worker gets a copy at once; it does not answer either.
+    // An idle worker gets a duplicate at once; it does not answer either.
     assert_eq!(rig.live(SECOND / 10), ["send 2: batch 2 = 0+1"]);
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
-    // The next one has twice as long.
+    // The next duplicate may take twice as long.
     rig.event(on_its_own(4));
     assert_eq!(rig.live(2 * OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 4: batch 4 = 0+1"]);
@@ -86,7 +86,7 @@ fn an_overdue_audit_goes_to_another_worker_but_not_to_whom_it_checks() {
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
     assert!(matches!(rig.batch(3).purpose, Purpose::Audit { .. }));
     rig.check(answer(3, 3, 0, 1), &["revoke 2: batch 2", "store job 1 evaluation 0"]);
-    // The late answer is compared no more: its evaluation is complete.
+    // The late answer is not compared, since its evaluation is complete.
     rig.check(answer(2, 2, 0, 1), &[]);
 }
 
@@ -101,7 +101,7 @@ fn an_overdue_audit_that_nobody_else_may_do_is_given_up() {
 #[test]
 fn audits_do_not_wait_for_workers_that_do_not_answer_each_other() {
     let mut rig = rig(100, 3, 1.0);
-    // Workers 2 and 3 hold as much as they may, and answer nothing; worker 1 answers all.
+    // Workers 2 and 3 hold as many batches as they may, and answer none; worker 1 answers all.
     for _ in 0..100 {
         let held = rig.state.workers[&WorkerId(1)].in_flight.clone();
         for id in held {
@@ -135,7 +135,7 @@ fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
     let mut rig = rig(1, 3, 1.0);
     rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
-    // Workers 1 and 2 are idle, and have said what they have to say.
+    // Workers 1 and 2 are idle, and have voted already.
     assert_eq!(rig.live(OVERDUE), [""; 0]);
     let waits = "a third worker, which decides between two whose answers differ (since 3 s); host 3 \
                  (process 3) is asked";
@@ -158,7 +158,7 @@ fn a_vote_of_a_worker_that_does_not_answer_is_not_waited_for_without_end() {
     assert!(effects[0].starts_with(failed), "{effects:?}");
 }
 
-/// A rig in which worker 2 holds realization 0 alone.
+/// Returns a rig in which worker 2 holds realization 0 alone.
 fn with_quarantined_realization() -> Rig {
     let mut rig = rig(1, 1, 0.0);
     rig.check(end_of_stream(1), &[]);
@@ -174,7 +174,7 @@ fn an_overdue_quarantined_realization_goes_alone_to_another_worker() {
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
     assert_eq!(rig.batch(3).purpose, Purpose::Exclusive);
-    // Nothing else goes to a worker that holds it.
+    // A worker that holds it gets no other work.
     rig.event(submit(1, "", propagation(8)));
     rig.check(stored(2, RecordKey::Job), &["answer 1: job 2"]);
     let effects = rig.event(answer(3, 3, 0, 1));
@@ -215,7 +215,8 @@ fn what_was_computed_ahead_and_not_answered_is_overdue_when_it_is_asked_for() {
     for worker in 1..=2 {
         rig.event(on_its_own(worker));
     }
-    // Worker 2 is ahead, and does not answer; nor does worker 1, which gets a copy in a moment.
+    // Worker 2 holds a speculative batch, and does not answer; nor does worker 1, which gets a
+    // duplicate in a moment.
     assert_eq!(rig.batch(2).purpose, Purpose::Speculative);
     assert_eq!(rig.event(answer(1, 1, 0, 1))[0], "store job 1 evaluation 0");
     rig.event(stored(1, RecordKey::Evaluation(0)));
@@ -257,7 +258,7 @@ fn where_other_work_waits_a_job_has_one_copy_out_at_a_time() {
     rig.check(on_its_own(2), &expected);
     assert_eq!(rig.live(OVERDUE), [""; 0]);
     rig.check(answer_in(1e-3, 2, 3, 0, 4), &["send 2: batch 5 = 0+1"]);
-    // The other one waits for what this one shows.
+    // The other batch waits for the result of this duplicate.
     let effects = rig.event(answer_in(1e-3, 2, 4, 4, 4));
     assert!(effects[0].starts_with("send 2: batch 6 = 8+"), "{effects:?}");
     let effects = rig.event(answer_in(1e-3, 2, 5, 0, 1));
@@ -268,18 +269,18 @@ fn where_other_work_waits_a_job_has_one_copy_out_at_a_time() {
 fn what_takes_long_everywhere_is_not_overdue() {
     let mut rig = rig(4, 2, 0.0);
     let all = |rig: &Rig| rig.state.batches.len();
-    // Each holds two batches of one realization, and nobody knows how long they take.
+    // Each holds two batches of one realization, and their duration is unknown.
     assert_eq!((rig.live(30 * SECOND), all(&rig)), (vec![], 4));
     rig.check(answer_in(30.0, 1, 1, 0, 1), &[]);
     // Now it is known.
     assert_eq!((rig.live(90 * SECOND - SECOND / 10), all(&rig)), (vec![], 3));
-    // Four times as long as one takes, and then only what may have been computed by then.
+    // Four times the duration of one, and then only batches that could have been computed by then.
     assert_eq!(rig.live(SECOND / 10), ["send 1: batch 5 = 2+1"]);
     assert_eq!(rig.live(110 * SECOND), [""; 0]);
 }
 
-/// A rig with a job of so many realizations of 1 ms that worker 1 takes part in and never answers,
-/// all others at once; until that is known of it.
+/// Returns a rig with a job of so many realizations of 1 ms: worker 1 never answers, all others
+/// answer at once, until worker 1 is on probation.
 fn with_silent_worker() -> Rig {
     let mut rig = rig(1, 0, 0.0);
     rig.event(request(1, Request::Cancel(JobId(1))));
@@ -296,8 +297,8 @@ fn with_silent_worker() -> Rig {
     panic!("worker 1 is not found out");
 }
 
-/// Runs a job of four realizations in which worker 1 does not answer; what worker 1 held in it at a
-/// time, and realizations of a batch, at most.
+/// Runs a job of four realizations in which worker 1 does not answer; returns the maximum number of
+/// batches that worker 1 held at a time, and of realizations in one of them.
 fn one_job(rig: &mut Rig) -> (usize, u64) {
     let job = rig.accept(propagation(4));
     let mut most = (0, 0);
@@ -342,10 +343,10 @@ fn who_does_not_answer_gets_one_realization_at_a_time_and_less_and_less_often() 
         let job = JobId(rig.state.next_job - 1);
         crate::snapshot::of(&rig.state, job, rig.now).unwrap().waiting_for
     };
-    // While it rests nobody waits for it.
+    // While it gets no work, no job waits for it.
     assert_eq!(waiting(&mut rig), "");
     rig.live(60 * SECOND);
-    let says = "host 1 (process 1) does not answer what it holds";
+    let says = "host 1 (process 1) does not answer its batches";
     assert!(waiting(&mut rig).contains(says), "{}", waiting(&mut rig));
 }
 
@@ -413,7 +414,7 @@ fn a_probation_is_remembered_for_the_worker_and_its_host() {
         let name = &rig.state.workers[&WorkerId(worker)].name;
         assert_eq!(rig.state.probation.has(name), on_probation, "{name}");
     }
-    // The other process of its host is tried at once.
+    // The other process of its host gets work at once.
     rig.accept(propagation(1000));
     let held = |worker| rig.state.workers[&WorkerId(worker)].in_flight.len();
     assert_eq!([11, 12, 13].map(held), [0, 1, 2]);
@@ -427,7 +428,7 @@ fn without_another_worker_the_lease_ends_after_ten_minutes_and_the_next_begins_o
                  answered yet";
     assert_eq!(rig.waits_for(), waits);
     let effects = rig.live(600 * SECOND);
-    let closed = "close 1: this worker has not answered anything it holds for 600.1s";
+    let closed = "close 1: this worker has not answered any of its batches for 600.1s";
     assert!(effects[0].starts_with(closed) && effects.len() == 1, "{effects:?}");
     rig.check(on_its_own(1), &["welcome 1, lease 2", "send 1: batch 3 = 2+1"]);
     rig.event(on_its_own(2));

@@ -1,11 +1,12 @@
-//! Ended jobs are forgotten when somebody wants it, or when they are old.
+//! Ended jobs are deleted on request, or when they are old.
 
 use super::*;
 use crate::event::Retention;
 
 const MINUTE: Duration = Duration::from_secs(60);
 
-/// Jobs 1, 2 and 3, which ended after one, two and three minutes, and job 4, which waits.
+/// Returns a rig with jobs 1, 2 and 3, which ended after one, two and three minutes, and job 4,
+/// which waits.
 fn rig() -> Rig {
     let mut rig = Rig::new();
     for job in 1..=3 {
@@ -49,13 +50,13 @@ fn a_job_is_there_until_the_store_has_forgotten_it() {
     let mut rig = rig();
     rig.check(prune(None, Some(1)), &["prune 1 2"]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
-    let refusal = "answer 7: the store does not forget ended jobs, none is removed: it is full";
+    let refusal = "answer 7: the store cannot delete the ended jobs; none was deleted: it is full";
     rig.check(pruned(&[1, 2], Err("it is full".to_owned())), &[refusal]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
     rig.check(pruned(&[1, 2], Ok(())), &["answer 7: pruned 2"]);
     let gone = "answer 8: no such job: 1";
     rig.check(request(8, Request::Fetch(JobId(1))), &[gone]);
-    // Its request id is free again, that of the others is not.
+    // Its request id is free again, those of the others are not.
     rig.check(submit(9, "request 1", propagation(2)), &["store job 5"]);
     rig.check(submit(9, "request 3", propagation(1)), &["answer 9: job 3"]);
 }
@@ -66,7 +67,7 @@ fn old_jobs_are_forgotten_unasked() {
     rig.state.config.keep_ended = Some(MINUTE * 3);
     rig.check_after(Duration::from_secs(61), &["prune 1"]);
     rig.check(Event::Pruned { token: None, jobs: vec![JobId(1)], outcome: Ok(()) }, &[]);
-    // It is looked once a minute.
+    // Old jobs are searched for once a minute.
     rig.check_after(Duration::from_secs(59), &[]);
     rig.check_after(Duration::from_secs(1), &["prune 2"]);
 }
@@ -77,13 +78,13 @@ fn a_clock_that_is_far_ahead_forgets_nothing_at_once() {
     for (keep, grace) in [(90 * DAY, 60 * MINUTE), (5 * MINUTE, 5 * MINUTE)] {
         let mut rig = rig();
         rig.state.config.keep_ended = Some(keep);
-        // The next life of the coordinator, on the same jobs.
+        // The next run of the coordinator, on the same jobs.
         rig.now += 3650 * DAY;
         (rig.state.started, rig.state.pruned) = (rig.now, None);
         rig.check_after(Duration::ZERO, &[]);
         rig.check_after(grace - MINUTE, &[]);
         rig.check_after(MINUTE, &["prune 1 2 3"]);
-        // Whoever asks for it gets it.
+        // A client's request is served all the same.
         rig.check(prune(Some(keep), None), &["prune 1 2 3"]);
     }
 }

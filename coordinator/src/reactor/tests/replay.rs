@@ -1,17 +1,17 @@
-//! Stored evaluations told again: after a ban, and after a restart.
+//! Replay of stored evaluations: after a ban, and after a restart.
 
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::event::Unread;
+use crate::event::ReadFailure;
 use crate::notice::Notice;
 use crate::reactor::Restored;
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, Store as _};
 use crate::worker_name::WorkerName;
 
-/// A search with `evaluations` of one realization in the store, each answered by one of these
-/// processes in turn, and then one under way.
+/// Returns a rig with a search that has `evaluations` of one realization in the store, each
+/// answered by one of these processes in turn, and then one under way.
 fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
@@ -33,19 +33,19 @@ fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
     (rig, store)
 }
 
-/// Answers what a job reads.
+/// Answers a read request of a job from the store.
 fn read(rig: &mut Rig, store: &MemoryStore, number: u64) -> Vec<String> {
     let found = Ok(store.clone().evaluation(JobId(1), number).unwrap());
     rig.event(Event::Read { job: JobId(1), number, found })
 }
 
-/// A batch of a job that somebody holds.
+/// Returns a batch of a job that a worker holds.
 fn batch_of(rig: &Rig, job: JobId) -> u64 {
     let held = rig.state.batches.iter().find(|(_, batch)| batch.assignment.job == job);
     held.map(|(id, _)| id.0).unwrap()
 }
 
-/// Has a worker in `process` contradict itself.
+/// Lets a worker in `process` contradict itself.
 fn expose(rig: &mut Rig, process: u32) -> Vec<String> {
     rig.accept(propagation(2));
     rig.event(hello_of(50, process, 1));
@@ -68,7 +68,7 @@ fn a_restarted_job_reads_one_evaluation_after_another() {
     assert_eq!(snapshot.evaluations, 3);
     assert_eq!(snapshot.waiting_for, "its stored evaluations, 0 of 3 are read again");
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
-    // An answer that comes twice means nothing.
+    // A repeated answer is ignored.
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     assert_eq!(read(&mut rig, &store, 1), ["read job 1 evaluation 2"]);
     assert_eq!(read(&mut rig, &store, 2), ["send 1: batch 1 = 0+1"]);
@@ -82,25 +82,25 @@ fn a_store_that_cannot_be_read_is_asked_again() {
     let mut rig = Rig { state, now: Duration::ZERO };
     rig.check(refused(0), &[]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
-    let waits = "the store does not give a record, it is tried again: the cable is out (since 0 s)";
+    let waits = "the store cannot read a record; retrying: the cable is out (since 0 s)";
     assert_eq!(snapshot.waiting_for, waits);
     rig.check_after(Duration::from_secs(2), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1"]);
 }
 
-/// The store cannot be read.
+/// Returns the event that the store could not be read.
 fn refused(number: u64) -> Event {
-    let found = Err(Unread::Refused { error: "the cable is out".to_owned() });
+    let found = Err(ReadFailure::Refused { error: "the cable is out".to_owned() });
     Event::Read { job: JobId(1), number, found }
 }
 
-/// What the store has is damaged.
+/// Returns the event that the stored record is damaged.
 fn damaged(number: u64) -> Event {
-    Event::Read { job: JobId(1), number, found: Err(Unread::Damaged) }
+    Event::Read { job: JobId(1), number, found: Err(ReadFailure::Damaged) }
 }
 
-/// A restarted coordinator with worker 1, about to read the first evaluation of a job.
+/// Returns a restarted coordinator with worker 1, about to read the first evaluation of a job.
 fn restarted(store: &mut MemoryStore) -> Rig {
     let restored = Restored::load(store).unwrap();
     let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
@@ -132,7 +132,7 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     rig.check(damaged(0), &["send 1: batch 1 = 0+1"]);
     rig.event(answer(1, 1, 700, 1));
     rig.check(stored(1, RecordKey::Evaluation(0)), &["read job 1 evaluation 1"]);
-    // It leads elsewhere: the second evaluation is at the same point, the third is not.
+    // The search takes another path: the second evaluation is at the same point, the third is not.
     let mut number = 1;
     while read(&mut rig, &store, number) == [format!("read job 1 evaluation {}", number + 1)] {
         number += 1;
@@ -149,7 +149,7 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
 fn a_job_whose_evaluations_cannot_be_read_is_cancelled_at_once() {
     let cancel = || request(7, Request::Cancel(JobId(1)));
     let end = ["store job 1 end: cancelled "];
-    // Before the store has refused, after that, and when what it has is damaged.
+    // Before the store has refused, after that, and when the stored record is damaged.
     let (_, mut store) = rig(&[1], 2);
     let mut rig = restarted(&mut store);
     rig.check(cancel(), &[]);
@@ -193,7 +193,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), [""; 0]);
     rig.event(hello_of(60, 3, 1));
-    // The same again: what is stored after it is right, and read.
+    // The outcomes are the same: the evaluations stored after it are right, and read.
     let again = answer(60, batch_of(&rig, JobId(1)), 1, 1);
     let effects = react(&mut rig.state, again, rig.now);
     let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
@@ -221,7 +221,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
     let EvaluationRecord { number: 0, .. } = record else { panic!("{record:?}") };
     store.put_evaluation(record, true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
-    // What comes next is computed, not read.
+    // The following evaluations are computed, not read.
     let effects = rig.event(stored(1, RecordKey::Evaluation(0)));
     assert!(effects.iter().all(|effect| effect.starts_with("send")), "{effects:?}");
 }
@@ -229,7 +229,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
 #[test]
 fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
     let (mut rig, _) = rig(&[2], 1);
-    rig.state.config.store_patience = Some(Duration::from_secs(4));
+    rig.state.config.store_give_up_after = Some(Duration::from_secs(4));
     let banned = expose(&mut rig, 2).swap_remove(0);
     let failed = || Event::StoreFailed {
         job: JobId(2),
@@ -240,12 +240,13 @@ fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
         rig.check(failed(), &[]);
         rig.check_after(Duration::from_secs(2), &[&banned]);
     }
-    rig.check(failed(), &["despair after 4s: the disk is full"]);
+    rig.check(failed(), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &[&banned]);
     rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
 }
 
-/// A search of one evaluation, answered by process 2, whose end the store has refused.
+/// Returns a rig with a search of one evaluation, answered by process 2, whose end the store has
+/// refused.
 fn refused_end() -> Rig {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
@@ -264,15 +265,15 @@ fn not_stored(job: u64, key: RecordKey) -> Event {
 
 #[test]
 fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
-    // Refused before the worker is found out.
+    // Refused before the worker is banned.
     let mut rig = refused_end();
     rig.check(not_stored(1, RecordKey::End), &[]);
     expose(&mut rig, 2);
     rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
-    // Nothing is written meanwhile that is not so.
+    // No wrong end is written meanwhile.
     rig.check_after(Duration::from_secs(1), &[]);
 
-    // On its way by then, and refused after that.
+    // On its way when the worker is banned, and refused after that.
     for again in [false, true] {
         let mut rig = refused_end();
         if again {

@@ -1,11 +1,11 @@
-//! Points that are computed before the search asks for them.
+//! Speculative evaluations.
 
 use super::*;
 use crate::batch::Purpose;
 use crate::job::Stage;
 
-/// A search over one parameter, whose second point is known from the first on, with workers 1, 2, …
-/// of one thread, each on a host of its own.
+/// Returns a rig with a search over one parameter, whose second point is known from the first on,
+/// and workers 1, 2, … of one thread, each on a host of its own.
 fn rig(workers: u32) -> Rig {
     let mut rig = Rig::speculating();
     rig.state.config.audit_fraction = 0.0;
@@ -30,7 +30,7 @@ fn an_idle_worker_computes_the_next_point_and_nobody_sees_it_before_its_time() {
     assert_eq!(job.evaluation().map(|evaluation| evaluation.filled()), Some(0));
     assert_eq!(job.rate.per_second(rig.now), 0.0);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    // What is there is all there is to it: it is stored at once.
+    // The speculative evaluation is complete, so it is stored at once.
     let expected = ["store job 1 evaluation 1", "send 1: batch 3 = 0+1", "send 2: batch 4 = 0+1"];
     rig.check(evaluation(0), &expected);
 }
@@ -70,7 +70,7 @@ fn other_work_takes_its_place() {
     rig.event(submit(1, "", propagation(1)));
     let expected = ["answer 1: job 2", "revoke 2: batch 2", "send 2: batch 3 = 0+1"];
     rig.check(stored(2, RecordKey::Job), &expected);
-    // When that is done, it is taken up again.
+    // When that is done, speculation continues.
     rig.check(answer(2, 3, 0, 1), &["store job 2 evaluation 0", "send 2: batch 4 = 0+1"]);
 }
 
@@ -80,7 +80,7 @@ fn threads_that_a_batch_leaves_idle_are_used() {
     rig.accept(identification(2));
     let expected = ["welcome 1, lease 1", "send 1: batch 1 = 0+2", "send 1: batch 2 = 0+2"];
     rig.check(hello(1, 4), &expected);
-    // A thread has room for one more, the worker has no room for one more batch.
+    // The worker may hold no further batch beside the speculative one, which is revoked.
     rig.event(submit(1, "", propagation(1)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+1"];
     rig.check(stored(2, RecordKey::Job), &expected);
@@ -106,7 +106,7 @@ fn nobody_else_is_risked_for_a_point_over_which_a_worker_was_lost() {
     rig.check(end_of_stream(2), &[]);
     rig.check(hello_on("host 3", 3, 3, 1), &["welcome 3, lease 3"]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    // Now it is asked for, and goes alone to whom most may be expected of.
+    // Now the search asks for it, and it goes alone to the worker with the best reputation.
     rig.check(evaluation(0), &["send 1: batch 3 = 0+1"]);
     assert_eq!(rig.state.batches[&BatchId(3)].purpose, Purpose::Exclusive);
 }
@@ -125,7 +125,7 @@ fn memory_is_for_what_is_asked_for() {
     rig.accept(identification(2));
     rig.event(hello(1, 4));
     assert_eq!(rig.state.jobs[&JobId(1)].speculation.evaluations.len(), 1);
-    // Another job begins, and there is no room for both.
+    // Another job begins, and the limit on realizations in memory leaves no space for both.
     rig.event(submit(1, "", propagation(2)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+2"];
     rig.check(stored(2, RecordKey::Job), &expected);

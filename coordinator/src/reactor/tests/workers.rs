@@ -1,4 +1,4 @@
-//! Workers: admitted, refused, silent, leaving.
+//! Workers: admitted, refused, silent, draining.
 
 use super::*;
 use crate::close_reason::CloseReason;
@@ -40,7 +40,7 @@ fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
     ] {
         let mut rig = Rig::with(100, &[]);
         rig.check(event, &[expected]);
-        // Later messages of a refused worker mean nothing.
+        // Later messages of a refused worker are ignored.
         rig.check(Event::Heartbeat { worker: WorkerId(1) }, &[]);
         rig.check(answer(1, 1, 0, 1), &[]);
         rig.check(end_of_stream(1), &[]);
@@ -51,7 +51,7 @@ fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
 fn a_second_hello_ends_the_stream() {
     let mut rig = Rig::new();
     rig.check(hello(1, 1), &["welcome 1, lease 1"]);
-    rig.check(hello(1, 1), &["close 1: this worker said hello twice on one stream"]);
+    rig.check(hello(1, 1), &["close 1: this worker sent a second hello on one stream"]);
     rig.check(hello(2, 1), &["welcome 2, lease 2"]);
 }
 
@@ -61,10 +61,10 @@ fn a_silent_worker_loses_its_lease() {
     rig.check_after(Duration::from_secs(9), &[]);
     rig.hear(1);
     rig.check_after(Duration::from_secs(10), &[]);
-    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+    let expired = "close 1: no message came from this worker for 10.001s; its lease has ended, \
                    attach again";
     rig.check_after(Duration::from_millis(1), &[expired]);
-    // What it says later means nothing, what it held goes to the next.
+    // Its later messages are ignored, and its batches go to the next worker.
     rig.check(answer(1, 1, 0, 4), &[]);
     rig.check(
         hello(2, 1),
@@ -81,9 +81,9 @@ fn while_the_coordinator_stands_still_nobody_is_silent() {
         let effects = rig.event(Event::Tick);
         assert!(!effects.iter().any(|effect| effect.starts_with("close")), "{effects:?}");
     }
-    // It was silent for nine seconds before, and it still is.
+    // It was silent for nine seconds before, and still is.
     rig.check_after(Duration::from_secs(1), &[]);
-    let expired = "close 1: nothing was heard of this worker for 10.001s; its lease has ended, \
+    let expired = "close 1: no message came from this worker for 10.001s; its lease has ended, \
                    attach again";
     rig.check_after(Duration::from_millis(1), &[expired]);
 }
@@ -107,7 +107,7 @@ fn a_worker_that_lives_but_never_answers_loses_its_lease() {
         rig.check_after(Duration::from_secs(6), &[]);
     }
     rig.hear(1);
-    let closed = "close 1: this worker has not answered anything it holds for 600.1s; its lease \
+    let closed = "close 1: this worker has not answered any of its batches for 600.1s; its lease \
                   has ended, attach again";
     rig.check_after(Duration::from_millis(100), &[closed]);
 }
@@ -119,7 +119,7 @@ fn a_malformed_answer_ends_the_stream_and_its_batches_return() {
     rig.check(answer(1, 1, 0, 3), &[closed]);
     let mut rig = Rig::with(8, &[1]);
     let reason = CloseReason::SecondHello;
-    let closed = "close 1: this worker said hello twice on one stream";
+    let closed = "close 1: this worker sent a second hello on one stream";
     rig.check(Event::Misbehaved { worker: WorkerId(1), reason }, &[closed]);
     rig.check(
         hello(2, 1),
@@ -142,7 +142,7 @@ fn a_leaving_worker_gets_no_more_and_is_dismissed_when_it_has_answered() {
 #[test]
 fn answers_to_unknown_batches_mean_nothing() {
     let mut rig = Rig::with(100, &[1, 1]);
-    // A number nobody has, and one that another worker has.
+    // An unknown batch, and one that another worker holds.
     rig.check(answer(1, 99, 0, 4), &[]);
     rig.check(answer(1, 3, 8, 4), &[]);
     let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
@@ -174,7 +174,7 @@ fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
     assert_eq!((gone.worker, gone.host.as_str(), gone.process), (1, "node", 42));
     assert_eq!((gone.batches, gone.reason.as_str()), (2, "its connection ended"));
     assert_eq!(gone.depart_time.map(|time| time.seconds), Some(3));
-    // However many come and go.
+    // However many come and go, the number of departed workers is limited.
     for worker in 3..200 {
         rig.event(hello(worker, 1));
         rig.event(end_of_stream(worker));
@@ -189,7 +189,7 @@ fn a_worker_that_is_sent_away_gets_nothing_more_and_leaves_when_it_has_answered(
     let mut rig = Rig::with(1000, &[1]);
     let drain = |worker| request(7, Request::DrainWorker(WorkerId(worker)));
     rig.check(drain(1), &["drain 1", "answer 7: worker 1 Draining"]);
-    // Once is enough.
+    // A second request changes nothing.
     rig.check(drain(1), &["answer 7: worker 1 Draining"]);
     let unknown = "answer 7: no worker with number 5 is attached";
     rig.check(drain(5), &[unknown]);

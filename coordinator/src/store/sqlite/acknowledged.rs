@@ -1,13 +1,13 @@
-//! A mark beside the database: the highest job that a client was told is accepted.
+//! A mark beside the database: the highest job whose acceptance was reported to a client.
 //!
-//! A write-ahead log that is cut short or damaged in its tail is a shorter log to SQLite: what was
-//! behind is gone, and nothing says so. The mark is outside of the log. It is written after a job is
-//! durable and before its client hears of it, so it is never ahead of the database, wherever a
-//! process dies; a database that knows fewer jobs than the mark has lost some.
+//! To SQLite, a write-ahead log that is truncated or damaged at its end is just a shorter log: the
+//! later records are lost without an error. The mark is outside the log. It is written after a job
+//! is durable and before its client is answered, so it is never ahead of the database, wherever a
+//! process dies; a database that has fewer jobs than the mark has lost some.
 //!
-//! The file has two slots in blocks of their own, written in turn, each with a checksum: a write that
-//! was torn leaves the other one. It has its full length from the beginning, so a write is one to a
-//! place that the disk has given already.
+//! The file has two slots in separate blocks, written in turn, each with a checksum: a torn write
+//! leaves the other slot intact. The file has its full length from the beginning, so a write only
+//! changes space that is already allocated.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
@@ -22,18 +22,19 @@ use crate::store::StoreError;
 
 /// Name of the file in the store's directory.
 pub(super) const MARK: &str = "osteon.acknowledged";
-/// Size of a slot, bytes: no disk or file system writes less than this at once and more than one.
+/// Size of a slot, bytes: each slot is in blocks of its own on any disk or file system, so that a
+/// write to one never touches the other.
 const SLOT_BYTES: usize = 4096;
 const SLOTS: u64 = 2;
 const LENGTH: u64 = SLOTS * SLOT_BYTES as u64;
 
-/// What to do with a database that knows fewer jobs than were acknowledged.
+/// Reaction to a database that has fewer jobs than were acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LostJobs {
     /// Refuse it.
     #[default]
     Refuse,
-    /// Go on without them. Their identifiers are not given again.
+    /// Continue without them. Their identifiers are not assigned again.
     Accept,
 }
 
@@ -42,25 +43,25 @@ pub enum LostJobs {
 pub(super) struct Mark {
     file: File,
     path: PathBuf,
-    /// Highest acknowledged job; 0: none.
+    /// Highest acknowledged job; 0 if there is none.
     last: u64,
     /// The slot that holds it.
     slot: u64,
 }
 
-/// What the file of a mark says.
+/// Contents of a mark file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// There is no such file.
+    /// The file does not exist.
     Nothing,
-    /// It cannot be read as a mark.
+    /// The file is not a valid mark.
     Damaged,
-    /// This job, in this slot.
+    /// The highest acknowledged job, and the slot that holds it.
     Job { last: u64, slot: u64 },
 }
 
 impl Mark {
-    /// What the mark in `directory` says.
+    /// Reads the mark in `directory`.
     ///
     /// # Errors
     /// When it cannot be read.
@@ -74,8 +75,8 @@ impl Mark {
         }
     }
 
-    /// Opens the mark in `directory`, which said `found`; a new one, of the job `last`, takes the
-    /// place of one that is not there, is damaged, or says another.
+    /// Opens the mark in `directory`, whose contents are `found`. It is replaced by a new one with
+    /// the job `last` if it is missing, is damaged, or names another job.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -98,7 +99,7 @@ impl Mark {
         }
     }
 
-    /// The mark of `directory`, on a disk that takes nothing.
+    /// Returns the mark of `directory`, opened so that writes fail.
     #[cfg(test)]
     pub(super) fn unwritable(directory: &Path, last: u64) -> Self {
         let path = directory.join(MARK);
@@ -106,7 +107,7 @@ impl Mark {
         Self { file, path, last, slot: 0 }
     }
 
-    /// Makes durable that `job` is acknowledged, if that is not known already.
+    /// Makes durable that `job` is acknowledged, unless a job at or above it is already.
     ///
     /// # Errors
     /// When it is not durable.
@@ -125,10 +126,10 @@ impl Mark {
     }
 }
 
-/// The highest acknowledged job of a database that knows of `known`.
+/// Returns the highest acknowledged job of a database whose highest job is `known`.
 ///
 /// # Errors
-/// When the mark `found` says that jobs are missing, or says nothing, unless that is accepted.
+/// When the mark `found` shows that jobs are missing, or is damaged, unless that is accepted.
 pub(super) fn checked(
     found: &Found,
     known: u64,
@@ -154,14 +155,14 @@ pub(super) fn checked(
     }
 }
 
-/// Makes the file in one step: nobody finds a part of it.
+/// Creates the file atomically: it is never seen partly written.
 fn make(directory: &Path, path: &Path, last: u64) -> io::Result<()> {
     let part = path.with_extension("acknowledged.part");
     let mut options = OpenOptions::new();
     let options = options.write(true).create(true).truncate(false).mode(FILE_MODE);
     let mut file = user_file::open_with(options, &part)?;
     file.set_len(0)?;
-    // Both slots: what an older file said is not wanted any more.
+    // Both slots are written, because the contents of an older file are obsolete.
     file.write_all(&text(last))?;
     file.write_all(&text(last))?;
     file.sync_all()?;
@@ -169,7 +170,7 @@ fn make(directory: &Path, path: &Path, last: u64) -> io::Result<()> {
     File::open(directory)?.sync_all()
 }
 
-/// A slot: a line for people, with its checksum, and space up to its length.
+/// Returns the contents of a slot: a readable line with its checksum, padded with spaces.
 fn text(last: u64) -> Vec<u8> {
     let line = format!("last acknowledged job {last}");
     let checksum = blake3::hash(line.as_bytes());
@@ -179,7 +180,7 @@ fn text(last: u64) -> Vec<u8> {
     bytes
 }
 
-/// The highest job of the slots that are whole.
+/// Returns the highest job of the intact slots.
 fn found(bytes: &[u8]) -> Found {
     let slots = bytes.chunks(SLOT_BYTES).zip(0_u64..);
     let whole = slots.filter_map(|(bytes, slot)| {
@@ -227,7 +228,7 @@ mod tests {
             }
         }
         drop(mark);
-        // The next life goes on in the other slot.
+        // The next run continues in the other slot.
         let found = said(directory);
         let mut mark = Mark::open(directory, &found, 4).unwrap();
         mark.acknowledge(JobId(3)).unwrap();

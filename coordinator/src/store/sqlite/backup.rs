@@ -1,5 +1,5 @@
-//! A copy of the file while it is in use, by SQLite's online backup: piece by piece on the
-//! connection that also writes, so that the copy has what is written between two pieces.
+//! Copies the file while it is in use, by SQLite's online backup: piece by piece on the connection
+//! that also writes, so that the copy includes the writes between two pieces.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -13,15 +13,15 @@ use rusqlite::backup::{Backup, StepResult};
 use super::opening;
 use crate::store::StoreError;
 
-/// Name of the copy in the store's directory, while it is made.
+/// Name of the copy in the store's directory, while it is being made.
 const COPY: &str = "osteon.backup";
-/// Pages of one piece: with pages of 4 KiB a piece is 1 MiB, which takes milliseconds.
+/// Number of pages in one piece: with pages of 4 KiB a piece is 1 MiB, which takes milliseconds.
 const PIECE_PAGES: i32 = 256;
-/// Measurements are nobody else's business.
+/// Measurements are private to their owner.
 const COPY_MODE: u32 = 0o600;
 
-/// Copies the database of `connection`, which is the file `store`, and calls `between` between two
-/// pieces; see [`crate::store::Store::copy`].
+/// Copies the database of `connection`, which is the file `store`, and calls `between` after each
+/// piece; see [`crate::store::Store::copy`].
 pub(super) fn copy(
     connection: &Connection,
     store: &Path,
@@ -33,25 +33,25 @@ pub(super) fn copy(
     options.read(true).write(true).create_new(true).mode(COPY_MODE);
     let file = options.open(&path).map_err(|error| failed(&path, error))?;
     let whole = copy_pages(connection, &path, between);
-    // Whatever came of it; it stays readable through `file`.
+    // Removed in any case; a complete copy remains readable through `file`.
     remove(&path)?;
     let whole = whole.map_err(|source| opening::refusal(&path, source))?;
     Ok(whole.then_some(file))
 }
 
-/// Removes what a coordinator that was killed has left in the directory of `store`.
+/// Removes the copy that a killed coordinator left in the directory of `store`.
 pub(super) fn remove_leftover(store: &Path) -> Result<(), StoreError> {
     remove(&store.with_file_name(COPY))
 }
 
-/// Copies page after page; whether it came to its end.
+/// Copies all pages; returns whether the copy is complete.
 fn copy_pages(
     connection: &Connection,
     path: &Path,
     between: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> rusqlite::Result<bool> {
     let mut copy = Connection::open(path)?;
-    // What is half a copy after a crash is of no use: it needs neither journal nor sync.
+    // A partial copy after a crash is useless, so the copy needs neither journal nor sync.
     copy.pragma_update(None, "journal_mode", "OFF")?;
     copy.pragma_update(None, "synchronous", "OFF")?;
     let backup = Backup::new(connection, &mut copy)?;
@@ -85,7 +85,7 @@ mod tests {
     use crate::store::sqlite::tests::{evaluation, job};
     use crate::store::{Store as _, StoredJob};
 
-    /// A store with evaluations of some 4 MB in all.
+    /// Returns a store with evaluations of about 4 MB in all.
     fn filled(directory: &Path) -> SqliteStore {
         let mut store = SqliteStore::open(directory).unwrap();
         store.put_job(&job(1)).unwrap();
@@ -97,7 +97,7 @@ mod tests {
         store
     }
 
-    /// What a coordinator finds that starts on the copy.
+    /// Returns the contents that a coordinator finds when it starts on the copy.
     fn restored(mut copy: File) -> (Vec<StoredJob>, Option<crate::ids::JobId>) {
         let directory = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
@@ -118,8 +118,8 @@ mod tests {
             .copy(&mut |store| {
                 pieces += 1;
                 if pieces == 1 {
-                    // Into pages that are copied already, and behind the last one.
-                    store.forget_jobs(&[crate::ids::JobId(7)]).unwrap();
+                    // Into pages that have been copied already, and after the last one.
+                    store.delete_jobs(&[crate::ids::JobId(7)]).unwrap();
                     store.put_job(&job(2)).unwrap();
                     store.put_evaluation(&evaluation(1, 0), false).unwrap();
                     store.put_evaluation(&evaluation(1, 100), false).unwrap();
@@ -143,7 +143,7 @@ mod tests {
         let copy = store.copy(&mut |_| ControlFlow::Break(())).unwrap();
         assert!(copy.is_none());
         assert!(!directory.path().join(COPY).exists());
-        // What a kill left is removed, by the next copy and by the next start.
+        // The copy of a killed coordinator is removed by the next copy and by the next start.
         fs::write(directory.path().join(COPY), "half a copy").unwrap();
         assert!(store.copy(&mut |_| ControlFlow::Continue(())).unwrap().is_some());
         fs::write(directory.path().join(COPY), "half a copy").unwrap();

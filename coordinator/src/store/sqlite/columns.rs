@@ -1,4 +1,4 @@
-//! Records as columns, their checksums, and back.
+//! Converts records to columns and back, with their checksums.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use crate::ids::JobId;
 use crate::store::{BanRecord, EndRecord, EvaluationRecord};
 use crate::worker_name::WorkerName;
 
-/// Bytes of an outcome in a blob: its code, its velocity as little-endian f64.
+/// Size of an outcome in a blob, bytes: its code, and its velocity as little-endian f64.
 const OUTCOME_BYTES: usize = 9;
 
-/// The evaluation of a row, and its number; `None` if it is damaged.
+/// Returns the evaluation of a row, and its number; `None` if it is damaged.
 pub(super) fn evaluation(
     job: JobId,
     row: &Row<'_>,
@@ -39,12 +39,12 @@ pub(super) fn evaluation(
     Ok((number, intact.then(unpacked).flatten()))
 }
 
-/// Nanoseconds as the file holds them: SQLite knows signed integers only.
+/// Returns nanoseconds as stored: SQLite has only signed integers.
 pub(super) fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).map_or(i64::MAX as u64, |ns| ns.min(i64::MAX as u64))
 }
 
-/// The columns of a job that its checksum is over.
+/// The columns of a job that its checksum covers.
 pub(super) struct JobColumns<'a> {
     pub(super) job: JobId,
     pub(super) request_id: &'a str,
@@ -78,7 +78,7 @@ pub(super) fn ban_checksum(record: &BanRecord) -> Vec<u8> {
     checksum(&fields)
 }
 
-/// Errors that are absent are an empty field.
+/// Returns the checksum of an evaluation. Absent estimated errors are an empty field.
 pub(super) fn evaluation_checksum(
     job: JobId,
     number: u64,
@@ -112,7 +112,8 @@ pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
     let numerics = numerics.to_le_bytes();
     fields.extend([ending.status.name().as_bytes(), version.as_bytes(), &numerics]);
     let commit = commit.as_ref().map(|commit| commit.as_bytes().to_vec());
-    // What is absent has no field, and a field of one byte says that it is present.
+    // A field of one byte tells whether an optional value is present; an absent one has no further
+    // field.
     let optional =
         [failure, reason, optional(*best_cost), optional(mean), optional(variation), commit];
     for value in &optional {
@@ -122,7 +123,7 @@ pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
     checksum(&fields)
 }
 
-/// BLAKE3 over fields, each after its length.
+/// Returns the BLAKE3 hash of fields, each preceded by its length.
 pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
     let mut hasher = blake3::Hasher::new();
     for field in fields {
@@ -169,8 +170,8 @@ fn unpack(point: &[u8]) -> Option<Point> {
     rest.is_empty().then(|| values.try_into().ok().map(Point)).flatten()
 }
 
-/// A line for each worker: its process, a stroke and the number it drew in hexadecimal, a space, its
-/// host.
+/// Packs worker names, one line each: the process, a slash and the number that it drew in
+/// hexadecimal, a space, the host.
 pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
     let line = |worker: &WorkerName| {
         format!("{}/{:x} {}", worker.process(), worker.instance(), worker.host())

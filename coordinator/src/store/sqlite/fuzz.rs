@@ -1,6 +1,6 @@
-//! Rows whose columns are damaged though their checksums are right, as another program may write
-//! them: a typed refusal or a record, never a panic, within a bound of processor time. What is read
-//! is put and read again, alike.
+//! Rows with damaged columns but valid checksums, as another program may write them. Reading one
+//! must give a typed error or a record, never a panic, within a limit of processor time. A record
+//! that is read is written and read again, unchanged.
 
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
 use osteon_proto::results;
@@ -9,13 +9,13 @@ use super::summary::summary_checksum;
 use super::tests::{end, evaluation, job, summary};
 use super::*;
 
-/// The columns of an evaluation that are unpacked.
+/// The columns of an evaluation that are decoded.
 const COLUMNS: [&str; 4] = ["point", "outcomes", "estimated_error", "workers"];
-/// Longest refusal, bytes.
+/// Maximum length of an error message, bytes.
 const REFUSAL_BYTES_MAX: usize = 4096;
 const JOB: JobId = JobId(1);
 
-/// A store with job 1, its evaluation 2 and its end, that takes no care of power cuts.
+/// Returns a store with job 1, its evaluation 2 and its end, without protection against power loss.
 fn store(directory: &Path) -> SqliteStore {
     let mut store = SqliteStore::open(directory).unwrap();
     store.connection.pragma_update(None, "synchronous", false).unwrap();
@@ -25,7 +25,7 @@ fn store(directory: &Path) -> SqliteStore {
     store
 }
 
-/// What was read, if it was; a refusal is typed, and somebody can read it.
+/// Returns the record that was read, if any; an error must be typed and readable.
 fn accepted<T>(read: Result<Option<T>, StoreError>) -> Option<T> {
     read.unwrap_or_else(|error| {
         let text = error.to_string();
@@ -34,7 +34,7 @@ fn accepted<T>(read: Result<Option<T>, StoreError>) -> Option<T> {
     })
 }
 
-/// `damage` stands in one column of an evaluation.
+/// Writes `damage` into one column of an evaluation and reads it.
 fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     let whole = evaluation(1, 2);
     let (point, outcomes) = (pack_point(whole.point), pack_outcomes(&whole.outcomes));
@@ -43,7 +43,7 @@ fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     let mut columns = [point, outcomes, errors, workers];
     columns[column] = damage.to_vec();
     let [point, outcomes, errors, workers] = &columns;
-    // No checksum is over what is no text.
+    // A column of text that is not valid UTF-8 is replaced for the checksum.
     let text = std::str::from_utf8(workers).unwrap_or_default();
     let checksum = evaluation_checksum(JOB, 2, point, outcomes, Some(errors), text);
     let sql = "UPDATE evaluation SET point = ?1, outcomes = ?2, estimated_error = ?3,
@@ -54,12 +54,12 @@ fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     if let Some(record) = accepted(read) {
         store.put_evaluation(&record, false).unwrap();
         let again = store.evaluation(JOB, 2).unwrap().unwrap();
-        // NaN equals nothing.
+        // Compared as text, since NaN is not equal to itself.
         assert_eq!(format!("{again:?}"), format!("{record:?}"), "{}", COLUMNS[column]);
     }
 }
 
-/// `damage` is the specification of a job.
+/// Writes `damage` as the specification of a job and reads it.
 fn check_specification(store: &mut SqliteStore, damage: &[u8]) {
     let record = job(1);
     let checksum = job_checksum(&job_columns(&record, damage));
@@ -73,7 +73,7 @@ fn check_specification(store: &mut SqliteStore, damage: &[u8]) {
     }
 }
 
-/// `damage` is the history of an ended job.
+/// Writes `damage` as the history of an ended job and reads it.
 fn check_history(store: &mut SqliteStore, damage: &[u8]) {
     let Summary { digest, best, .. } = summary(1);
     let checksum = summary_checksum(JOB, &digest, best, damage);
@@ -86,7 +86,7 @@ fn check_history(store: &mut SqliteStore, damage: &[u8]) {
     }
 }
 
-/// Every seed as it is, then many damaged ones.
+/// Checks every seed unchanged, then many damaged ones.
 fn run(seeds: Vec<Vec<u8>>, mut check_one: impl FnMut(&mut SqliteStore, &[u8])) {
     let directory = tempfile::tempdir().unwrap();
     let store = std::cell::RefCell::new(store(directory.path()));
@@ -100,7 +100,7 @@ fn run(seeds: Vec<Vec<u8>>, mut check_one: impl FnMut(&mut SqliteStore, &[u8])) 
     });
 }
 
-/// A name by which `cargo xtask random` finds them.
+/// The name by which `cargo xtask random` finds these tests.
 mod on_random_cases {
     use super::*;
 

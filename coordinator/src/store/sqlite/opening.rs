@@ -1,5 +1,5 @@
-//! Opening the file: whose it is, on which kind of disk it lies, of which format it is. Nothing of
-//! a file that is refused is changed.
+//! Opens the file: takes the lock, finds out the kind of file system, and checks the format. A file
+//! that is refused is not changed.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write as _};
@@ -15,34 +15,34 @@ use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 use super::schema::SCHEMA;
 use crate::store::StoreError;
 
-/// The one format that this program reads and writes.
+/// The only format that this program reads and writes.
 pub(super) const FORMAT: i64 = 6;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
-/// Name of the file that says who has the store open.
+/// Name of the lock file, which names the process that has the store open.
 const LOCK: &str = "osteon.lock";
-/// How long to wait for a coordinator that is just ending.
+/// Time to wait for another coordinator that is about to end.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(2);
-/// Longest text of a lock that is shown, bytes.
+/// Maximum length of the text in a lock file that is shown, bytes.
 const HOLDER_BYTES_MAX: u64 = 256;
 
-/// Mode of a new directory, and of a new file: measurements are nobody else's business.
+/// Mode of a new directory and of a new file: measurements are private to their owner.
 const DIRECTORY_MODE: u32 = 0o700;
 pub(super) const FILE_MODE: u32 = 0o600;
-/// The bits of a mode that concern others than the owner.
+/// The mode bits of users other than the owner.
 const OTHERS: u32 = 0o077;
 
-/// How changes are made safe against a crash.
+/// Method that protects changes against a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Journal {
-    /// A log beside the file: fast, on disks of this machine.
+    /// A write-ahead log beside the file: fast, for local disks.
     WriteAhead,
-    /// A copy of what is overwritten: on disks that are shared over a network.
+    /// A copy of the overwritten pages: for disks that are shared over a network.
     Rollback,
 }
 
-/// Opens the file in `directory`, making both if need be; the lock is held as long as the file. What
-/// `accept` says of it, before anything in it is changed.
+/// Opens the file in `directory`, creating both if necessary; the lock is held as long as the file
+/// is open. Calls `accept` before anything in the file is changed, and returns its result.
 pub(super) fn open<T>(
     directory: &Path,
     accept: impl FnOnce(&Connection, &Path) -> Result<T, StoreError>,
@@ -65,14 +65,14 @@ pub(super) fn open<T>(
     Ok((connection, lock, path, accepted))
 }
 
-/// Makes a directory that only this user can enter, and those on the way to it; one that is there
-/// stays as it is.
+/// Creates a directory that only this user can access, and its parents; an existing one is not
+/// changed.
 pub(super) fn make_directory(directory: &Path) -> io::Result<()> {
     DirBuilder::new().recursive(true).mode(DIRECTORY_MODE).create(directory)
 }
 
-/// Makes an empty file that only this user can read, to which SQLite gives its tables, and whose
-/// mode those beside it get; warns of one that is there and that others can reach.
+/// Creates an empty file that only this user can read, in which SQLite makes its tables; SQLite
+/// gives its mode to the files beside it. Warns if an existing file is accessible to other users.
 fn make_private(directory: &Path, path: &Path) -> io::Result<()> {
     let made = OpenOptions::new().write(true).create_new(true).mode(FILE_MODE).open(path);
     match made {
@@ -88,7 +88,7 @@ fn make_private(directory: &Path, path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Why there is no file: for want of room, or `otherwise`.
+/// Returns the error for a file that cannot be created: no space, or `otherwise`.
 fn unmade(
     path: &Path,
     error: io::Error,
@@ -107,7 +107,7 @@ fn mode(path: &Path) -> io::Result<u32> {
     Ok(fs::metadata(path)?.permissions().mode())
 }
 
-/// Opens the file and sets its modes.
+/// Opens the file and sets its pragmas.
 pub(super) fn open_file<T>(
     path: &Path,
     journal: Journal,
@@ -116,7 +116,7 @@ pub(super) fn open_file<T>(
     let refused = |source| refusal(path, source);
     let mut connection = Connection::open(path).map_err(refused)?;
     connection.busy_timeout(BUSY_TIMEOUT).map_err(refused)?;
-    // Before all else: then the write-ahead log needs no memory shared with others.
+    // Must come first: then the write-ahead log needs no shared memory.
     connection.pragma_update(None, "locking_mode", "EXCLUSIVE").map_err(refused)?;
     check_format(&connection, path)?;
     check_pages(&connection, path)?;
@@ -131,8 +131,8 @@ pub(super) fn open_file<T>(
     Ok((connection, accepted))
 }
 
-/// Leaves the log as it is when the connection ends: somebody may want to see the rest of one that is
-/// cut. Without a log there is none to be left.
+/// Keeps a non-empty log when the connection ends: an operator may want to examine the rest of a
+/// truncated one.
 fn leave_log(connection: &Connection, path: &Path) -> rusqlite::Result<()> {
     let log = path.with_extension("sqlite-wal");
     if fs::metadata(log).is_ok_and(|log| log.len() > 0) {
@@ -141,7 +141,7 @@ fn leave_log(connection: &Connection, path: &Path) -> rusqlite::Result<()> {
     Ok(())
 }
 
-/// Refuses what this program did not write.
+/// Refuses a file that this program did not write.
 fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     let refused = |source| refusal(path, source);
     let sql = "SELECT count(*), coalesce(sum(name = 'format'), 0) FROM sqlite_schema
@@ -165,8 +165,8 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     }
 }
 
-/// Refuses a file whose pages do not fit together. Checksums find only what is read, and some
-/// records are read much later. This reads the file once.
+/// Refuses a file whose pages are inconsistent. Checksums protect only records that are read, and
+/// some are read much later. This reads the whole file once.
 fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     let found: String = connection
         .query_row("PRAGMA quick_check(1)", [], |row| row.get(0))
@@ -174,14 +174,14 @@ fn check_pages(connection: &Connection, path: &Path) -> Result<(), StoreError> {
     if found == "ok" {
         return Ok(());
     }
-    // A heading may stand before what it found.
+    // The findings may be preceded by a heading.
     let found = found.lines().last().unwrap_or_default().to_owned();
     Err(StoreError::Inconsistent { path: path.to_owned(), found })
 }
 
-/// Sets the modes, and makes the tables of a new file.
+/// Sets the pragmas, and creates the tables of a new file.
 fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()> {
-    // Counts for a new file only: removed records give their room back.
+    // Takes effect only for a new file: deleted records return their space.
     connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
     let journal = match journal {
         Journal::WriteAhead => "WAL",
@@ -204,7 +204,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
     transaction.commit()
 }
 
-/// Takes the store for this process and writes there who that is.
+/// Locks the store for this process, and writes the name of the process into the lock file.
 fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     let path = directory.join(LOCK);
     let failed = |error| unmade(&path, error, |path, error| StoreError::Lock { path, error });
@@ -215,7 +215,7 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
             let mut holder = String::new();
-            // Who it is helps, and is not needed.
+            // The name of the holder is useful, but not necessary.
             let _ = (&file).take(HOLDER_BYTES_MAX).read_to_string(&mut holder);
             let holder = match holder.trim() {
                 "" => "another coordinator".to_owned(),
@@ -224,7 +224,7 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
             return Err(StoreError::InUse { path: store.to_owned(), holder });
         }
         Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {
-            tracing::warn!(path = %path.display(), "this file system knows no locks of whole files");
+            tracing::warn!(path = %path.display(), "this file system does not support file locks");
         }
         Err(TryLockError::Error(error)) => return Err(failed(error)),
     }
@@ -233,13 +233,13 @@ fn lock(directory: &Path, store: &Path) -> Result<File, StoreError> {
     Ok(file)
 }
 
-/// This process, for people.
+/// Describes this process, for people.
 fn holder() -> String {
     let host = host_name().unwrap_or_else(|| "this host".to_owned());
     format!("the coordinator with process {} on {host}", std::process::id())
 }
 
-/// The kind of network file system that `directory` lies on, if it does.
+/// Returns the kind of network file system that `directory` lies on, if it does.
 #[cfg(target_os = "linux")]
 fn network_file_system(directory: &Path) -> Option<&'static str> {
     let found = rustix::fs::statfs(directory).ok()?;
@@ -251,8 +251,8 @@ fn network_file_system(_: &Path) -> Option<&'static str> {
     None
 }
 
-/// Name of the network file system with this magic number (statfs(2) and the kernel's
-/// `magic.h`; those of the vendors as they publish them).
+/// Returns the name of the network file system with this magic number (statfs(2) and the kernel's
+/// `magic.h`; those of vendors as they publish them).
 fn network_kind(magic: u32) -> Option<&'static str> {
     Some(match magic {
         0x6969 => "NFS",
@@ -273,7 +273,7 @@ fn network_kind(magic: u32) -> Option<&'static str> {
     })
 }
 
-/// What SQLite's refusal means for whoever runs the coordinator.
+/// Returns the error of the store that an error of SQLite means for the operator.
 pub(super) fn refusal(path: &Path, error: rusqlite::Error) -> StoreError {
     let path = path.to_owned();
     match error.sqlite_error_code() {
@@ -313,7 +313,7 @@ mod tests {
             let cause = rusqlite::Error::SqliteFailure(ffi::Error::new(code), Some(cause));
             let refusal = refusal(Path::new("osteon.db"), cause);
             assert_eq!(refusal.to_string().matches("what SQLite says").count(), 1, "{refusal}");
-            // Who prints the chain adds nothing.
+            // The error has no source, so printing the chain adds nothing.
             assert!(refusal.source().is_none(), "{refusal:?}");
         }
     }

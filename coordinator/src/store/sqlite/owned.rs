@@ -1,5 +1,5 @@
-//! The store for its owner. What it does is done through a shared reference, so that others may use
-//! it between two pieces of a copy.
+//! `Store` for the owner of a `SqliteStore`. Each method calls that of the shared reference, so
+//! that others may use the store between two pieces of a copy.
 
 use std::fs::File;
 
@@ -29,8 +29,8 @@ impl Store for SqliteStore {
         (&*self).evaluation(job, number)
     }
 
-    fn begin_again(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
-        (&*self).begin_again(job, fingerprint)
+    fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
+        (&*self).reset_job(job, fingerprint)
     }
 
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError> {
@@ -53,8 +53,8 @@ impl Store for SqliteStore {
         (&*self).summary(job)
     }
 
-    fn forget_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
-        (&*self).forget_jobs(jobs)
+    fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
+        (&*self).delete_jobs(jobs)
     }
 
     fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {

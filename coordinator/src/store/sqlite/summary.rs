@@ -20,7 +20,7 @@ pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rus
     connection.execute(sql, values).map(drop)
 }
 
-/// The summary of a job, if there is one; inside, `None` if it is damaged.
+/// Returns the summary of a job, if there is one; the inner `None` means that it is damaged.
 pub(super) fn get(
     connection: &Connection,
     job: JobId,

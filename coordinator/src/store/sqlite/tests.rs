@@ -1,4 +1,5 @@
-//! The file: what is put is there after a reopening, what is damaged or foreign is refused.
+//! Tests of the file: records are there after it is reopened; damaged and foreign files are
+//! refused.
 
 use std::fs;
 
@@ -43,7 +44,7 @@ pub(super) fn evaluation(job: u64, number: u64) -> EvaluationRecord {
         number,
         point: Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1 + number as f64]),
         outcomes: Arc::from([Ok(3900.1), Err(FailureKind::NoConvergence), Ok(f64::MIN_POSITIVE)]),
-        // Of the second one every realization failed, say.
+        // As if every realization of the second one had failed.
         estimated_error: (number != 1)
             .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
         workers: (0..number)
@@ -74,7 +75,7 @@ pub(super) fn end(job: u64) -> EndRecord {
     }
 }
 
-/// The evaluations of a job below number 10.
+/// Returns the evaluations of a job below number 10.
 fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord>, StoreError> {
     let mut all = Vec::new();
     for number in 0..10 {
@@ -107,7 +108,7 @@ fn what_is_put_is_there_after_a_reopening() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(&directory.path().join("made/on/the/way")).unwrap();
     for _ in 0..2 {
-        // Twice: a write whose report was lost is repeated.
+        // Written twice: a write whose report was lost is repeated.
         store.put_job(&job(1)).unwrap();
         store.put_job(&job(2)).unwrap();
         store.put_ban(&ban(1)).unwrap();
@@ -131,7 +132,7 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.job(JobId(2)).unwrap(), Some(job(2)));
     assert_eq!(store.job(JobId(3)).unwrap(), None);
     assert_eq!(store.bans().unwrap(), [ban(1)]);
-    // Process 0 has computed evaluation 1 of job 1, which has ended, and nobody else has.
+    // Only process 0 has computed evaluation 1 of job 1, which has ended.
     let ended_with = |store: &mut SqliteStore, host, process| {
         store.ended_with(&WorkerName::new(host, process, 0)).unwrap()
     };
@@ -158,7 +159,7 @@ fn other_users_cannot_read_what_is_made() {
         assert_eq!(mode(&made.join(name)), 0o600, "{name}");
     }
     drop(store);
-    // What an operator has chosen stays.
+    // Modes chosen by an operator are kept.
     fs::set_permissions(&made, fs::Permissions::from_mode(0o750)).unwrap();
     fs::set_permissions(made.join(FILE), fs::Permissions::from_mode(0o640)).unwrap();
     drop(SqliteStore::open(&made).unwrap());
@@ -264,7 +265,7 @@ fn forgotten_jobs_are_gone_and_their_room_is_given_back() {
     }
     store.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).unwrap();
     let before = size();
-    store.forget_jobs(&[JobId(1), JobId(9)]).unwrap();
+    store.delete_jobs(&[JobId(1), JobId(9)]).unwrap();
     assert!(size() < before * 6 / 10, "{} of {before} bytes are left", size());
     let ids: Vec<JobId> = store.jobs().unwrap().iter().map(|job| job.record.job).collect();
     assert_eq!(ids, [JobId(2)]);
@@ -301,7 +302,7 @@ fn a_directory_that_cannot_be_written_is_named() {
     fs::write(&file, "").unwrap();
     let error = SqliteStore::open(&file.join("store")).unwrap_err();
     assert!(matches!(error, StoreError::Directory { .. }), "{error}");
-    // Whoever runs this may be allowed to write everywhere, but not here.
+    // The user of this test may be allowed to write everywhere, but not here.
     let error = SqliteStore::open(Path::new("/proc/self")).unwrap_err();
     assert!(matches!(error, StoreError::Lock { .. }), "{error}");
     assert!(error.to_string().contains("give the coordinator's user write permission"), "{error}");
@@ -325,7 +326,8 @@ fn with_a_rollback_journal_everything_is_the_same() {
     store.put_job(&job(1)).unwrap();
     let path = store.path.clone();
     drop(store);
-    // A file that was made with a write-ahead log, and moved.
+    // A file that was created with a write-ahead log, and is now opened as on a network file
+    // system.
     let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
@@ -337,7 +339,7 @@ fn with_a_rollback_journal_everything_is_the_same() {
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);
 }
 
-/// A mark that is written and not synced may name the job all the same.
+/// A mark that was written but not synced may name the job all the same.
 #[test]
 fn a_job_whose_mark_fails_is_refused_and_does_not_keep_the_store_from_opening() {
     let directory = tempfile::tempdir().unwrap();
@@ -388,7 +390,7 @@ fn a_job_that_begins_again_has_no_evaluation_and_new_numerics() {
         store.put_job(&job(id)).unwrap();
         store.put_evaluation(&evaluation(id, 0), false).unwrap();
     }
-    store.begin_again(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
+    store.reset_job(JobId(1), "osteon 2.0.0 numerics 5").unwrap();
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
     let again = JobRecord { fingerprint: "osteon 2.0.0 numerics 5".to_owned(), ..job(1) };

@@ -77,7 +77,7 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     // A replay takes the same path.
     let mut again = Search::new(Arc::new(job.clone()));
     for row in search.history() {
-        again.retell(row.point, speeds(&job.monte_carlo, &row.point), ERRORS).unwrap();
+        again.replay(row.point, speeds(&job.monte_carlo, &row.point), ERRORS).unwrap();
     }
     assert_eq!(
         again.result(&ending(&again), &Program::this(None)),

@@ -125,7 +125,7 @@ impl SolidLayer {
         self.edge(-k, &u[top], &mut out[top]);
     }
 
-    /// Elements of `N` nodes; 0 stands for any number.
+    /// Processes elements of `N` nodes; 0 stands for any number.
     #[inline(always)]
     fn elements<const N: usize, V: Vector, S: Sink>(
         &self,

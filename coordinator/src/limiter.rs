@@ -1,5 +1,5 @@
-//! Places for what takes room in memory: few at a time, fewer of one caller, so that who is slow
-//! does not keep the others out; and nobody waits for long.
+//! Concurrency limiter for calls that hold much memory: few run at a time, and fewer of one caller,
+//! so that a slow caller does not block the others. Nobody waits for long.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -14,78 +14,78 @@ use tonic::codegen::http::Extensions;
 use crate::accept::Peer;
 use crate::access::Holder;
 
-/// Who finds no place for this long is refused.
+/// A call that gets no permit within this time is refused.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// When a refused call may be tried again.
+/// Time after which a refused call may be repeated.
 const RETRY: Duration = Duration::from_secs(5);
 
-/// Whose call it is.
+/// Identity of a caller.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Caller {
-    /// Whoever holds the token of this name.
+    /// The holder of the token with this name.
     Holder(String),
-    /// Without tokens: whoever is at the other end of this connection.
+    /// Without tokens: the peer of this connection.
     Connection(u64),
 }
 
-/// Some places.
+/// A pool of permits.
 #[derive(Debug, Clone)]
-pub(crate) struct Places {
+pub(crate) struct Limiter {
     all: Arc<Semaphore>,
-    of_one: usize,
-    /// Those of each caller who has or wants one.
+    per_caller: usize,
+    /// Semaphores of the callers that hold or await a permit.
     own: Arc<Mutex<BTreeMap<Caller, Weak<Semaphore>>>>,
 }
 
-/// One of the places, until it is dropped.
+/// A permit, held until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct Permit {
     _own: OwnedSemaphorePermit,
     _of_all: OwnedSemaphorePermit,
 }
 
 impl Caller {
-    /// The caller that the door and the listener have noted.
+    /// Returns the caller as noted by the access layer and the listener.
     pub(crate) fn of(extensions: &Extensions) -> Self {
         match (extensions.get::<Holder>(), extensions.get::<Peer>()) {
             (Some(Holder(name)), _) => Self::Holder(name.clone()),
             (None, Some(peer)) => Self::Connection(peer.connection),
-            // Numbers of connections begin above.
+            // Numbers of connections begin above 0.
             (None, None) => Self::Connection(0),
         }
     }
 }
 
-impl Places {
-    /// So many places, and so many for one caller.
-    pub(crate) fn new(all: usize, of_one: usize) -> Self {
-        Self { all: Arc::new(Semaphore::new(all)), of_one, own: Arc::default() }
+impl Limiter {
+    /// Returns a pool of `all` permits, of which one caller can hold `per_caller`.
+    pub(crate) fn new(all: usize, per_caller: usize) -> Self {
+        Self { all: Arc::new(Semaphore::new(all)), per_caller, own: Arc::default() }
     }
 
-    /// Waits for a place.
+    /// Waits for a permit.
     ///
     /// # Errors
-    /// `RESOURCE_EXHAUSTED` when there is none for a while.
-    pub(crate) async fn take(&self, caller: Caller) -> Result<Place, Status> {
+    /// `RESOURCE_EXHAUSTED` when there is no permit within the time limit.
+    pub(crate) async fn take(&self, caller: Caller) -> Result<Permit, Status> {
         let own = self.own(caller);
         let both = async {
-            // The own one first: who waits for it is in nobody's way.
+            // The caller's own permit comes first: whoever waits for it blocks nobody else.
             let own = own.acquire_owned().await.ok()?;
             let of_all = Arc::clone(&self.all).acquire_owned().await.ok()?;
-            Some(Place { _own: own, _of_all: of_all })
+            Some(Permit { _own: own, _of_all: of_all })
         };
-        // No semaphore is ever closed.
+        // Semaphores are never closed.
         timeout(PATIENCE, both).await.ok().flatten().ok_or_else(full)
     }
 
     fn own(&self, caller: Caller) -> Arc<Semaphore> {
-        // Nothing panics while it is locked.
+        // Nothing panics while the lock is held.
         let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         own.retain(|_, places| places.strong_count() > 0);
         if let Some(places) = own.get(&caller).and_then(Weak::upgrade) {
             return places;
         }
-        let places = Arc::new(Semaphore::new(self.of_one));
+        let places = Arc::new(Semaphore::new(self.per_caller));
         own.insert(caller, Arc::downgrade(&places));
         places
     }
@@ -107,21 +107,21 @@ mod tests {
 
     use super::*;
 
-    async fn take(places: &Places, connection: u64) -> Result<Place, Code> {
+    async fn take(places: &Limiter, connection: u64) -> Result<Permit, Code> {
         places.take(Caller::Connection(connection)).await.map_err(|status| status.code())
     }
 
     #[tokio::test(start_paused = true)]
     async fn nobody_takes_all_and_nobody_waits_for_ever() {
-        let places = Places::new(3, 2);
+        let places = Limiter::new(3, 2);
         let mut held = vec![take(&places, 1).await.unwrap(), take(&places, 1).await.unwrap()];
         assert_eq!(take(&places, 1).await.unwrap_err(), Code::ResourceExhausted);
         held.push(take(&places, 2).await.unwrap());
         assert_eq!(take(&places, 3).await.unwrap_err(), Code::ResourceExhausted);
         drop(held.remove(0));
-        let of_one = take(&places, 1).await.unwrap();
-        drop((of_one, held));
-        // Nothing is remembered of who has gone.
+        let per_caller = take(&places, 1).await.unwrap();
+        drop((per_caller, held));
+        // Callers that have gone are not remembered.
         drop(take(&places, 4).await.unwrap());
         let known: Vec<Caller> = places.own.lock().unwrap().keys().cloned().collect();
         assert_eq!(known, slice::from_ref(&Caller::Connection(4)));
@@ -129,7 +129,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_waits_for_an_own_place_is_in_nobodys_way() {
-        let places = Places::new(2, 1);
+        let places = Limiter::new(2, 1);
         let _held = take(&places, 1).await.unwrap();
         let waiting = tokio::spawn({
             let places = places.clone();

@@ -1,5 +1,6 @@
-//! What an ended job left, out of the store: without computing its path again, so that neither its
-//! length nor the version that went it matters. What the data say is computed here, from what is read.
+//! Output of an ended job, read from the store. The path of the search is not computed again, so
+//! neither its length nor the program version that computed it matters. The inference from the data
+//! is computed here, from the stored evaluations.
 
 use std::sync::Arc;
 
@@ -13,10 +14,10 @@ use tokio::sync::oneshot;
 use crate::ids::JobId;
 use crate::store::{EndRecord, JobRecord, Store, StoreError};
 
-/// What an ended job left.
+/// Output of an ended job.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Leftover {
-    /// What was to be computed.
+pub struct JobOutput {
+    /// The specification.
     pub specification: JobSpecification,
     /// The result, with the outcomes of every best point.
     pub result: JobResult,
@@ -24,13 +25,13 @@ pub struct Leftover {
     pub history: Vec<Evaluation>,
 }
 
-/// Why what a job left cannot be read.
+/// Error when the output of a job cannot be read.
 #[derive(Debug, Error)]
 pub enum ReadError {
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The job was forgotten meanwhile.
+    /// The job has been deleted meanwhile.
     #[error("no such job: {job}; it was pruned meanwhile")]
     Pruned {
         /// The job.
@@ -52,11 +53,11 @@ pub enum ReadError {
     },
 }
 
-/// Reads what a job left, all at once. Blocks.
+/// Reads the whole output of a job. Blocks.
 ///
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
-pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadError> {
+pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<JobOutput, ReadError> {
     let job = end.job;
     let JobRecord { specification, .. } = job_record(store, job)?;
     let left = Left { end: end.clone(), specification, summary: summary(store, job)? };
@@ -68,27 +69,28 @@ pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<Leftover, ReadErro
     result.groups = groups.into_iter().flatten().collect();
     let Left { specification, summary, .. } = left;
     let specification = Arc::unwrap_or_clone(specification);
-    Ok(Leftover { specification, result, history: summary.history })
+    Ok(JobOutput { specification, result, history: summary.history })
 }
 
-/// What an ended job left but its outcomes, of which there may be more than memory holds.
+/// Output of an ended job without its outcomes, which may need more memory than there is.
 #[derive(Debug)]
 pub(crate) struct Left {
-    /// How it ended.
+    /// The end of the job.
     pub(crate) end: EndRecord,
-    /// What was to be computed.
+    /// The specification.
     pub(crate) specification: Arc<JobSpecification>,
-    /// What its path came to.
+    /// Summary of the path of its search.
     pub(crate) summary: Summary,
 }
 
 impl Left {
-    /// Number of the best evaluation, if one was feasible; `None` where the data are groups.
+    /// Returns the number of the best evaluation, if one was feasible; `None` where the data are
+    /// groups.
     pub(crate) fn best(&self) -> Option<u64> {
         self.summary.best
     }
 
-    /// Groups of the data whose searches have ended.
+    /// Returns the number of groups of the data whose searches have ended.
     pub(crate) fn groups(&self) -> usize {
         match &self.specification.data {
             Some(Data::Groups(groups)) => groups.len().min(self.summary.groups.len()),
@@ -96,20 +98,21 @@ impl Left {
         }
     }
 
-    /// Number of the best evaluation of a group, if one was feasible.
+    /// Returns the number of the best evaluation of a group, if one was feasible.
     pub(crate) fn best_of(&self, set: usize) -> Option<u64> {
         self.summary.groups.get(set)?.best
     }
 
-    /// The result without its groups, given the outcomes of the best evaluation. Computes what the data
-    /// say.
+    /// Returns the result without its groups, given the outcomes of the best evaluation. Computes
+    /// the inference from the data.
     pub(crate) fn result(&self, outcomes: Option<Arc<[Outcome]>>) -> JobResult {
         let best = self.best_point(self.best(), outcomes);
         let EndRecord { ending, program, .. } = &self.end;
         self.summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
-    /// What was found for a group, given the outcomes of its best evaluation. Computes what its data say.
+    /// Returns the result of a group, given the outcomes of its best evaluation. Computes the
+    /// inference from its data.
     pub(crate) fn group(
         &self,
         set: usize,
@@ -129,24 +132,24 @@ impl Left {
     }
 }
 
-/// One record of what an ended job left, to be read for somebody.
+/// A request to read one record of an ended job.
 #[derive(Debug)]
 pub(crate) enum Reading {
-    /// The job.
+    /// The job record.
     Job(JobId, Reply<JobRecord>),
-    /// What its path came to.
+    /// The summary of the path of its search.
     Summary(JobId, Reply<Summary>),
     /// The outcomes of the evaluation with this number.
     Outcomes(JobId, u64, Reply<Arc<[Outcome]>>),
 }
 
-/// Where a record that was read goes.
+/// Channel for a record that was read.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T, ReadError>>;
 
 impl Reading {
-    /// Reads it, unless nobody waits for it any more. Blocks for that long.
+    /// Reads the record, unless the receiver has gone. Blocks meanwhile.
     pub(crate) fn serve(self, store: &mut dyn Store) {
-        // Who asked may go while it is read.
+        // The receiver may be dropped during the read.
         match self {
             Self::Job(job, reply) if !reply.is_closed() => {
                 drop(reply.send(job_record(store, job)));
@@ -177,7 +180,8 @@ fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Arc<[Outco
     Ok(evaluation.outcomes)
 }
 
-/// What is missing was forgotten with its job, or is `lost`.
+/// Returns the record that was read. If there is none, the error is `Pruned` where the job has been
+/// deleted, otherwise `lost`.
 fn found<T>(
     store: &mut dyn Store,
     job: JobId,

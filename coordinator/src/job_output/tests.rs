@@ -1,4 +1,4 @@
-//! The best evaluation and the summary are enough, and nothing less.
+//! The best evaluation and the summary are necessary and sufficient for the output of a job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::store_thread::{Command, serve};
 
 const JOB: JobId = JobId(1);
 
-/// An ended search of eight evaluations, and the record of its best.
+/// Returns an ended search of eight evaluations, and the record of its best.
 pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
     let mut parameters = [1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
     parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
@@ -116,7 +116,7 @@ fn a_path_without_an_evaluation_leaves_a_result() {
     assert_eq!(left.result, search.result(&end.ending, &end.program));
 }
 
-/// A store with an ended job.
+/// Returns a store with an ended job.
 fn with_ended() -> (MemoryStore, JobRecord, EndRecord) {
     let (record, search, end, best) = ended();
     let mut store = MemoryStore::new();
@@ -126,7 +126,7 @@ fn with_ended() -> (MemoryStore, JobRecord, EndRecord) {
     (store, record, end)
 }
 
-/// What a reading that is served at once replies.
+/// Serves a request at once and returns the reply.
 fn served<T>(
     store: &mut MemoryStore,
     reading: impl FnOnce(Reply<T>) -> Reading,
@@ -147,7 +147,7 @@ fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
     let left = Left { end, specification: record.specification, summary };
     assert_eq!(left.result(Some(outcomes)), read(&mut store, &left.end).unwrap().result);
 
-    store.forget_jobs(&[JOB]).unwrap();
+    store.delete_jobs(&[JOB]).unwrap();
     let errors = [
         served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap_err(),
         served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap_err(),
@@ -158,8 +158,8 @@ fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
     }
 }
 
-/// Many records are to be read, then one is to be put and the job forgotten: neither waits until all are
-/// read.
+/// Many reads are waiting when a record is put and the job is deleted: neither command waits until
+/// all records are read.
 #[test]
 fn a_fetch_lets_others_have_the_store_in_between() {
     let (mut store, record, _) = with_ended();
@@ -179,7 +179,7 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });
     assert!(matches!(done.try_recv().unwrap(), Event::Pruned { outcome: Ok(()), .. }));
     let mut read = fetches.into_iter().map(|mut fetched| fetched.try_recv().unwrap());
-    // One between the two.
+    // One record is read between the two commands.
     assert!(read.next().unwrap().is_ok());
     for error in read.map(Result::unwrap_err) {
         assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");

@@ -1,0 +1,154 @@
+//! What is concluded from data, as results carry it: plain data.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::moments::Moments;
+use crate::parameters::{Parameter, Point};
+
+/// Conclusions from one set of data: the parameters that it determines, and the points that match
+/// it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conclusions {
+    /// Identified quantities; `None` if the derivatives were not measured, or cannot be computed.
+    pub inference: Option<Inference>,
+    /// Profiles of the cost, one for each free parameter; empty for a likelihood, and if there are
+    /// priors.
+    pub profiles: Vec<Profile>,
+    /// The solutions from all starts; `None` for a single start.
+    pub solutions: Option<Solutions>,
+}
+
+/// Conclusions from the data about the parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inference {
+    /// Whether the model matches the data within the noise.
+    pub matched: bool,
+    /// Confidence level of all intervals.
+    pub level: f64,
+    /// Errors of both moments.
+    pub noise: NoiseErrors,
+    /// The free parameters, in the order of the directions' components.
+    pub free: Vec<Parameter>,
+    /// Derivatives of both moments.
+    pub sensitivities: Vec<Sensitivity>,
+    /// Directions that the data determine, by decreasing singular value.
+    pub fixed: Vec<Direction>,
+    /// Orthonormal directions that the data leave free.
+    pub undetermined: Vec<Vec<f64>>,
+    /// √(c1111/ρ), m/s.
+    pub bulk_velocity: Quantity,
+    /// The dispersion.
+    pub dispersion: Quantity,
+    /// The free parameters themselves; their uncertainty is known only if no direction is left
+    /// free.
+    pub parameters: Vec<(Parameter, Quantity)>,
+}
+
+/// A direction of the box that the data determine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// Singular value: change of ln v and ln Δ, together, for a step across the box.
+    pub singular_value: f64,
+    /// Unit vector with a component for each free parameter, in units of the box.
+    pub components: Vec<f64>,
+}
+
+/// A quantity derived from the parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// Its value at the best point, in its unit.
+    pub value: f64,
+    /// Its uncertainty; `None` if the data do not determine it.
+    pub known: Option<Known>,
+}
+
+/// Uncertainty of a quantity, as far as the data determine it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Standard error.
+    pub standard_error: f64,
+    /// Confidence interval.
+    pub interval: [f64; 2],
+    /// Fraction of its gradient, in units of the box, that lies in directions which the data leave
+    /// free: sine of the angle between the gradient and the directions that they determine.
+    pub free_share: f64,
+}
+
+/// Derivatives of both moments along one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Relative change of the mean for a relative change of the parameter, ∂ ln v / ∂ ln p.
+    pub mean: f64,
+    /// The same for the coefficient of variation, ∂ ln Δ / ∂ ln p.
+    pub coefficient_of_variation: f64,
+}
+
+/// Relative standard errors of both moments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseErrors {
+    /// Errors due to the noise of the data; `None` if only their moments are known.
+    pub data: Option<Moments>,
+    /// Errors due to sampling.
+    pub sampling: Moments,
+}
+
+/// The profile of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its values, equidistant from the lower bound to the upper, in its unit.
+    pub values: Vec<f64>,
+    /// The lowest cost with the parameter at each value and the other free ones anywhere within
+    /// their bounds; infinite if no such point is admissible.
+    pub costs: Vec<f64>,
+}
+
+/// The solutions of searches from several starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solutions {
+    /// The best point of each start that found a feasible one.
+    pub points: Vec<Solution>,
+    /// Number of them that match the data as well as the best one, or within the tolerance of the
+    /// search.
+    pub matching: u64,
+    /// Spreads over these points; `None` if there are none.
+    pub spread: Option<Spreads>,
+}
+
+/// The best point of the search from one start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// Number of the start, from 0.
+    pub start: u32,
+    /// The evaluated point.
+    pub point: Point,
+    /// Its cost.
+    pub cost: f64,
+    /// Number of evaluations of this search.
+    pub evaluations: u64,
+}
+
+/// Smallest, largest and mean value of a quantity over several solutions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Spread {
+    /// Smallest value.
+    pub smallest: f64,
+    /// Largest value.
+    pub largest: f64,
+    /// Mean value.
+    pub mean: f64,
+}
+
+/// Spreads over a set of points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spreads {
+    /// Spread of each parameter.
+    pub parameters: [Spread; 7],
+    /// Spreads of the entries of the elasticity matrix on and above the diagonal, row by row, with
+    /// row and column from 0 (Pa, Kelvin-Mandel).
+    pub entries: Vec<(usize, usize, Spread)>,
+}

@@ -1,0 +1,185 @@
+//! The tree of a file, with paths and lines for messages.
+
+use std::fmt;
+use std::path::Path;
+
+use thiserror::Error;
+
+use crate::visible;
+
+/// Format of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// TOML 1.
+    Toml,
+    /// JSON, with the same keys and nesting.
+    Json,
+}
+
+impl Format {
+    /// Returns the format that the extension of `path` denotes; `None` if it is neither `toml` nor
+    /// `json`.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        if extension.eq_ignore_ascii_case("toml") {
+            Some(Self::Toml)
+        } else if extension.eq_ignore_ascii_case("json") {
+            Some(Self::Json)
+        } else {
+            None
+        }
+    }
+
+    /// Returns the name for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Toml => "TOML",
+            Self::Json => "JSON",
+        }
+    }
+}
+
+/// Syntax error of a text.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
+pub struct Malformed {
+    /// The expected format.
+    pub format: Format,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// The parser's message.
+    pub message: String,
+}
+
+/// A value with its line number (for a table's entry: the line of its key).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Node {
+    /// Line, from 1, if the format provides it.
+    pub(crate) line: Option<usize>,
+    /// The value.
+    pub(crate) value: Value,
+}
+
+/// The values that a file may contain.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Value {
+    /// JSON's null.
+    Null,
+    /// true or false.
+    Boolean(bool),
+    /// A number written without fraction or exponent, within ±2⁶³ or so.
+    Integer(i128),
+    /// Any other number; may be NaN or infinite.
+    Number(f64),
+    /// A string.
+    Text(String),
+    /// TOML's date or time.
+    Date,
+    /// An array.
+    List(Vec<Node>),
+    /// A table (JSON: object), in the order of the file; keys are unique.
+    Table(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// Returns the line of the field with this path, or else of the innermost table around it that
+    /// has one.
+    ///
+    /// Paths have the form of [`entry_path`] and [`element_path`].
+    pub(crate) fn line_of(&self, path: &str) -> Option<usize> {
+        let mut node = self;
+        let mut rest = path;
+        let mut line = None;
+        while let Some((child, after)) = node.child_on(rest) {
+            line = if child.is_implied() { None } else { child.line };
+            node = child;
+            rest = after;
+        }
+        line
+    }
+
+    /// Returns whether this is a table that no line of the file opens by itself, as `parameters` in
+    /// `[parameters.density]`: the parser gives it the line of its first entry.
+    fn is_implied(&self) -> bool {
+        let Value::Table(entries) = &self.value else { return false };
+        let first = entries.first().map(|(_, node)| node);
+        first.is_some_and(|node| node.line == self.line && matches!(node.value, Value::Table(_)))
+    }
+
+    /// Returns the child that the first segment of `path` names, and the rest of the path.
+    fn child_on<'a, 'p>(&'a self, path: &'p str) -> Option<(&'a Node, &'p str)> {
+        match &self.value {
+            Value::Table(entries) => entries.iter().find_map(|(key, node)| {
+                let path = path.strip_prefix('.').unwrap_or(path);
+                let rest = path.strip_prefix(shown_key(key).as_str())?;
+                (rest.is_empty() || rest.starts_with(['.', '['])).then_some((node, rest))
+            }),
+            Value::List(elements) => {
+                let (index, rest) = path.strip_prefix('[')?.split_once(']')?;
+                Some((elements.get(index.parse::<usize>().ok()?)?, rest))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Returns the path of the entry `key` of the table at `table`; the root's path is empty.
+pub(crate) fn entry_path(table: &str, key: &str) -> String {
+    let key = shown_key(key);
+    if table.is_empty() { key } else { format!("{table}.{key}") }
+}
+
+/// Returns the path of element `index` (from 0) of the list at `list`.
+pub(crate) fn element_path(list: &str, index: usize) -> String {
+    format!("{list}[{index}]")
+}
+
+/// Returns a key as it must be written in TOML, shortened if it is long.
+fn shown_key(key: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !key.is_empty() && key.len() <= SHOWN_CHARACTERS_MAX && key.chars().all(bare) {
+        key.to_owned()
+    } else {
+        quoted(key)
+    }
+}
+
+/// Returns `text` in quotes, with control characters escaped, shortened if it is long.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut shown: String = text.chars().take(SHOWN_CHARACTERS_MAX).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    format!("{shown:?}")
+}
+
+/// Longest part of a user's text that is quoted in a message.
+const SHOWN_CHARACTERS_MAX: usize = 60;
+
+impl fmt::Display for Value {
+    /// Formats the value for a message, after "is" or "found".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Boolean(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value:?}"),
+            Self::Text(text) => write!(f, "the string {}", quoted(text)),
+            Self::Date => f.write_str("a date or time"),
+            Self::List(elements) => match elements.len() {
+                0 => f.write_str("an empty list"),
+                count => write!(f, "a list of {count}"),
+            },
+            Self::Table(_) => f.write_str("a table"),
+        }
+    }
+}
+
+/// Returns line and column, both from 1, of a byte offset.
+pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}

@@ -1,0 +1,34 @@
+//! Where measured velocities stand in a file, for messages about one of them.
+
+use std::path::{Path, PathBuf};
+
+/// File and lines of a job's velocities.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// The file.
+    pub(crate) path: PathBuf,
+    /// Line of each velocity of each set, from 1.
+    pub(crate) lines: Vec<Vec<u32>>,
+}
+
+impl Origin {
+    /// Returns the path of the file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns the line of a velocity of a set.
+    pub(crate) fn line(&self, set: usize, index: usize) -> Option<u32> {
+        self.lines.get(set)?.get(index).copied()
+    }
+
+    /// Returns file and line of a velocity as the beginning of a message; empty if there is no
+    /// file.
+    pub(crate) fn place(origin: Option<&Self>, set: usize, index: usize) -> String {
+        let place = origin.and_then(|origin| {
+            let line = origin.line(set, index)?;
+            Some(format!("{}, line {line}: velocity ", origin.path.display()))
+        });
+        place.unwrap_or_default()
+    }
+}
