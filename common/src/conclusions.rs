@@ -1,4 +1,4 @@
-//! What is concluded from data, as results carry it: plain data.
+//! The conclusions from data that results contain, as plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

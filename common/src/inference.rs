@@ -1,5 +1,5 @@
-//! What the data determine about the parameters and what they leave free, to first order around the
-//! best point.
+//! Inference from the data: which parameters they determine and which they leave free, to first
+//! order around the best point.
 //!
 //! y = (ln v, ln Δ), the logarithms of mean and coefficient of variation of the velocities, depend
 //! on the free parameters x, in units of the box, through the Jacobian J that the search has

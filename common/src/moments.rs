@@ -1,4 +1,4 @@
-//! Moments of velocities, and what is said of them: plain data.
+//! Moments of velocities, their errors and tests, as plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Where measured velocities stand in a file, for messages about one of them.
+//! Positions of measured velocities in a file, for messages about one of them.
 
 use std::path::{Path, PathBuf};
 

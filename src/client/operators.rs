@@ -29,7 +29,7 @@ impl Client {
         self.present(worker, "worker")
     }
 
-    /// Passes a copy of the store to `take`, part by part; returns the size and checksum that the
+    /// Passes a copy of the store to `take`, part by part; returns the size and digest that the
     /// whole copy must have. The outer error is that of `take`.
     pub(crate) async fn backup<E>(
         &mut self,
