@@ -1,5 +1,5 @@
-//! A certificate authority for one installation, and the certificates that it signs. Knows no
-//! file.
+//! A certificate authority for one installation, and the certificates that it signs. This file
+//! reads and writes no files.
 
 use osteon_coordinator::access::{CLIENT_NAME, WORKER_NAME};
 use rcgen::{
@@ -8,28 +8,29 @@ use rcgen::{
 };
 use time::{Duration, OffsetDateTime};
 
-/// Days that an authority is valid.
+/// Validity of an authority in days.
 const AUTHORITY_DAYS: i64 = 3650;
-/// Certificates are valid a little before they are made: clocks differ.
+/// Certificates are valid from this long before their creation, because clocks differ.
 const CLOCK_MARGIN: Duration = Duration::hours(1);
-/// Names of this machine that every coordinator's certificate is for.
+/// Names of the local machine that every coordinator's certificate includes.
 const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 
 /// A certificate and its key, both in PEM.
 pub(crate) struct Made {
     /// The certificate.
     pub(crate) certificate: String,
-    /// Its key: a secret.
+    /// Its private key, which is secret.
     pub(crate) key: String,
 }
 
 /// An authority that can sign.
 pub(crate) struct Authority(Issuer<'static, KeyPair>);
 
-/// Whom a certificate is for.
+/// The holder of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bearer<'a> {
-    /// A coordinator, and the hosts that it can be reached by, besides this machine's own names.
+    /// A coordinator, with the hosts under which it can be reached, besides the local machine's own
+    /// names.
     Coordinator(&'a [String]),
     /// A worker.
     Worker,
@@ -38,7 +39,7 @@ pub(crate) enum Bearer<'a> {
 }
 
 impl Authority {
-    /// A new authority, valid from `now` on.
+    /// Creates an authority that is valid from `now` on.
     pub(crate) fn new(now: OffsetDateTime) -> Result<(Self, Made), rcgen::Error> {
         let key = KeyPair::generate()?;
         let mut params = CertificateParams::default();
@@ -52,12 +53,12 @@ impl Authority {
         Ok((Self(Issuer::new(params, key)), made))
     }
 
-    /// An authority that was made earlier.
+    /// Loads an existing authority.
     pub(crate) fn from_pem(certificate: &str, key: &str) -> Result<Self, rcgen::Error> {
         Ok(Self(Issuer::from_ca_cert_pem(certificate, KeyPair::from_pem(key)?)?))
     }
 
-    /// A certificate for `bearer`, valid for `days` from `now` on.
+    /// Issues a certificate for `bearer` that is valid for `days` from `now` on.
     pub(crate) fn sign(
         &self,
         bearer: Bearer<'_>,

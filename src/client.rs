@@ -1,4 +1,4 @@
-//! A client of the service of jobs: every wait has an end, every error names the coordinator.
+//! A client of the jobs service: every wait is limited, and every error names the coordinator.
 
 pub(crate) mod operators;
 
@@ -32,90 +32,91 @@ mod peer;
 
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
-/// After this long without a coordinator the user is told that it is looked for, s.
+/// Time without a coordinator after which the user is told that the client is waiting for it, s.
 const SILENCE_S_MAX: u64 = 1;
-/// Wait between two attempts to find a coordinator again, ms.
+/// Pause between two attempts to reconnect to a coordinator, ms.
 const RETRY_MS: u64 = 250;
-/// Most pages of jobs that a list may have: each holds up to 1000.
+/// Maximum number of pages of a job list; each holds up to 1000 jobs.
 const PAGES_MAX: usize = 10_000;
 
-/// Why a coordinator did not do what was asked.
+/// Reason why a request to a coordinator failed.
 #[derive(Debug, Error)]
 pub(crate) enum ClientError {
     /// A file of certificates or a token cannot be used.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// There is no coordinator.
+    /// No coordinator could be reached.
     #[error(transparent)]
     Connect(#[from] ConnectError),
-    /// It is there, and says nothing.
+    /// The coordinator did not answer in time.
     #[error("the coordinator at {endpoint} did not answer within {ANSWER_S_MAX} s")]
     Unanswered {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
     },
-    /// It went away.
+    /// The connection was lost.
     #[error("lost the coordinator at {endpoint}: {reason}")]
     Lost {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// What the transport says.
+        /// The transport's error.
         reason: String,
     },
-    /// It cannot do it now.
+    /// The coordinator cannot serve the request now.
     #[error("the coordinator at {endpoint} is unavailable: {reason}")]
     Unavailable {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// Why it cannot.
+        /// The coordinator's explanation.
         reason: String,
     },
-    /// It refuses the specification.
+    /// The coordinator rejects the specification.
     #[error("{}", counted(.0))]
     Violations(Violations),
-    /// It refuses the request.
+    /// The coordinator refuses the request.
     #[error("{reason}{hint} (coordinator {endpoint})")]
     Refused {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// The status.
+        /// The gRPC status code.
         code: Code,
-        /// What it says.
+        /// The coordinator's explanation.
         reason: String,
-        /// What can be done about it, or nothing.
+        /// Advice for the user, or an empty text.
         hint: &'static str,
     },
-    /// Whether it has accepted a job is not known.
+    /// It is unknown whether the coordinator has accepted the job.
     #[error(
         "{cause}; the job may be accepted all the same: `osteon submit` of the same job with \
          --request-id {request_id} prints its id and makes no second one"
     )]
     Uncertain {
-        /// What became of the last attempt.
+        /// Error of the last attempt.
         cause: Box<ClientError>,
-        /// The request.
+        /// Id of the request.
         request_id: String,
     },
-    /// There is no trust, and it may be for want of what the environment holds for another coordinator.
+    /// Coordinator and client do not trust each other, possibly because credentials in the
+    /// environment were meant for another coordinator and therefore not used.
     #[error("{cause}; {unused}")]
     Untrusted {
-        /// What became of it.
+        /// The error.
         cause: Box<ClientError>,
-        /// Variables that were not used.
+        /// The environment variables that were not used.
         unused: Unused,
     },
-    /// It sent what cannot be read.
+    /// The coordinator sent a message that cannot be read.
     #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// What is wrong.
+        /// The defect of the message.
         source: Malformed,
     },
 }
 
 impl ClientError {
-    /// Whether the user must give something else.
+    /// Returns whether the cause is the user's input.
     pub(crate) fn is_bad_input(&self) -> bool {
         match self {
             Self::Violations(_) | Self::Credentials(_) => true,
@@ -127,7 +128,7 @@ impl ClientError {
         }
     }
 
-    /// With what was not used, where that may be the reason.
+    /// Adds the environment variables that were not used, if that may be the reason of the error.
     fn without(self, unused: &Unused) -> Self {
         let of_trust = matches!(
             self,
@@ -149,33 +150,33 @@ fn counted(violations: &Violations) -> String {
     format!("the coordinator rejected the job: {} {errors}{}", lines.len(), lines.concat())
 }
 
-/// Everything that an ended job left.
+/// Specification, result and history of an ended job.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fetched {
-    /// The specification, defaults filled in.
+    /// The specification, with defaults filled in.
     pub(crate) specification: JobSpecification,
-    /// The result, with the outcomes of the best point; of groups with those of each, as long as all of
-    /// them are no more than one evaluation may have.
+    /// The result, with the outcomes of the best point. For groups, it has the outcomes of each
+    /// group's best point, unless together they exceed the number that one evaluation may have.
     pub(crate) result: JobResult,
-    /// The evaluations in order.
+    /// The evaluations, in order.
     pub(crate) history: Vec<Evaluation>,
 }
 
-/// Where a coordinator is, and what is shown to it; the files are not read yet.
+/// Address of a coordinator and the credential files for it, which have not been read yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Remote {
-    /// Its address.
+    /// Address of the coordinator.
     pub(crate) endpoint: Endpoint,
-    /// Files of certificates and a token.
+    /// The credential files.
     pub(crate) files: CredentialFiles,
-    /// Whether the environment names it, and not the command line.
+    /// Whether the address comes from the environment and not from the command line.
     pub(crate) from_environment: bool,
-    /// Variables of the environment that were not used for it.
+    /// Environment variables that were not used for this coordinator.
     pub(crate) unused: Unused,
 }
 
 impl Remote {
-    /// Says where the work is done, unless the command line says it.
+    /// Prints the coordinator's address, unless it was given on the command line.
     pub(crate) fn tell(&self) {
         if self.from_environment {
             say(&format!("running on {} ({COORDINATOR})", self.endpoint));
@@ -183,12 +184,12 @@ impl Remote {
     }
 }
 
-/// What is told of a job besides its specification.
+/// Properties of a submitted job besides its specification.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct SubmitOptions {
-    /// Rank among the user's own jobs.
+    /// Priority among the user's own jobs.
     pub(crate) priority: u32,
-    /// What people call it; may be empty.
+    /// Name for display; may be empty.
     pub(crate) name: String,
 }
 
@@ -200,8 +201,7 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// Reads the credentials and connects to the coordinator; one that is not there may be about to
-    /// come.
+    /// Reads the credentials and connects to the coordinator; waits if it is still starting.
     pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
         let Remote { endpoint, files, unused, .. } = remote;
         let found = async {
@@ -214,7 +214,7 @@ impl Client {
         Ok(Self { peer: Peer::new(remote), jobs })
     }
 
-    /// The connection, as soon as there is one.
+    /// Retries until there is a connection or the time limit has passed.
     async fn find(
         endpoint: &Endpoint,
         credentials: &Credentials,
@@ -235,8 +235,8 @@ impl Client {
         }
     }
 
-    /// Submits a job; its id. While it is not known whether the coordinator has it, the same
-    /// request is sent again, in all no longer than a client waits.
+    /// Submits a job and returns its id. If a failure leaves unknown whether the coordinator has
+    /// the job, the same request is sent again, within the client's time limit for an answer.
     pub(crate) async fn submit(
         &mut self,
         specification: &JobSpecification,
@@ -272,7 +272,7 @@ impl Client {
         }
     }
 
-    /// All jobs, oldest first.
+    /// Returns all jobs, oldest first.
     pub(crate) async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
         let mut jobs = Vec::new();
         let mut page_token = String::new();
@@ -288,13 +288,13 @@ impl Client {
         Ok(jobs)
     }
 
-    /// The workers that were found to compute wrongly.
+    /// Returns the workers that are expelled because they computed wrongly.
     pub(crate) async fn expelled(&mut self) -> Result<Vec<v1::ExpelledWorker>, ClientError> {
         let call = self.jobs.list_expelled(v1::ListExpelledRequest {});
         Ok(self.peer.answered(call).await?.workers)
     }
 
-    /// Forgets ended jobs; those that are forgotten.
+    /// Deletes ended jobs; returns the ids of the deleted ones.
     pub(crate) async fn prune(
         &mut self,
         older_than: Option<Duration>,
@@ -305,15 +305,15 @@ impl Client {
         Ok(self.peer.answered(call).await?.jobs)
     }
 
-    /// Cancels a job; how it is then.
+    /// Cancels a job; returns its state afterwards.
     pub(crate) async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });
         let snapshot = self.peer.answered(call).await?.snapshot;
         self.present(snapshot, "snapshot")
     }
 
-    /// Follows a job until it has ended, and shows every snapshot to `show`. A coordinator that
-    /// goes away and comes back within 10 s is found again.
+    /// Follows a job until it has ended, and passes every snapshot to `show`. Reconnects to a
+    /// coordinator that comes back within 10 s.
     pub(crate) async fn watch<E: From<ClientError>>(
         &mut self,
         job: &str,
@@ -342,8 +342,8 @@ impl Client {
         }
     }
 
-    /// One stream of snapshots: the last one, or why there is none. The outer error is that of
-    /// `show`.
+    /// Follows a job over one stream; returns the last snapshot, or the error that ended the
+    /// stream. The outer error is that of `show`.
     async fn watch_stream<E>(
         &mut self,
         job: &str,
@@ -356,7 +356,8 @@ impl Client {
             Err(error) => return Ok(Err(error)),
         };
         loop {
-            // No limit here: a job may be long, and the connection is probed while it is silent.
+            // No time limit here: a job may take long, and a silent connection is probed by
+            // keepalives.
             let snapshot = match stream.message().await {
                 Ok(Some(message)) => match self.present(message.snapshot, "snapshot") {
                     Ok(snapshot) => snapshot,
@@ -377,7 +378,7 @@ impl Client {
         }
     }
 
-    /// Everything that an ended job left.
+    /// Fetches the specification, result and history of an ended job.
     pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
         let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
         let mut stream = self.peer.answered(call).await?;
@@ -407,17 +408,17 @@ impl Client {
     }
 }
 
-/// How a job ended; `None` while it has not.
+/// Returns the final status of a job; `None` while it has not ended.
 pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     JOB_STATUS.value(snapshot.status)
 }
 
-/// Reads the files. A pipe among them may take a while, in which signals are looked at.
+/// Reads the credential files on another thread, so that signals are handled while a pipe is read.
 async fn loaded(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Credentials, ClientError> {
     let (files, endpoint) = (files.clone(), endpoint.clone());
     match spawn_blocking(move || Credentials::load(&files, &endpoint)).await {
         Ok(loaded) => Ok(loaded?),
-        // It is never aborted, so it has panicked.
+        // The task is never aborted, so it has panicked.
         Err(error) => resume_unwind(error.into_panic()),
     }
 }

@@ -1,4 +1,4 @@
-//! One file per subcommand, or per family of them.
+//! The subcommands: one file per command, or per family of commands.
 
 mod certs;
 mod coordinator;
@@ -15,13 +15,13 @@ use crate::ending::{Ending, Failure};
 use crate::resolved::Resolved;
 use crate::signals::unless_interrupted;
 
-/// Of commands that begin nothing which others could see.
+/// Message for interrupted commands that have not started anything visible to others.
 const NOTHING_LEFT: &str = "nothing was changed";
 
-/// Does what the command line says.
+/// Executes the command line.
 ///
 /// # Errors
-/// When it cannot be done.
+/// If the command fails.
 pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
     match resolved {
         Resolved::Run(run) => run::run(run).await,

@@ -1,4 +1,4 @@
-//! Who gets in at a coordinator: options about certificates and tokens, checked against the
+//! Access to a coordinator: the options about certificates and tokens, checked against the listen
 //! address.
 
 use std::os::unix::fs::FileTypeExt as _;
@@ -11,21 +11,21 @@ use osteon_coordinator::{BindError, ListenAddress, Listener, Tls, Tokens};
 use crate::arguments::CoordinatorArguments;
 use crate::ending::Failure;
 
-/// What a listener asks of those who come.
+/// Credentials that a listener requires of clients and workers.
 pub(crate) enum Door {
-    /// Nothing.
+    /// None.
     Open,
     /// A token, without TLS.
     Tokens(Tokens),
-    /// Certificates and tokens.
+    /// Certificates, and tokens.
     Tls(Tls, Tokens),
 }
 
 impl Door {
-    /// Reads the files that the options name.
+    /// Reads the files named by the options.
     ///
     /// # Errors
-    /// When one cannot be used, or the options do not fit the address.
+    /// If one cannot be used, or if the options do not fit the address.
     pub(crate) fn open(
         arguments: &CoordinatorArguments,
         address: &ListenAddress,
@@ -69,7 +69,7 @@ impl Door {
     /// Binds the address.
     ///
     /// # Errors
-    /// When it cannot be listened on.
+    /// If it is not possible to listen on it.
     pub(crate) async fn bind(
         self,
         address: &ListenAddress,

@@ -1,4 +1,4 @@
-//! A coordinator in this process and worker processes beside it, on a private Unix socket.
+//! A coordinator in this process, with worker processes on a private Unix socket.
 
 mod workers;
 
@@ -19,17 +19,17 @@ use crate::embedded::workers::Workers;
 use crate::ending::Failure;
 use crate::program;
 
-/// Longest directory of temporary files that leaves room for the socket's name, bytes.
+/// Longest path of a temporary directory that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;
-/// A run ends when its store has taken nothing for this long, s; the same command continues it.
+/// A run ends if its store has accepted no write for this long, s; the same command resumes it.
 const STORE_PATIENCE_S: u64 = 10;
 
-/// Where the coordinator keeps its jobs.
+/// Storage of the coordinator's jobs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum StorePlace {
-    /// Nowhere: they go with the process.
+    /// In memory: the jobs are lost when the process ends.
     Memory,
-    /// In a directory, to continue after an interruption.
+    /// In a directory, so that an interrupted run can be resumed.
     Directory(PathBuf),
 }
 
@@ -38,12 +38,13 @@ pub(crate) struct Embedded {
     coordinator: Coordinator,
     workers: Workers,
     endpoint: Endpoint,
-    /// Holds the socket; removed at the end.
+    /// The directory of the socket; removed at the end.
     _directory: TempDir,
 }
 
 impl Embedded {
-    /// Starts everything; `progress` grows whenever the workers have achieved something.
+    /// Starts coordinator and workers. `progress` increases whenever the workers have completed
+    /// something.
     pub(crate) async fn start(
         store: StorePlace,
         workers: u32,
@@ -61,12 +62,12 @@ impl Embedded {
         Ok(Self { coordinator, workers, endpoint, _directory: directory })
     }
 
-    /// Address of the coordinator.
+    /// Returns the address of the coordinator.
     pub(crate) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// Completes when the workers or the coordinator cannot go on.
+    /// Completes when the workers or the coordinator cannot continue.
     pub(crate) async fn failed(&mut self) -> Failure {
         tokio::select! {
             failure = self.workers.failed() => failure,
@@ -74,7 +75,7 @@ impl Embedded {
         }
     }
 
-    /// Ends and reaps the workers, then the coordinator.
+    /// Ends and reaps the workers, then ends the coordinator.
     pub(crate) async fn end(self) {
         self.workers.end().await;
         self.coordinator.shutdown().await;
@@ -86,7 +87,7 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
     let listener = listener.map_err(Failure::failed)?;
     let store: Box<dyn Store + Send> = match store {
         StorePlace::Memory => Box::new(MemoryStore::new()),
-        // This process submits its job again: one that is lost is computed anew.
+        // Lost jobs are accepted here: this process submits its job again, and it is recomputed.
         StorePlace::Directory(path) => {
             let store = SqliteStore::open_with(&path, LostJobs::Accept);
             Box::new(store.map_err(Failure::failed)?)
@@ -97,13 +98,13 @@ async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordin
     osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
 }
 
-/// A directory that only this user can enter.
+/// Creates a directory that only this user can enter.
 fn private_directory() -> anyhow::Result<TempDir> {
     use std::os::unix::fs::PermissionsExt as _;
     let mut builder = tempfile::Builder::new();
     builder.prefix("osteon-").permissions(std::fs::Permissions::from_mode(0o700));
     let parent = std::env::temp_dir();
-    // The kernel takes short paths of sockets only.
+    // The kernel accepts only short paths of sockets.
     let parent = if parent.as_os_str().len() <= TEMPORARY_BYTES_MAX {
         parent
     } else {

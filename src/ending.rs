@@ -1,28 +1,29 @@
-//! How a command ends, and the exit code of each way.
+//! The ways in which a command ends, with their exit codes.
 
 use std::fmt;
 
 use crate::client::ClientError;
 
-/// A command that ran to its end.
+/// Outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ending {
-    /// Exit code 0.
+    /// The command succeeded: exit code 0.
     Done,
-    /// The result is there, and says that the run failed or was cancelled: exit code 1.
+    /// There is a result, which says that the run failed or was cancelled: exit code 1.
     RunFailed,
 }
 
-/// A command that did not run to its end.
+/// Reason why a command did not run to its end.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Bad usage or bad input; nothing was started. Exit code 2.
     BadInput(anyhow::Error),
-    /// Everything else. Exit code 1.
+    /// Any other error. Exit code 1.
     Failed(anyhow::Error),
-    /// A signal ended the command; what becomes of what was begun. Exit code 130 or 143.
+    /// A signal ended the command; the text says what happens to the work begun. Exit code 130 or
+    /// 143.
     Interrupted(Interruption, &'static str),
-    /// Whoever reads stdout has seen enough. Exit code 0.
+    /// The reader of stdout has closed it. Exit code 0.
     ClosedPipe,
 }
 
@@ -36,7 +37,7 @@ pub(crate) enum Interruption {
 }
 
 impl Interruption {
-    /// As shells count it: 128 and the number of the signal.
+    /// Returns the exit code by the convention of shells: 128 plus the number of the signal.
     pub(crate) fn exit_code(self) -> u8 {
         match self {
             Self::Interrupted => 130,
@@ -46,18 +47,18 @@ impl Interruption {
 }
 
 impl Failure {
-    /// Bad usage or bad input.
+    /// Creates the failure of bad usage or bad input.
     pub(crate) fn bad_input(error: impl Into<anyhow::Error>) -> Self {
         Self::BadInput(error.into())
     }
 
-    /// Something that is not the user's fault.
+    /// Creates a failure that is not caused by the user's input.
     pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Self {
         Self::Failed(error.into())
     }
 
-    /// A path that was given cannot be used: bad input where another path would do, failed where
-    /// the machine is at fault, as with a full disk.
+    /// Creates the failure of a path that cannot be used: bad input if another path could be,
+    /// failed if the machine is the cause, as with a full disk.
     pub(crate) fn unusable_path(error: std::io::Error, context: String) -> Self {
         use std::io::ErrorKind;
         let of_the_path = matches!(
@@ -75,7 +76,7 @@ impl Failure {
         if of_the_path { Self::BadInput(error) } else { Self::Failed(error) }
     }
 
-    /// Exit code of the process.
+    /// Returns the exit code of the process.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Interrupted(interruption, _) => interruption.exit_code(),
@@ -91,7 +92,7 @@ impl fmt::Display for Failure {
         match self {
             Self::BadInput(error) | Self::Failed(error) => {
                 write!(f, "{error}")?;
-                // Causes that the message does not already tell.
+                // Append only the causes that the message does not contain already.
                 let mut told = error.to_string();
                 for cause in error.chain().skip(1) {
                     let text = cause.to_string();
@@ -115,7 +116,7 @@ impl From<ClientError> for Failure {
     }
 }
 
-/// An error of writing to stdout.
+/// Converts an error of writing to stdout.
 pub(crate) fn stdout_failure(error: std::io::Error) -> Failure {
     if error.kind() == std::io::ErrorKind::BrokenPipe {
         return Failure::ClosedPipe;

@@ -1,4 +1,4 @@
-//! What the environment says of a coordinator: options that every command would repeat.
+//! The environment variables that replace options about the coordinator.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -10,17 +10,17 @@ use osteon_proto::endpoint::Endpoint;
 
 use crate::ending::Failure;
 
-/// Names the coordinator.
+/// The variable with the address of the coordinator.
 pub(crate) const COORDINATOR: &str = "OSTEON_COORDINATOR";
 const TLS_CA: &str = "OSTEON_TLS_CA";
 const TLS_CERT: &str = "OSTEON_TLS_CERT";
 const TLS_KEY: &str = "OSTEON_TLS_KEY";
 const TOKEN_FILE: &str = "OSTEON_TOKEN_FILE";
 
-/// The variables that name files of certificates and a token.
+/// The variables that name credential files.
 pub(crate) const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
 
-/// What the environment says; an option counts before it, and an empty variable counts as none.
+/// The values of the variables. An option takes precedence, and an empty variable counts as unset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Environment {
     coordinator: Option<String>,
@@ -31,15 +31,15 @@ impl Environment {
     /// Reads the variables of this process.
     ///
     /// # Errors
-    /// When the name of the coordinator is no text.
+    /// If the coordinator's address is not valid Unicode.
     pub(crate) fn of_process() -> Result<Self, Failure> {
         Self::read(|name| std::env::var_os(name))
     }
 
-    /// Reads the variables that `variable` knows.
+    /// Reads the variables through the function `variable`.
     ///
     /// # Errors
-    /// As [`of_process`](Self::of_process).
+    /// Same as [`of_process`](Self::of_process).
     pub(crate) fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, Failure> {
         let given = |name| variable(name).filter(|value| !value.is_empty());
         let file = |name| given(name).map(PathBuf::from);
@@ -57,10 +57,10 @@ impl Environment {
         })
     }
 
-    /// The coordinator that the environment names, if it names one.
+    /// Returns the coordinator named in the environment, if there is one.
     ///
     /// # Errors
-    /// When what it names is no address.
+    /// If the value is not an address.
     pub(crate) fn coordinator(&self) -> Result<Option<Endpoint>, Failure> {
         let parsed = self.coordinator.as_deref().map(str::parse::<Endpoint>).transpose();
         parsed.map_err(|error| {
@@ -68,10 +68,10 @@ impl Environment {
         })
     }
 
-    /// The coordinator that a command cannot do without.
+    /// Returns the coordinator of a command that requires one.
     ///
     /// # Errors
-    /// When neither the option nor the environment names one.
+    /// If neither the option nor the environment names one.
     pub(crate) fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, Failure> {
         match option {
             Some(endpoint) => Ok(endpoint),
@@ -83,10 +83,10 @@ impl Environment {
         }
     }
 
-    /// The files for the coordinator at `endpoint`: those of the options, and those of the
-    /// environment where there is no option and the address has a use for them. A certificate and
-    /// its key come from the same place. Where the environment names another coordinator, its files
-    /// are that one's: they are not used, and a token of theirs is not shown to a stranger.
+    /// Returns the files for the coordinator at `endpoint`: those of the options, and, where there
+    /// is no option and the address can use them, those of the environment. Certificate and key are
+    /// always taken from the same source. If the environment names another coordinator, its files
+    /// belong to that one: they are not used, so that a stranger never receives their token.
     pub(crate) fn files(
         &self,
         options: CredentialFiles,
@@ -117,7 +117,8 @@ impl Environment {
     }
 }
 
-/// Whether the text is the address of the coordinator at `endpoint`. Names of hosts have no case.
+/// Returns whether the text is the address of the coordinator at `endpoint`. Host names ignore
+/// case.
 fn is_at(text: &str, endpoint: &Endpoint) -> bool {
     match (text.parse(), endpoint) {
         (Ok(Endpoint::Https(one)), Endpoint::Https(other))
@@ -127,8 +128,8 @@ fn is_at(text: &str, endpoint: &Endpoint) -> bool {
     }
 }
 
-/// Variables that were not used, because the environment names another coordinator than the command
-/// line; perhaps none.
+/// Variables that were not used because the environment names a different coordinator from the
+/// command line; may be empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Unused(Vec<(&'static str, &'static str)>);
 
@@ -144,7 +145,7 @@ impl Unused {
         Self(named.map(|(_, variable, option)| (variable, option)).collect())
     }
 
-    /// Whether every variable that had a use was used.
+    /// Returns whether no variable was left unused.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -176,7 +177,7 @@ mod tests {
         of_coordinator(Some("https://a:1"))
     }
 
-    /// Every file, and the coordinator that is named.
+    /// An environment with every file, and the given coordinator.
     fn of_coordinator(named: Option<&str>) -> Environment {
         let mut variables =
             vec![(TLS_CA, "ca"), (TLS_CERT, "cert"), (TLS_KEY, "key"), (TOKEN_FILE, "token")];
@@ -184,7 +185,7 @@ mod tests {
         environment(&variables)
     }
 
-    /// Authority, certificate, key and token that are used at `url`.
+    /// Returns authority, certificate, key and token that are used at `url`.
     fn used(environment: &Environment, options: CredentialFiles, url: &str) -> [String; 4] {
         let (files, _) = environment.files(options, &url.parse().unwrap());
         [files.ca, files.certificate, files.key, files.token]
@@ -219,7 +220,7 @@ mod tests {
         assert_eq!(used(&all(), ca, "https://a:1"), ["mine", "cert", "key", "token"]);
         let token = CredentialFiles { token: Some("mine".into()), ..none() };
         assert_eq!(used(&all(), token, "https://a:1"), ["ca", "cert", "key", "mine"]);
-        // A certificate never meets the key of another.
+        // A certificate is never combined with a key from another source.
         let certificate = CredentialFiles { certificate: Some("mine".into()), ..none() };
         assert_eq!(used(&all(), certificate, "https://a:1"), ["ca", "mine", "-", "token"]);
     }
@@ -230,7 +231,7 @@ mod tests {
         for (url, expected) in [
             ("http://127.0.0.1:1", ["-", "-", "-", "token"]),
             ("unix:/run/osteon", ["-", "-", "-", "token"]),
-            // There a token could be read by others.
+            // The token would be sent unencrypted to this address.
             ("http://node-1:1", ["-", "-", "-", "-"]),
         ] {
             assert_eq!(used(&of_coordinator(Some(url)), none(), url), expected, "{url}");
@@ -244,7 +245,8 @@ mod tests {
         for (named, url, expected) in [
             (Some("https://a:1"), "https://a:1", every),
             (Some("https://A:1/"), "https://a:1", every),
-            // Then they are for whatever the command line names.
+            // Without an address in the environment, the files apply to any coordinator on the
+            // command line.
             (None, "https://b:1", every),
             (Some(""), "https://b:1", every),
             (Some("https://a:1"), "https://b:1", ["-"; 4]),
@@ -262,7 +264,8 @@ mod tests {
             (!unused.is_empty()).then(|| unused.to_string())
         };
         assert_eq!(unused(none(), "https://a:1"), None);
-        // Neither is missed where there is an option, or no use.
+        // Variables are not reported as unused if there is an option, or if the address cannot use
+        // them.
         assert_eq!(unused(none(), "http://b:1"), None);
         let told = unused(mine, "https://b:1").unwrap();
         assert_eq!(

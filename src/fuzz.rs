@@ -1,5 +1,5 @@
-//! Directories of results whose files are damaged: what is stored is shown, judged or refused, and
-//! never a panic.
+//! Fuzzing of results directories with damaged files: the stored result is shown, interpreted or
+//! refused, without ever panicking.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn specification(kind: JobKind) -> JobSpecification {
     texts("jobs").iter().find_map(read).unwrap()
 }
 
-/// Does with `result.json` what commands do.
+/// Uses `result.json` as the commands do.
 fn check_result(json: &str) {
     let Ok(result) = bounded(json.len(), || ResultFile::from_json(json)) else { return };
     let specification = specification(result.kind());
@@ -40,7 +40,7 @@ fn check_result(json: &str) {
     }
 }
 
-/// A directory with these files: its result is taken only with the job that it belongs to.
+/// Reads a directory with these files: its result is accepted only with the job that it belongs to.
 fn check_directory(job: &str, json: &str) {
     for kind in KINDS {
         let specification = specification(kind);
@@ -50,7 +50,7 @@ fn check_directory(job: &str, json: &str) {
         let stored = bounded(job.len() + json.len(), || {
             ResultsDirectory::stored(directory.path(), &specification)
         });
-        // Only that of an identification has data.
+        // Only the job of an identification has data.
         let parse = |kind| job_file::parse(job, FileFormat::Toml, Path::new(""), kind).ok();
         let read = KINDS.into_iter().find_map(parse);
         let same =
@@ -67,7 +67,7 @@ fn check_directory(job: &str, json: &str) {
     }
 }
 
-/// Jobs as a run writes them.
+/// Returns jobs as a run writes them.
 fn stored_jobs() -> Vec<String> {
     KINDS.map(|kind| job_file::to_toml(&specification(kind))).to_vec()
 }

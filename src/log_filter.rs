@@ -1,4 +1,4 @@
-//! What is logged: the variable RUST_LOG, or a default.
+//! Log filter: the environment variable RUST_LOG, or a default.
 
 use std::ffi::OsString;
 
@@ -7,17 +7,17 @@ use tracing_subscriber::EnvFilter;
 
 use crate::ending::Failure;
 
-/// Where the environment says what is logged.
+/// The environment variable with the log filter.
 pub(crate) const VARIABLE: &str = "RUST_LOG";
 
-/// The levels, and what turns everything off.
+/// The log levels, including the one that turns everything off.
 const LEVELS: [&str; 6] = ["off", "error", "warn", "info", "debug", "trace"];
 
-/// The filter that `value` describes; of `default_level` if there is none, or an empty one.
+/// Returns the filter described by `value`, or that of `default_level` if it is absent or empty.
 ///
 /// # Errors
-/// When it cannot be read, or has a word that is neither a level nor a module with one: such a word
-/// would turn off everything that it does not name.
+/// If it cannot be parsed, or contains a word that is neither a level nor a module with a level:
+/// such a word would turn off everything that it does not name.
 pub(crate) fn read(value: Option<OsString>, default_level: &str) -> Result<EnvFilter, Failure> {
     let text = value.map(OsString::into_string).transpose();
     let text = text.map_err(|value| wrong(&value.to_string_lossy(), "it is no text"))?;

@@ -1,4 +1,4 @@
-//! The front door of osteon: reads the command line, calls the crates behind it, prints.
+//! The command line of osteon: parses arguments, calls the other crates, prints results.
 //!
 //! Results go to stdout through [`output`], everything else to stderr. Exit codes: 0 done, 1 the
 //! run failed or was cancelled, 2 bad usage or bad input, 130 and 143 ended by SIGINT and SIGTERM.
@@ -46,7 +46,7 @@ fn main() -> ExitCode {
         Ok(Ending::Done) | Err(Failure::ClosedPipe) => ExitCode::SUCCESS,
         Ok(Ending::RunFailed) => ExitCode::from(1),
         Err(failure) => {
-            // Nothing is left to be done when stderr is closed, too.
+            // If stderr is closed as well, nothing more can be done.
             let message = failure.to_string();
             let _closed = writeln!(std::io::stderr(), "osteon: {}", visible::lines(&message));
             ExitCode::from(failure.exit_code())
@@ -63,15 +63,15 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
         .build()
         .map_err(|error| Failure::failed(anyhow::Error::new(error).context("cannot start")))?;
     let result = runtime.block_on(commands::run(resolved));
-    // A computation that was given up may still hold a thread; nobody waits for it.
+    // An abandoned computation may still occupy a thread; its result is not needed.
     runtime.shutdown_background();
     result
 }
 
-/// Logs go to stderr; `RUST_LOG` overrides the level.
+/// Sends logs to stderr; `RUST_LOG` overrides the level.
 ///
 /// # Errors
-/// When `RUST_LOG` cannot be meant.
+/// If `RUST_LOG` is not a valid filter.
 fn trace(default_level: &str) -> Result<(), Failure> {
     let filter = log_filter::read(std::env::var_os(log_filter::VARIABLE), default_level)?;
     tracing_subscriber::fmt()

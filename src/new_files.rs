@@ -1,4 +1,4 @@
-//! Files that are made and never replaced: certificates, keys, tokens.
+//! Creation of files that are never overwritten: certificates, keys, tokens.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
@@ -10,20 +10,20 @@ use osteon_common::{user_file, visible};
 
 use crate::ending::Failure;
 
-/// A file to be made.
+/// A file to be created.
 pub(crate) struct NewFile {
-    /// Where.
+    /// Path of the file.
     pub(crate) path: PathBuf,
-    /// What it holds.
+    /// Content of the file.
     pub(crate) text: String,
     /// Whether only its owner may read it.
     pub(crate) secret: bool,
 }
 
-/// Makes all files, or none.
+/// Creates all files, or none.
 ///
 /// # Errors
-/// When one of them is there already (bad input), or cannot be written.
+/// If one of them already exists (bad input), or cannot be written.
 pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
     for NewFile { path, .. } in files {
         if path.symlink_metadata().is_ok() {
@@ -36,7 +36,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
     for (made, file) in files.iter().enumerate() {
         if let Err(error) = write(file) {
             for earlier in &files[..made] {
-                // The first error is the one to tell.
+                // Report the first error, not one of the clean-up.
                 drop(fs::remove_file(&earlier.path));
             }
             let context = format!("cannot write {}", visible::path(&file.path));
@@ -46,10 +46,10 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes a directory that only its owner can enter; one that is there stays as it is.
+/// Creates a directory that only its owner can enter; an existing directory is left as it is.
 ///
 /// # Errors
-/// When it cannot be made.
+/// If it cannot be created.
 pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
     made.map_err(|error| {
@@ -60,17 +60,17 @@ pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
     })
 }
 
-/// Adds a line to a secret file, which is made if need be.
+/// Appends a line to a secret file, which is created if necessary.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If it cannot be written.
 pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
         let mut options = OpenOptions::new();
         let options = options.read(true).append(true).create(true).mode(0o600);
         let mut file = user_file::open_with(options, path)?;
         let whole = ends_with_newline(&file)?;
-        // In one piece: others may add lines at the same time.
+        // Written in a single call, because others may append lines at the same time.
         file.write_all(format!("{}{line}\n", if whole { "" } else { "\n" }).as_bytes())?;
         file.sync_all()
     };
@@ -85,13 +85,13 @@ fn write(file: &NewFile) -> std::io::Result<()> {
     let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
     let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
     if written.is_err() {
-        // Half a file is none.
+        // An incomplete file is useless.
         drop(fs::remove_file(&file.path));
     }
     written
 }
 
-/// Whether a line can be added behind the last byte.
+/// Returns whether the file is empty or ends with a newline, so that a line can be appended.
 fn ends_with_newline(file: &fs::File) -> std::io::Result<bool> {
     use std::os::unix::fs::FileExt as _;
     let length = file.metadata()?.len();

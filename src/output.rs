@@ -1,4 +1,4 @@
-//! What goes to stdout: one trait, one implementation for people and one for programs.
+//! Output to stdout: one trait, with one implementation for people and one for programs.
 
 pub(crate) mod json;
 mod text;
@@ -26,24 +26,24 @@ pub(crate) struct ShownResult<'a> {
     pub(crate) specification: &'a JobSpecification,
     /// The result.
     pub(crate) result: &'a ResultFile,
-    /// Where the files are, if they are kept.
+    /// Directory of the result files, if they are kept.
     pub(crate) directory: Option<&'a Path>,
 }
 
 /// A simulation to show.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShownSimulation<'a> {
-    /// What was simulated.
+    /// The setup that was simulated.
     pub(crate) setup: &'a Setup,
-    /// What was picked.
+    /// The picked arrival, or the failure.
     pub(crate) arrival: &'a Result<Arrival, Failure>,
-    /// The file of the traces, if there is one.
+    /// The file of the traces, if it was written.
     pub(crate) traces: Option<&'a Path>,
-    /// The same case solved in other ways, if that was asked for.
+    /// Comparison of other solutions of the same case, if requested.
     pub(crate) check: Option<&'a Check>,
 }
 
-/// The object `solver` of one solved case: the sampling that decided, where it is known.
+/// Returns the object `solver` of one solved case, with the sampling that was decisive, if known.
 fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     let error = arrival.map(|arrival| arrival.estimated_error);
     let mut solver = Solver::new(&setup.solver, NominalSampling::of(setup), error);
@@ -57,42 +57,42 @@ fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     solver
 }
 
-/// One way to print. Every method writes whole lines.
+/// An output format. Every method writes whole lines.
 pub(crate) trait Output {
-    /// The result of a job.
+    /// Prints the result of a job.
     fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()>;
-    /// The outcome of one case.
+    /// Prints the outcome of one case.
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
-    /// The id of an accepted job.
+    /// Prints the id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
-    /// All jobs, and the workers that are expelled.
+    /// Prints all jobs, and the workers that are expelled.
     fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()>;
-    /// The attached workers, those that went last, and those that are expelled.
+    /// Prints the attached workers, those that left last, and those that are expelled.
     fn workers(
         &mut self,
         workers: &ListWorkersResponse,
         expelled: &[ExpelledWorker],
     ) -> io::Result<()>;
-    /// One worker as of now.
+    /// Prints the current state of one worker.
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
-    /// That a coordinator serves, or why it does not.
+    /// Prints that a coordinator serves, or why it does not.
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
-    /// The copy of a store in a file.
+    /// Prints the file of a copy of a store.
     fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()>;
-    /// The jobs that are forgotten.
+    /// Prints the ids of the deleted jobs.
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()>;
-    /// One job as of now.
+    /// Prints the current state of one job.
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()>;
-    /// A text that is the same for people and programs: a case file, a URL.
+    /// Prints a text that is the same for people and programs: a case file, a URL.
     fn verbatim(&mut self, text: &str) -> io::Result<()>;
 }
 
-/// The output of `format` on stdout.
+/// Returns the output of `format` on stdout.
 pub(crate) fn stdout(format: Format) -> Box<dyn Output> {
     on(format, Box::new(io::stdout()))
 }
 
-/// The output of `format` on `writer`.
+/// Returns the output of `format` on `writer`.
 pub(crate) fn on<'a>(format: Format, writer: Box<dyn Write + 'a>) -> Box<dyn Output + 'a> {
     match format {
         Format::Text => Box::new(text::TextOutput::new(writer)),

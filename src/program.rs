@@ -1,18 +1,18 @@
-//! What this program is, for people and for results.
+//! Identification of this program, for users and for results.
 
 use std::sync::LazyLock;
 
 use osteon_common::version::{NUMERICS_REVISION, Program, RESULT_SCHEMA, VERSION};
 
-/// The commit that it was built from; `None` if it was built outside a repository.
+/// The commit from which it was built; `None` if it was built outside a repository.
 pub(crate) const COMMIT: Option<&str> = option_env!("OSTEON_BUILD_COMMIT");
 
-/// This program.
+/// Returns version, numerics and commit of this program.
 pub(crate) fn this() -> Program {
     Program::this(COMMIT)
 }
 
-/// What `--version` prints behind the name.
+/// Returns the text that `--version` prints after the name.
 pub(crate) fn version_line() -> &'static str {
     static LINE: LazyLock<String> = LazyLock::new(|| {
         let commit = COMMIT.unwrap_or("unknown");

@@ -1,4 +1,4 @@
-//! What a run shows on stderr while it computes: a few lines on a terminal, else one line a minute.
+//! Progress of a run on stderr: a few lines on a terminal, otherwise one line a minute.
 
 mod display;
 mod observer;
@@ -17,16 +17,16 @@ use tracing_subscriber::fmt::MakeWriter;
 pub(crate) use self::display::{Observed, line, span};
 use self::observer::Observer;
 
-/// Time between two lines where there is no terminal, s.
+/// Time between two lines if stderr is not a terminal, s.
 const LINE_INTERVAL_S: u64 = 60;
-/// How often a terminal is drawn, per second.
+/// Redraws of a terminal per second.
 const DRAWN_HZ: u8 = 8;
-/// Columns of a terminal that does not tell.
+/// Columns assumed for a terminal of unknown width.
 const WIDTH_DEFAULT: usize = 80;
 /// Narrowest terminal for which lines are laid out.
 const WIDTH_MIN: usize = 40;
 
-/// Bars of this process; empty where stderr is no terminal.
+/// Progress bars of this process; empty if stderr is not a terminal.
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
 
 /// Progress of one run.
@@ -39,14 +39,14 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Nothing done yet of this job.
+    /// Starts to show the progress of this job.
     pub(crate) fn start(specification: &JobSpecification) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bars = BARS.get_or_init(|| {
                 MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(DRAWN_HZ))
             });
             let bar = bars.add(ProgressBar::no_length());
-            // Falls back to the library's own look if the template were wrong.
+            // If the template were invalid, the library's default style would be used.
             if let Ok(style) = ProgressStyle::with_template("{msg}") {
                 bar.set_style(style);
             }
@@ -57,7 +57,7 @@ impl Progress {
         Self { bar, begun, last_line: begun, observer }
     }
 
-    /// Shows how far the job is.
+    /// Shows the progress of the job.
     pub(crate) fn show(&mut self, snapshot: &JobSnapshot) {
         let observed = self.observer.observe(snapshot, self.begun.elapsed());
         if let Some(bar) = &self.bar {
@@ -68,13 +68,13 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
             if let Some(bars) = BARS.get() {
                 bars.remove(bar);
-                // Fails only when stderr is closed.
+                // Fails only if stderr is closed.
                 drop(bars.clear());
             }
         }
@@ -87,7 +87,7 @@ impl Drop for Progress {
     }
 }
 
-/// How many evaluations of a job would measure derivatives, beside those of its searches.
+/// Returns how many evaluations of a job measure derivatives, in addition to those of its searches.
 fn derivatives(specification: &JobSpecification) -> u64 {
     if specification.kind == JobKind::Propagation {
         return 0;
@@ -98,16 +98,16 @@ fn derivatives(specification: &JobSpecification) -> u64 {
     specification.evaluations_max().saturating_sub(searches)
 }
 
-/// Columns of the terminal as it is now.
+/// Returns the current number of columns of the terminal.
 fn terminal_width() -> usize {
     let width = terminal_size_of(std::io::stderr()).map(|(Width(width), _)| usize::from(width));
     width.filter(|width| *width > 0).unwrap_or(WIDTH_DEFAULT).max(WIDTH_MIN)
 }
 
-/// One line on stderr, above a bar if there is one.
+/// Prints one line on stderr, above a bar if there is one.
 pub(crate) fn say(line: &str) {
     let line = visible::lines(line);
-    // Nothing is left to be done when stderr is closed.
+    // If stderr is closed, nothing more can be done.
     let write = || drop(writeln!(std::io::stderr(), "{line}"));
     match BARS.get() {
         Some(bars) => bars.suspend(write),
@@ -115,7 +115,7 @@ pub(crate) fn say(line: &str) {
     }
 }
 
-/// Where logs go: stderr, above a bar if there is one.
+/// Writer of the logs: stderr, above a bar if there is one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LogWriter;
 
@@ -144,7 +144,7 @@ impl Write for LogWriter {
     }
 }
 
-/// An event of the log as one line: what others have said in it begins no line of its own.
+/// Returns a log event as one line: line breaks and hidden characters are escaped.
 fn shown(event: &[u8]) -> String {
     let text = String::from_utf8_lossy(event);
     match text.strip_suffix('\n') {

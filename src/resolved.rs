@@ -1,4 +1,4 @@
-//! What the command line means: environment and defaults resolved, files not yet read.
+//! The command line with environment and defaults resolved; files have not been read yet.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -20,28 +20,28 @@ use crate::ending::Failure;
 use crate::environment::{Environment, Unused};
 use crate::request::Request;
 
-/// Worker processes of a run on this machine, unless given.
+/// Default number of worker processes of a run on this machine.
 const WORKERS_DEFAULT: u32 = 2;
 
-/// Format of what goes to stdout.
+/// Format of the output on stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
-    /// For people.
+    /// Text for people.
     Text,
-    /// For programs.
+    /// JSON for programs.
     Json,
 }
 
-/// What is to be done.
+/// The command to be executed.
 #[derive(Debug)]
 pub(crate) enum Resolved {
     /// `identify`, `propagate`.
     Run(Run),
     /// `simulate`.
     Simulate {
-        /// What, and what of it is wanted.
+        /// The case and the requested output.
         arguments: SimulateArguments,
-        /// What computes.
+        /// The instruction set to compute on.
         isa: Isa,
     },
     /// `draw`.
@@ -50,11 +50,11 @@ pub(crate) enum Resolved {
     Coordinator(CoordinatorArguments),
     /// `worker`.
     Worker {
-        /// How it works; without credentials yet.
+        /// Configuration of the worker, still without credentials.
         config: WorkerConfig,
-        /// Files of certificates and a token.
+        /// The credential files.
         files: CredentialFiles,
-        /// Variables that were not used for it.
+        /// Environment variables that were not used for its coordinator.
         unused: Unused,
     },
     /// `certs`.
@@ -67,119 +67,119 @@ pub(crate) enum Resolved {
     Submit {
         /// The job file.
         job: PathBuf,
-        /// What the job does.
+        /// Kind of the job.
         kind: JobKind,
-        /// The request that stands for it.
+        /// The request, which makes the submission idempotent.
         request: Request,
-        /// What is told besides.
+        /// Further properties of the job.
         options: SubmitOptions,
-        /// Where to.
+        /// The coordinator to submit to.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `jobs`.
     Jobs {
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `jobs prune`.
     Prune {
-        /// Only jobs that ended longer ago.
+        /// Only jobs that ended longer ago than this.
         older_than: Option<Duration>,
-        /// So many that ended last are kept.
+        /// Number of most recently ended jobs that are kept.
         keep_last: Option<u64>,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `workers`.
     Workers {
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `workers drain`.
     DrainWorker {
         /// Number of the worker.
         worker: u64,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `health`.
     Health {
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
         /// Longest wait for the answer.
         limit: Duration,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `backup`.
     Backup {
-        /// Where to.
+        /// Directory for the copy.
         directory: PathBuf,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// How to print.
+        /// Output format.
         format: Format,
     },
     /// `watch`.
     Watch {
         /// Id of the job.
         job: String,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
     },
     /// `cancel`.
     Cancel {
         /// Id of the job.
         job: String,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
     },
     /// `fetch`.
     Fetch {
         /// Id of the job.
         job: String,
-        /// Of whom.
+        /// The coordinator to ask.
         coordinator: Remote,
-        /// Where to.
+        /// Directory for the results.
         out: PathBuf,
     },
 }
 
-/// One run of a job, from its file to its result.
+/// One run of a job, from its job file to its result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// What the job does.
+    /// Kind of the job.
     pub(crate) kind: JobKind,
     /// The job file.
     pub(crate) job: PathBuf,
-    /// Who computes.
+    /// The computers of the run.
     pub(crate) place: Place,
-    /// What people call the job; may be empty.
+    /// Name of the job for display; may be empty.
     pub(crate) name: String,
-    /// Where results are kept, if anywhere.
+    /// Directory for the results, if they are kept.
     pub(crate) out: Option<PathBuf>,
-    /// How to print.
+    /// Output format.
     pub(crate) format: Format,
 }
 
-/// Who computes a run.
+/// The computers of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// Worker processes of this one.
+    /// Worker processes started by this process.
     Here {
-        /// How many.
+        /// Number of worker processes.
         workers: u32,
-        /// Threads of each.
+        /// Number of threads of each worker.
         threads: u32,
     },
     /// A running coordinator.
@@ -205,7 +205,7 @@ impl Resolved {
         let run = |kind, run| {
             let run = resolve_run(kind, run, cores, &environment)?;
             if matches!(run.place, Place::Here { .. }) {
-                // Workers read it again; a wrong one is told here, at once.
+                // Workers read the variable again, but an invalid value is reported here, at once.
                 isa()?;
             }
             Ok::<_, Failure>(Self::Run(run))
@@ -256,7 +256,7 @@ impl Resolved {
         })
     }
 
-    /// Services tell what happens; commands only what is wrong.
+    /// Returns the default log level: services log their events, commands only problems.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
             Self::Coordinator(_) | Self::Worker { .. } => "info",
@@ -265,7 +265,7 @@ impl Resolved {
     }
 }
 
-/// Text or JSON.
+/// Returns JSON or text.
 pub(crate) fn format(json: bool) -> Format {
     if json { Format::Json } else { Format::Text }
 }
@@ -303,7 +303,7 @@ fn resolve_run(
     Ok(Run { kind, job, place, name: name.unwrap_or_default(), out, format: format(json) })
 }
 
-/// `jobs` and what is below it.
+/// Resolves `jobs` and its subcommands.
 fn resolve_jobs(
     arguments: JobsArguments,
     remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
@@ -320,7 +320,7 @@ fn resolve_jobs(
     })
 }
 
-/// `workers` and what is below it.
+/// Resolves `workers` and its subcommands.
 fn resolve_workers(
     arguments: WorkersArguments,
     remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
@@ -391,7 +391,7 @@ mod tests {
         resolve_run(JobKind::Identification, arguments, cores, &environment).unwrap()
     }
 
-    /// The coordinator that is named, and files for it.
+    /// An environment with this coordinator, and files for it.
     fn environment(coordinator: Option<&str>) -> Environment {
         let files = ["OSTEON_TLS_CA", "OSTEON_TOKEN_FILE"];
         Environment::read(|name| match name {

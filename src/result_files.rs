@@ -1,5 +1,5 @@
-//! The files of a results directory as they are written: each by rename, and at the end
-//! `provenance.json`, which says of all of them what made them.
+//! Writing the files of a results directory: each by rename, followed by `provenance.json`, which
+//! records the origin of all of them, and finally the result.
 
 use std::fs;
 use std::io::{self, BufWriter, IntoInnerError, Write};
@@ -10,31 +10,31 @@ use osteon_common::version::{Program, RESULT_SCHEMA};
 use osteon_common::{user_file, visible};
 use serde_json::{Value, json};
 
-/// The file of a result, written last: a directory with it is complete.
+/// The result file, written last: a directory that contains it is complete.
 pub(crate) const RESULT: &str = "result.json";
-/// The file that says what made the others.
+/// The file that records the origin of the other files.
 pub(crate) const PROVENANCE: &str = "provenance.json";
 
-/// What made the files of a directory.
+/// Origin of the files of a directory.
 pub(crate) struct Origin<'a> {
-    /// What was computed: `kind` of the result.
+    /// Kind of the computation: `kind` of the result.
     pub(crate) kind: &'a str,
     /// The program that computed the result.
     pub(crate) program: &'a Program,
     /// Digest of the result, if it has one.
     pub(crate) digest: Option<&'a str>,
-    /// Seed of the germs, if there were any.
+    /// Seed of the germs, if any were drawn.
     pub(crate) seed: Option<u64>,
 }
 
-/// Files that are written to a directory one after the other.
+/// Writer of the files of a directory, one after another.
 pub(crate) struct ResultFiles<'a> {
     directory: &'a Path,
     written: Vec<Value>,
 }
 
 impl<'a> ResultFiles<'a> {
-    /// From now on the directory has no complete result, until [`finish`](Self::finish).
+    /// Removes an old result: the directory is incomplete until [`finish`](Self::finish).
     pub(crate) fn begin(directory: &'a Path) -> anyhow::Result<Self> {
         for name in [RESULT, PROVENANCE] {
             remove_if_there(&directory.join(name))?;
@@ -47,7 +47,7 @@ impl<'a> ResultFiles<'a> {
         self.write_by(name, |file| file.write_all(text.as_bytes()))
     }
 
-    /// The same of what `print` writes piece by piece.
+    /// Same as [`write`](Self::write), for a text that `print` writes piece by piece.
     pub(crate) fn write_by(
         &mut self,
         name: &str,
@@ -89,7 +89,7 @@ impl<'a> ResultFiles<'a> {
     }
 }
 
-/// Takes the hash of what is written.
+/// Writer that also hashes the bytes written.
 struct Hashing<'a> {
     file: &'a mut dyn Write,
     hash: &'a mut blake3::Hasher,
@@ -107,7 +107,8 @@ impl Write for Hashing<'_> {
     }
 }
 
-/// Writes `text` to `path` so that a reader sees either what was there before, or all of it.
+/// Writes `text` to `path` atomically: a reader sees either the previous content or all of the new
+/// one.
 pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     write_by(path, |file| file.write_all(text.as_bytes()))
 }

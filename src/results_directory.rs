@@ -1,9 +1,9 @@
-//! The directory of a run: what stands in it, and in which order it is written.
+//! The directory of a run: its files, and the order in which they are written.
 //!
 //! `job.toml` is written first, when the job is accepted, and `result.json` last, by rename: a
-//! directory with a `result.json` is complete. What serves to continue (`store`, `.request`) goes
-//! only after that, and only when there is nothing to continue: the result is not that of a
-//! cancelled job.
+//! directory with a `result.json` is complete. The data needed to resume (`store`, `.request`) are
+//! removed only after that, and only if the run cannot be resumed, i.e. unless the result is that
+//! of a cancelled job.
 
 use std::fs::{self, File, TryLockError};
 use std::os::unix::fs::MetadataExt as _;
@@ -24,9 +24,9 @@ use crate::request::Request;
 use crate::result_files::{self, Origin, RESULT, ResultFiles};
 use crate::verdict;
 
-/// The file of the job that a directory belongs to.
+/// File of the job to which a directory belongs.
 pub(crate) const JOB: &str = "job.toml";
-/// The file of the case that a directory belongs to.
+/// File of the case to which a directory belongs.
 pub(crate) const CASE: &str = "case.toml";
 const HISTORY: &str = "history.csv";
 const REALIZATIONS: &str = "realizations.csv";
@@ -35,10 +35,11 @@ const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
 const STORE: &str = "store";
-/// Most attempts to lock a directory whose lock is removed by one run after another.
+/// Maximum number of attempts to lock a directory whose lock file is removed by one run after
+/// another.
 const LOCK_ATTEMPTS_MAX: u32 = 100;
 
-/// A directory of results, held by this process alone.
+/// A directory of results, locked by this process.
 #[derive(Debug)]
 pub(crate) struct ResultsDirectory {
     path: PathBuf,
@@ -47,12 +48,12 @@ pub(crate) struct ResultsDirectory {
 }
 
 impl ResultsDirectory {
-    /// The result that `path` holds of `specification`, be it that of a cancelled job; `None` if there
-    /// is no run, or one that did not end.
+    /// Returns the result in `path` for `specification`, including that of a cancelled job; `None`
+    /// if there is no run, or one that did not end.
     ///
     /// # Errors
-    /// Bad input when another specification was run there, or the file is no result of it; failed when
-    /// it cannot be read.
+    /// Bad input if the directory belongs to another specification, or if the file is not a result
+    /// of this one; failed if it cannot be read.
     pub(crate) fn stored(
         path: &Path,
         specification: &JobSpecification,
@@ -96,11 +97,11 @@ impl ResultsDirectory {
         Ok(Some(result))
     }
 
-    /// As [`stored`](Self::stored), of runs only that would end the same way again: what a run
-    /// shows instead of running.
+    /// Same as [`stored`](Self::stored), but only for runs that would end the same way again: such
+    /// a result is shown instead of running the job.
     ///
     /// # Errors
-    /// As [`stored`](Self::stored).
+    /// Same as [`stored`](Self::stored).
     pub(crate) fn finished(
         path: &Path,
         specification: &JobSpecification,
@@ -108,11 +109,11 @@ impl ResultsDirectory {
         Ok(Self::stored(path, specification)?.filter(|result| !verdict::may_end_otherwise(result)))
     }
 
-    /// Makes the directory, if there is none, and holds it. What was stored there before may
-    /// have changed by then.
+    /// Creates the directory, if necessary, and locks it. By then the stored files may have changed
+    /// since they were last read.
     ///
     /// # Errors
-    /// When another process holds it, or it cannot be written.
+    /// If another process holds the lock, or if the directory cannot be written.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         make_directory(path)?;
         let lock_path = path.join(LOCK);
@@ -121,7 +122,7 @@ impl ResultsDirectory {
                 Failure::unusable_path(error, format!("cannot write {}", visible::path(&lock_path)))
             })?;
             match lock.try_lock() {
-                // A run that ended meanwhile has removed the file: its lock locks nothing.
+                // A run that ended meanwhile has removed the file, so this lock protects nothing.
                 Ok(()) if !is_at(&lock, &lock_path) => {}
                 Ok(()) => return Ok(Self { path: path.to_owned(), _lock: lock }),
                 Err(TryLockError::WouldBlock) => break,
@@ -134,19 +135,19 @@ impl ResultsDirectory {
         Err(Failure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
     }
 
-    /// Where a store of this run is kept until it has ended.
+    /// Returns the directory of the run's store, which is kept until the run has ended.
     pub(crate) fn store(&self) -> PathBuf {
         self.path.join(STORE)
     }
 
-    /// The request that stands for this directory, the same one at every call, on whatever host.
+    /// Returns the request of this directory, which is the same at every call and on every host.
     pub(crate) fn request(&self) -> Result<Request, Failure> {
         let path = self.path.join(REQUEST);
         let stored = read_if_there(&path).map_err(Failure::Failed)?.unwrap_or_default();
         let mut lines = stored.lines().map(str::trim);
         if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
             let request = Request::with_id(id.to_owned());
-            // Whoever writes the file by hand may leave the client out.
+            // A user who writes the file by hand may leave out the client.
             let client = lines.next().map_or(request.client, str::to_owned);
             return Ok(Request { client, ..request });
         }
@@ -156,10 +157,10 @@ impl ResultsDirectory {
         Ok(request)
     }
 
-    /// Makes the next [`request`](Self::request) a new one: the job of the present one has
-    /// nothing more to give.
+    /// Makes the next [`request`](Self::request) a new one, because the job of the present one
+    /// cannot be continued.
     pub(crate) fn forget_request(&self) {
-        // A leftover does no harm but to show the same end again.
+        // If removal fails, the only harm is that the same ending is shown again.
         drop(fs::remove_file(self.path.join(REQUEST)));
     }
 
@@ -169,7 +170,7 @@ impl ResultsDirectory {
         result_files::write(&self.path.join(JOB), &text).map_err(Failure::Failed)
     }
 
-    /// Writes all that an ended job left, `result.json` last; the result.
+    /// Writes all files of an ended job, `result.json` last, and returns the result.
     pub(crate) fn write_results(
         &self,
         kind: JobKind,
@@ -196,7 +197,7 @@ impl ResultsDirectory {
         };
         write_all().map_err(Failure::Failed)?;
         if fetched.result.status != Status::Cancelled {
-            // What served only to continue is not needed any more; a leftover does no harm.
+            // The data for resuming are no longer needed; it does no harm if some remain.
             self.forget_request();
             drop(fs::remove_dir_all(self.store()));
         }
@@ -206,15 +207,15 @@ impl ResultsDirectory {
 
 impl Drop for ResultsDirectory {
     fn drop(&mut self) {
-        // Last of all, and still locked; a leftover does no harm.
+        // Removed last and while still locked; a leftover file does no harm.
         drop(fs::remove_file(self.path.join(LOCK)));
     }
 }
 
-/// Makes a directory that the user has named, if there is none.
+/// Creates a directory named by the user, if it does not exist.
 ///
 /// # Errors
-/// Bad input when it cannot be one, failed when the machine has no room for it.
+/// Bad input if the path cannot be a directory, failed if the machine has no room for it.
 pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(path).map_err(|error| {
         Failure::unusable_path(
@@ -224,7 +225,7 @@ pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
     })
 }
 
-/// The text of a file in a directory that the user has named; `None` if there is no such file.
+/// Returns the text of a file in a directory named by the user; `None` if there is no such file.
 pub(crate) fn given(path: &Path) -> Result<Option<String>, Failure> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
         Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
@@ -232,7 +233,7 @@ pub(crate) fn given(path: &Path) -> Result<Option<String>, Failure> {
     })
 }
 
-/// The realizations at the best point, or at those of the groups.
+/// Returns the table of the realizations at the best point, or at those of the groups.
 fn realizations(fetched: &Fetched) -> String {
     if matches!(fetched.specification.data, Some(Data::Groups(_))) {
         let groups = fetched.result.groups.iter();
@@ -251,7 +252,7 @@ fn realizations(fetched: &Fetched) -> String {
     results_csv::realizations(best.map(|best| best.outcomes.as_slice()).unwrap_or_default())
 }
 
-/// Whether `file` is what stands at `path`.
+/// Returns whether `file` is still the file at `path`.
 fn is_at(file: &File, path: &Path) -> bool {
     match (file.metadata(), fs::metadata(path)) {
         (Ok(ours), Ok(there)) => (ours.dev(), ours.ino()) == (there.dev(), there.ino()),
@@ -259,19 +260,19 @@ fn is_at(file: &File, path: &Path) -> bool {
     }
 }
 
-/// The job whose results `directory` holds, read as one of `kind`.
+/// Returns the job whose results `directory` contains, read as one of `kind`.
 ///
 /// # Errors
-/// When there is none, or it cannot be read.
+/// If there is none, or if it cannot be read.
 pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
     Ok(job_file::read(&directory.join(JOB), kind)?)
 }
 
-/// Refuses a directory whose job is not `specification`, and says where they differ.
+/// Refuses a directory whose job is not `specification`, and reports the first difference.
 fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
-    // What is said in other words, or left out where it is the default, is the same job.
+    // The comparison ignores formatting, and defaults that are left out.
     let directory = path.parent().unwrap_or(Path::new(""));
-    // Only that of an identification has data.
+    // Only the job of an identification has data.
     let complete = [JobKind::Identification, JobKind::Propagation]
         .into_iter()
         .find_map(|kind| job_file::parse(stored, Format::Toml, directory, kind).ok())
@@ -286,7 +287,7 @@ fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Resu
     }
 }
 
-/// The first line in which the complete texts of two jobs differ, in words.
+/// Describes the first line in which the complete texts of two jobs differ.
 pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
     if there == here {
         return None;
@@ -300,22 +301,22 @@ pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
     Some(format!("line {}: `{}` there, `{}` here", line + 1, shown(there), shown(here)))
 }
 
-/// The result in `directory`.
+/// Returns the result in `directory`.
 ///
 /// # Errors
-/// When there is none, or it cannot be read.
+/// If there is none, or if it cannot be read.
 pub(crate) fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
     let text = read_if_there(&directory.join(RESULT))?;
     let cannot = || format!("cannot read {}: no such file", result_path(directory));
     read_result(directory, &text.with_context(cannot)?)
 }
 
-/// The path of the result in `directory`, for messages.
+/// Returns the path of the result in `directory`, for messages.
 pub(crate) fn result_path(directory: &Path) -> String {
     visible::path(&directory.join(RESULT))
 }
 
-/// The result of a text, or which file is to be replaced.
+/// Parses a result; the error names the file that must be replaced.
 fn read_result(directory: &Path, text: &str) -> anyhow::Result<ResultFile> {
     ResultFile::from_json(text).map_err(|error| {
         anyhow!(
@@ -326,7 +327,8 @@ fn read_result(directory: &Path, text: &str) -> anyhow::Result<ResultFile> {
     })
 }
 
-/// The text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no such file.
+/// Returns the text of a file of a run, of at most [`FILE_BYTES_MAX`] bytes; `None` if there is no
+/// such file.
 fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
     let cannot = || format!("cannot read {}", visible::path(path));
     let read = match user_file::read(path, FILE_BYTES_MAX) {

@@ -1,14 +1,14 @@
-//! Results for tests: what a test says of a result, and the rest from a complete one.
+//! Complete results for tests, in which a test sets only the keys that matter to it.
 
 use osteon_common::report::ResultFile;
 use serde_json::Value;
 
-/// A complete result of an identification, with the keys of `partial` put into it.
+/// Returns a complete result of an identification, in which the keys of `partial` are replaced.
 pub(crate) fn identification(partial: &str) -> ResultFile {
     filled(include_str!("../fuzz/corpus/results/identification.json"), partial)
 }
 
-/// A complete result of a propagation, with the keys of `partial` put into it.
+/// Returns a complete result of a propagation, in which the keys of `partial` are replaced.
 pub(crate) fn propagation(partial: &str) -> ResultFile {
     filled(include_str!("../fuzz/corpus/results/propagation.json"), partial)
 }
@@ -19,7 +19,7 @@ fn filled(complete: &str, partial: &str) -> ResultFile {
     ResultFile::from_json(&value.to_string()).unwrap()
 }
 
-/// Puts keys into an object, and into the objects below it. Failures are counted anew.
+/// Sets keys of an object and of nested objects. Failures are counted again.
 pub(crate) fn put(into: &mut Value, partial: &Value) {
     let (Some(entries), Value::Object(new)) = (into.as_object_mut(), partial) else {
         *into = partial.clone();

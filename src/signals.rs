@@ -1,4 +1,4 @@
-//! The wish of a user, or of the system, that the program ends.
+//! Signals by which a user or the system asks the program to end.
 
 use std::time::Duration;
 
@@ -8,20 +8,21 @@ use tokio::sync::oneshot;
 use crate::ending::{Failure, Interruption};
 use crate::progress::say;
 
-/// Signals that come so soon after the first are one with it: some programs send it to a process
-/// and to its group.
+/// Signals that follow the first one within this time count as part of it: some programs send a
+/// signal both to a process and to its group.
 const ONE_WISH: Duration = Duration::from_millis(300);
-/// A command that cannot stop, because nobody reads what it writes, is ended after this long.
+/// A command that cannot stop, because nobody reads its output, is killed after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Completes at the first SIGINT or SIGTERM after the call; these signals no longer end the process
-/// by themselves from then on. SIGHUP is left alone, so that `nohup` keeps its meaning, unless [`hangups`] asks for it.
+/// Completes at the first SIGINT or SIGTERM after the call; from the call on, these signals do not
+/// end the process by themselves. SIGHUP is left alone, so that `nohup` keeps its effect, unless
+/// [`hangups`] handles it.
 ///
-/// Who then presses Ctrl-C again does not want to wait for an orderly end: the process exits, with
-/// code 130.
+/// If the user then presses Ctrl-C again, instead of waiting for an orderly end, the process exits
+/// with code 130.
 ///
 /// # Errors
-/// When the system does not let signals be handled.
+/// If the system does not allow signals to be handled.
 pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, Failure> {
     let listen = |kind| {
         signal(kind).map_err(|error| {
@@ -40,21 +41,21 @@ pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, Failu
     })
 }
 
-/// What `command` ends with, or the first SIGINT or SIGTERM: for commands that can be left at any
-/// moment. `left` says what becomes of what was begun.
+/// Returns the outcome of `command`, or ends it at the first SIGINT or SIGTERM; for commands that
+/// can be interrupted at any moment. `left` says what happens to the work begun.
 ///
 /// # Errors
-/// That of the command, or the signal.
+/// The error of the command, or the signal.
 pub(crate) async fn unless_interrupted<T>(
     command: impl Future<Output = Result<T, Failure>>,
     left: &'static str,
 ) -> Result<T, Failure> {
     let interruption = interruption()?;
     let (sender, received) = oneshot::channel();
-    // In a task of its own, which runs even while the command is kept by what does not wait.
+    // Runs in a separate task, which makes progress even while the command blocks.
     tokio::spawn(async move {
         let interruption = interruption.await;
-        // Fails only when the command has ended.
+        // Fails only if the command has ended.
         let _ended = sender.send(interruption);
         tokio::time::sleep(PATIENCE).await;
         std::process::exit(interruption.exit_code().into());
@@ -65,17 +66,17 @@ pub(crate) async fn unless_interrupted<T>(
     }
 }
 
-/// SIGHUP from now on, which no longer ends the process.
+/// Handles SIGHUP from now on, so that it does not end the process.
 ///
 /// # Errors
-/// When the system does not let signals be handled.
+/// If the system does not allow signals to be handled.
 pub(crate) fn hangups() -> Result<Signal, Failure> {
     signal(SignalKind::hangup()).map_err(|error| {
         Failure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
     })
 }
 
-/// The next signal; waits for ever without a source of them.
+/// Waits for the next signal; waits forever if there is no source of signals.
 pub(crate) async fn next(signals: &mut Option<Signal>) {
     if let Some(signals) = signals
         && signals.recv().await.is_some()
@@ -88,7 +89,7 @@ pub(crate) async fn next(signals: &mut Option<Signal>) {
 /// Ends the process at the next SIGINT.
 async fn exit_at_the_next() {
     tokio::time::sleep(ONE_WISH).await;
-    // Hears only what comes from now on.
+    // Receives only signals sent after this point.
     if let Ok(mut interrupt) = signal(SignalKind::interrupt())
         && interrupt.recv().await.is_some()
     {

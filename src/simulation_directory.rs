@@ -1,7 +1,8 @@
-//! The directory of a simulation: it belongs to one case, as that of a run does to one job.
+//! The directory of a simulation, which belongs to one case, as the directory of a run belongs to
+//! one job.
 //!
-//! `case.toml` is written first and `result.json` last, by rename. The same case is written again
-//! to the same bytes; another one is refused.
+//! `case.toml` is written first and `result.json` last, by rename. Simulating the same case again
+//! writes the same bytes; another case is refused.
 
 use std::io::Write;
 use std::path::Path;
@@ -18,10 +19,10 @@ use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 
 /// The file of the traces.
 pub(crate) const TRACES: &str = "traces.csv";
-/// Start of the first line of `case.toml`, which goes on with the options of the traces.
+/// Start of the first line of `case.toml`; the options of the traces follow.
 const COMMAND: &str = "# osteon simulate case.toml";
 
-/// What a directory of a simulation belongs to.
+/// The case and options to which a simulation's directory belongs.
 pub(crate) struct Simulated<'a> {
     /// The case.
     pub(crate) case: &'a Case,
@@ -32,17 +33,17 @@ pub(crate) struct Simulated<'a> {
 }
 
 impl Simulated<'_> {
-    /// The text of `case.toml`: the case with all defaults, below the command that makes the same
-    /// files of it.
+    /// Returns the text of `case.toml`: the case with all defaults, below the command that creates
+    /// the same files from it.
     fn text(&self) -> String {
         let Self { case, duration, time_step } = self;
         let command = format!("{COMMAND} --duration {duration:?} --time-step {time_step:?}\n");
         command + &case_file::to_toml(case)
     }
 
-    /// The first difference from the simulation that `stored`, the text of a `case.toml`,
-    /// describes. The case is compared by its meaning: defaults may be left out there, and keys
-    /// may be in another order.
+    /// Returns the first difference from the simulation described by `stored`, the text of a
+    /// `case.toml`. Cases are compared after parsing: defaults may be left out, and keys may be in
+    /// another order.
     fn difference_from(&self, stored: &str) -> Option<String> {
         let Some([duration, time_step]) = traces_of(stored) else {
             return Some(format!("its first line is not `{COMMAND} --duration S --time-step S`"));
@@ -61,8 +62,8 @@ impl Simulated<'_> {
     /// Refuses a directory that belongs to something else.
     ///
     /// # Errors
-    /// Bad input when another case, other traces, or a job was computed there; failed when it cannot
-    /// be read.
+    /// Bad input if another case, other traces, or a job was computed there; failed if it cannot be
+    /// read.
     pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), Failure> {
         let there = |name: &str| directory.join(name).symlink_metadata().is_ok();
         let shown = visible::path(directory);
@@ -83,11 +84,11 @@ impl Simulated<'_> {
         Err(Failure::bad_input(anyhow!("{why}; choose another --out directory")))
     }
 
-    /// Writes all files, `print` the traces.
+    /// Writes all files; `print` writes the traces.
     ///
     /// # Errors
-    /// As [`refuse_other`](Self::refuse_other); failed when another process writes there, or it
-    /// cannot be written.
+    /// Same as [`refuse_other`](Self::refuse_other); also failed if another process writes there,
+    /// or if the directory cannot be written.
     pub(crate) fn write(
         &self,
         directory: &Path,
@@ -95,7 +96,7 @@ impl Simulated<'_> {
         print: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
     ) -> Result<(), Failure> {
         let _held = ResultsDirectory::open(directory)?;
-        // Another process may have written between the first look and the lock.
+        // Another process may have written between the first check and the lock.
         self.refuse_other(directory)?;
         let program = program::this();
         let origin = Origin { kind: "simulation", program: &program, digest: None, seed: None };
@@ -109,7 +110,8 @@ impl Simulated<'_> {
     }
 }
 
-/// Duration and time step, s, of the traces beside the `case.toml` with the text `stored`.
+/// Returns duration and time step, s, of the traces that belong to a `case.toml` with the text
+/// `stored`.
 fn traces_of(stored: &str) -> Option<[f64; 2]> {
     let options = stored.lines().next()?.strip_prefix(COMMAND)?;
     let (duration, time_step) =

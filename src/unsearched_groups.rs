@@ -1,4 +1,4 @@
-//! Tells of groups of the data for which no search can be made.
+//! Warnings about groups of the data that cannot be searched.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use osteon_common::visible;
 
 use crate::progress::say;
 
-/// Most groups that are told of one by one.
+/// Maximum number of groups that are listed individually.
 const TOLD_MAX: usize = 10;
 
-/// Says on stderr which groups of the job in the file `job` are not searched, and why.
+/// Prints on stderr which groups of the job in the file `job` are not searched, and why.
 pub(crate) fn warn(job: &Path, noted: &Noted) {
     let groups = noted.specification.data.as_ref().map_or(&[][..], Data::groups);
     let unsearched: Vec<_> =

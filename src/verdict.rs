@@ -1,5 +1,5 @@
-//! What a result means: whether the run is done, and why not. A stored result is judged as one that was
-//! just computed.
+//! Interpretation of a result: whether the run is complete, and if not, why. A stored result is
+//! treated like one that was just computed.
 
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::report::{Propagation, ResultFile};
@@ -8,7 +8,7 @@ use osteon_common::results::Status;
 use crate::client::Fetched;
 use crate::ending::Ending;
 
-/// What a result means for the exit code.
+/// Returns the ending of a command, and thus the exit code, for this result.
 pub(crate) fn ending(specification: &JobSpecification, result: &ResultFile) -> Ending {
     let done = match result {
         ResultFile::Identification(found) => {
@@ -19,30 +19,29 @@ pub(crate) fn ending(specification: &JobSpecification, result: &ResultFile) -> E
     if done { Ending::Done } else { Ending::RunFailed }
 }
 
-/// Whether the result is that of a run which somebody ended before its time: running it again
-/// goes further.
+/// Returns whether the run was cancelled, in which case running it again continues it.
 pub(crate) fn is_cancelled(result: &ResultFile) -> bool {
     result.status() == Some(Status::Cancelled)
 }
 
-/// Whether running it again may end otherwise: somebody ended the run before its time, or it failed
+/// Returns whether running the job again may end otherwise: the run was cancelled, or failed
 /// because of the machines that it ran on.
 pub(crate) fn may_end_otherwise(result: &ResultFile) -> bool {
     is_cancelled(result) || machine_failure(result).is_some()
 }
 
-/// Why a run failed, if that lies in the machines that it ran on.
+/// Returns the reason why a run failed, if the machines that it ran on are the cause.
 pub(crate) fn machine_failure(result: &ResultFile) -> Option<&str> {
     let (failure, reason) = result.failure()?;
     failure.is_retryable().then(|| reason.unwrap_or(failure.name()))
 }
 
-/// Why the result of a propagation is a failure; `None` if it is none.
+/// Returns the reason why the result of a propagation is a failure; `None` if it is not one.
 pub(crate) fn propagation_failure(
     specification: &JobSpecification,
     result: &Propagation,
 ) -> Option<String> {
-    // A file may say anything.
+    // The counts come from a file and may be arbitrarily large.
     let failed = result.failures.values().copied().fold(0, u64::saturating_add);
     let realizations = specification.monte_carlo.realizations;
     let most = specification.monte_carlo.max_failed_fraction;
@@ -57,8 +56,8 @@ pub(crate) fn propagation_failure(
     None
 }
 
-/// Why an ended job has no result to show or to keep; `None` if it has one. A propagation that
-/// did not complete its only evaluation has none, a search has one from its start.
+/// Returns the reason why an ended job has no result to show or to keep; `None` if it has one. A
+/// propagation has none until its only evaluation is complete, a search has one from its start.
 pub(crate) fn missing_result(fetched: &Fetched) -> Option<String> {
     if fetched.specification.kind == JobKind::Identification || fetched.result.best.is_some() {
         return None;

@@ -1,6 +1,7 @@
-//! What is said before anything is computed: unusual numbers, and data that the bounds do not reach.
+//! Warnings before anything is computed: unusual values, and data that are out of reach within the
+//! bounds.
 //!
-//! Nothing of it changes a job: the point nearest to such data is a result, too.
+//! They never change a job: the point nearest to such data is a valid result, too.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::job::{JobKind, JobSpecification, Range};
@@ -14,38 +15,39 @@ use osteon_solver::{Failure, Solver, Workspace};
 
 use crate::progress::say;
 
-/// Setups with more (frequency, wavenumber) pairs are not solved ahead: it would take more than a moment.
+/// Setups with more (frequency, wavenumber) pairs are not solved in advance, as it would take too
+/// long.
 const PAIRS_MAX: f64 = 2e5;
-/// Share by which a mean may be off the velocities of mean models: g_L, which the closed form does not
-/// know, and the dispersion move it by less.
+/// Fraction by which a mean may be beyond the velocities of mean models: g_L, which the closed form
+/// does not contain, and the dispersion shift it by less.
 const MEAN_MARGIN: f64 = 0.01;
-/// The same of a coefficient of variation, whose closed form is a rough one.
+/// The same for a coefficient of variation, whose closed form is a rough approximation.
 const VARIATION_MARGIN: f64 = 0.05;
-/// Standard errors by which measured moments may be off.
+/// Number of standard errors by which measured moments may be off.
 const ERRORS: f64 = 3.0;
-/// Most groups that are named.
+/// Maximum number of groups that are named.
 const GROUPS_LISTED_MAX: usize = 5;
 
-/// Says everything that there is to say about a job that is about to be submitted.
+/// Prints all warnings about a job that is about to be submitted.
 pub(crate) async fn say_of_job(specification: &JobSpecification, warnings: &[Warning]) {
     say_all(warnings);
     let specification = specification.clone();
-    // It takes some milliseconds of this thread's time, in which a signal shall be heard.
+    // Runs on another thread: it takes some milliseconds, in which a signal must still be handled.
     let lines = tokio::task::spawn_blocking(move || out_of_reach(&specification)).await;
     for line in lines.unwrap_or_default() {
         say(&format!("warning: {line}"));
     }
 }
 
-/// Says what is unusual.
+/// Prints warnings about unusual values.
 pub(crate) fn say_all(warnings: &[Warning]) {
     for warning in warnings {
         say(&format!("warning: {warning}"));
     }
 }
 
-/// Which data of an identification no point within the bounds reaches, by the solver's velocities of the
-/// slowest and the fastest mean model.
+/// Returns which data of an identification cannot be reached by any point within the bounds,
+/// according to the solver's velocities of the slowest and the fastest mean model.
 fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     let Some(data) = &specification.data else { return Vec::new() };
     let solver = SolverSettings::default();
@@ -81,7 +83,7 @@ fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     lines
 }
 
-/// Velocities of mean models, m/s, and what the closed form says of coefficients of variation.
+/// Velocities of mean models, m/s, and coefficients of variation by the closed form.
 struct Solved {
     slowest: Option<(Point, f64)>,
     fastest: Option<(Point, f64)>,
@@ -109,7 +111,8 @@ impl Solved {
         Self { slowest, fastest, start, variation: Reach::of(ranges, setup).variation }
     }
 
-    /// Which moments of data, of so many velocities, are out of reach, each with the rest of a sentence.
+    /// Returns which moments of data with this number of velocities are out of reach, each with the
+    /// rest of a sentence.
     fn missed(
         &self,
         specification: &JobSpecification,
@@ -119,7 +122,8 @@ impl Solved {
         let ranges = &specification.parameters;
         let count = count.map_or(f64::INFINITY, |count| count as f64);
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
-        // A velocity goes with the root of a stiffness, so its mean lies below that of the mean model.
+        // A velocity is proportional to the root of a stiffness, so its mean lies below that of the
+        // mean model.
         let most = self.variation.1;
         let error = ERRORS * variation / count.sqrt();
         let margins = (MEAN_MARGIN + error + 0.5 * most * most, MEAN_MARGIN + error);
@@ -158,7 +162,7 @@ impl Solved {
         missed
     }
 
-    /// The velocities that are reached, as far as they are known.
+    /// Describes the velocities within reach, as far as they are known.
     fn velocities(&self) -> String {
         let [slowest, fastest] =
             [&self.slowest, &self.fastest].map(|end| end.as_ref().map(|&(_, velocity)| velocity));
@@ -184,11 +188,11 @@ fn beyond(value: &str, side: &str, reached: &str, cure: &str) -> String {
     )
 }
 
-/// Which bounds to widen to get beyond a corner of them.
+/// Returns which bounds must be widened to get beyond this corner of the box.
 fn widened(ranges: &[Range; 7], corner: &Point) -> String {
     let (mut lower_bounds, mut upper_bounds) = (Vec::new(), Vec::new());
     for parameter in Parameter::ALL {
-        // Neither has much to do with the mean.
+        // Neither of these has much influence on the mean.
         if matches!(parameter, Parameter::LongitudinalShearModulus | Parameter::Dispersion) {
             continue;
         }

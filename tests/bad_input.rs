@@ -1,5 +1,5 @@
-//! Bad input: exit code 2, a message that names the field or the file and line, nothing on
-//! stdout, nothing written.
+//! Bad input gives exit code 2, a message that names the field or the file and line, no output on
+//! stdout, and no files.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -19,7 +19,7 @@ fn case(bone: &str) -> String {
     format!("[bone]\ndensity = 1598.8\n{bone}")
 }
 
-/// The engineering constants of the optimum, one of them changed.
+/// The engineering constants of the optimum, with one of them changed.
 fn constants(name: &str, value: &str) -> String {
     let line = |&(key, number, ..): &(&str, f64, f64, f64)| {
         if key == name { format!("{key} = {value}\n") } else { format!("{key} = {number:?}\n") }
@@ -27,7 +27,7 @@ fn constants(name: &str, value: &str) -> String {
     format!("[bone]\n{}", OPTIMUM[..6].iter().map(line).collect::<String>())
 }
 
-/// A Mandel matrix of 1e10 on the diagonal with one other entry.
+/// A Mandel matrix with 1e10 on the diagonal and one other entry.
 fn mandel(row: usize, column: usize, value: f64) -> String {
     let entry = |i: usize, j: usize| match (i, j) {
         _ if (i, j) == (row, column) => value,
@@ -39,8 +39,8 @@ fn mandel(row: usize, column: usize, value: f64) -> String {
     case(&format!("mandel = [{}]\n", rows.join(", ")))
 }
 
-/// Runs `command` on `file` and asserts that it is refused with every text of `expected`, and
-/// that --out was not touched.
+/// Runs `command` on `file` and checks that it is refused with every text of `expected`, and that
+/// --out was not touched.
 fn refused(scratch: &Scratch, command: &str, file: &Path, expected: &[&str]) {
     let out = scratch.path("out");
     let finished = run(&[command, text(file), "--out", text(&out)]);
@@ -150,7 +150,7 @@ fn data_that_no_point_can_reach_are_refused() {
     refused(&scratch, "identify", &file, &[expected]);
 }
 
-/// What is only unusual is computed, after a word on stderr.
+/// Unusual values are accepted after a warning on stderr.
 #[test]
 fn unusual_numbers_are_warned_of_and_computed_with() {
     let warned = |command: &str, name: &str, text: &str, expected: &[&str]| {
@@ -263,14 +263,14 @@ fn a_realization_that_does_not_exist_is_refused() {
     assert!(drawn.stderr.contains("result.json"), "{drawn:?}");
 }
 
-/// Runs the program to its end, for which it has a minute.
+/// Runs the program to its end, which must come within a minute.
 fn run_within_a_minute(arguments: &[&str]) -> Finished {
     let mut command = Command::new("timeout");
     command.arg("60").arg(osteon().get_program()).args(arguments).env("RUST_LOG", "warn");
     Finished::of(command.output().unwrap())
 }
 
-/// A pipe that nobody writes would be waited for without end.
+/// Opening a pipe without a writer would otherwise block forever.
 #[test]
 fn what_is_no_regular_file_is_refused_at_once() {
     let scratch = Scratch::new();
@@ -329,7 +329,7 @@ fn what_is_no_regular_file_is_refused_at_once() {
     check(text(&locked), "a pipe", &serve);
 }
 
-/// Escape sequences and marks that turn the direction of writing are written out.
+/// Escape sequences and marks that change the direction of writing are escaped.
 #[test]
 fn what_a_user_does_not_see_is_shown() {
     let scratch = Scratch::new();
@@ -342,14 +342,14 @@ fn what_a_user_does_not_see_is_shown() {
         let raw = refused.stderr.contains(|c| c != '\n' && is_hidden(c));
         assert!(!raw, "{refused:?}");
     };
-    // In names of files.
+    // In file names.
     let name = "job\u{202e}\u{1b}[31m\n.toml";
     let shown = r"job\u{202e}\u{1b}[31m\n.toml";
     let absent = scratch.path(name);
     check(&["identify", text(&absent)], &[shown, "No such file"]);
     let file = scratch.write(name, "[bone]\n\"a\\u001bb\\u202e\" = 1\nb = \"\\u009b2J\"\n");
     check(&["simulate", text(&file)], &[shown, r"a\u{1b}b\u{202e}"]);
-    // In keys and values of a job file, and in what a parser says of them.
+    // In keys and values of a job file, and in the parser's messages about them.
     let with = |section: &str| scratch.write("job.toml", &(job(10, 1) + section));
     let file = with("[solver]\nmethod = \"exa\\u001b[2Jct\"\n");
     check(&["identify", text(&file)], &[r"exa\u{1b}[2Jct"]);
@@ -367,7 +367,7 @@ fn what_a_user_does_not_see_is_shown() {
     check(&["identify", text(&file)], &[r"b\u{1b}[2J\u{2066}one"]);
     scratch.write("v.csv", "velocity,bone\n3900,a\n3901,a\n3900,a\u{200b}\n3901,a\u{200b}\n");
     check(&["identify", text(&file)], &[r"a\u{200b}", "has the character U+200B", "leave it out"]);
-    // In the log, where it would begin a line of its own, too.
+    // In the log, where it would also begin a new line.
     let url = format!("unix:{}", text(&scratch.path("a\u{1b}[2J\n\u{202e}ERROR")));
     let worker = ["worker", "--coordinator", &url, "--give-up-after", "0.1"];
     check(&worker, &["WARN", r"a\u{1b}[2J\n\u{202e}ERROR"]);
@@ -380,7 +380,7 @@ fn a_directory_of_results_that_cannot_be_one_is_bad_input() {
     let case = scratch.write("case.toml", &constants("density", "1598.8"));
     let file = scratch.write("file", "a file");
     let below = file.join("out");
-    // No file system lets anybody, root included, make directories there.
+    // No file system allows anybody, even root, to create directories there.
     let forbidden = Path::new("/proc/osteon");
     for out in [file.as_path(), &below, forbidden] {
         for (command, input) in [("identify", &job), ("propagate", &job), ("simulate", &case)] {

@@ -1,4 +1,4 @@
-//! The build script: which commit it notes, and that it never stops a build for want of one.
+//! The build script: it records the right commit, and never fails a build because there is none.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -22,14 +22,14 @@ fn compiled(directory: &Path) -> std::path::PathBuf {
 fn run(script: &Path, directory: &Path, given: &str) -> Output {
     let mut command = Command::new(script);
     command.current_dir(directory).env("OSTEON_COMMIT", given);
-    // A caller's repository is not that of the directory.
+    // The environment may point to a repository other than that of the directory.
     for name in ["GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE"] {
         command.env_remove(name);
     }
     command.output().unwrap()
 }
 
-/// The commit that a successful run notes.
+/// Returns the commit that a successful run records.
 fn noted(output: &Output) -> Option<String> {
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout.clone()).unwrap();
@@ -48,7 +48,7 @@ fn git(directory: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Files and directories whose changes run the script again.
+/// Returns the files and directories whose changes run the script again.
 fn watched(output: &Output) -> Vec<String> {
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     let lines = text.lines().filter_map(|line| line.strip_prefix("cargo:rerun-if-changed="));
@@ -69,13 +69,13 @@ fn the_commit_is_that_of_the_tree_with_a_mark_where_it_was_modified() {
     git(&tree, &["commit", "--quiet", "--message", "one"]);
     let commit = git(&tree, &["rev-parse", "HEAD"]);
     assert_eq!(noted(&run(&script, &tree, "")), Some(commit.clone()));
-    // What the program is not built from does not count.
+    // Files that the program is not built from do not count.
     fs::write(tree.join("README.md"), "more\n").unwrap();
     assert_eq!(noted(&run(&script, &tree, "")), Some(commit.clone()));
     fs::write(tree.join("src/main.rs"), "fn main() { }\n").unwrap();
     assert_eq!(noted(&run(&script, &tree, "")), Some(format!("{commit}-dirty")));
     git(&tree, &["checkout", "--quiet", "src/main.rs"]);
-    // In a work tree beside the first one `.git` is a file.
+    // In a linked work tree `.git` is a file.
     git(&tree, &["worktree", "add", "--quiet", "../beside", "-b", "other"]);
     let beside = scratch.path().join("beside");
     let output = run(&script, &beside, "");
@@ -84,14 +84,14 @@ fn the_commit_is_that_of_the_tree_with_a_mark_where_it_was_modified() {
     assert!(watched.iter().any(|path| path.ends_with("refs/heads/other")), "{watched:?}");
     assert!(watched.iter().any(|path| path.ends_with("worktrees/beside/HEAD")), "{watched:?}");
     assert!(watched.iter().all(|path| beside.join(path).exists()), "{watched:?}");
-    // A packed branch has no file: its directory is watched.
+    // A packed branch has no file, so its directory is watched.
     git(&beside, &["pack-refs", "--all"]);
     let output = run(&script, &beside, "");
     assert_eq!(noted(&output), Some(commit));
     let watched = self::watched(&output);
     assert!(watched.iter().any(|path| path.ends_with("refs/heads")), "{watched:?}");
     assert!(watched.iter().all(|path| beside.join(path).exists()), "{watched:?}");
-    // Sources inside another repository are not of its commits.
+    // Sources inside another repository do not belong to its commits.
     assert_eq!(noted(&run(&script, &tree.join("src"), "")), None);
 }
 

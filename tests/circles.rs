@@ -1,10 +1,10 @@
-//! Reads the sources: the files of a crate refer to each other without a circle, so that each can be
-//! read after those that it builds upon.
+//! Checks in the sources that the files of a crate do not refer to each other in a circle, so that
+//! each can be read after those that it builds upon.
 //!
-//! An arrow leads from a file to the file that defines what it names by a path: `crate::…`,
-//! `super::…`, `self::…`, or the name of a module that it declares. `mod x;` alone is no arrow, and
-//! `pub use x::Y` is a signpost: it is no arrow of its own file, and whoever follows it arrives at
-//! the file that it points to. What is compiled for tests only does not count.
+//! An arrow leads from a file to the file that defines an item which it names by a path:
+//! `crate::…`, `super::…`, `self::…`, or the name of a module that it declares. `mod x;` alone is
+//! not an arrow. `pub use x::Y` is a signpost: it is not an arrow of its own file, and a path
+//! through it leads to the file that it points to. Code that is compiled only for tests is ignored.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -12,20 +12,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// Directories whose files form no circle, each the `src` of a crate.
+/// Directories whose files must not form a circle, each the `src` of a crate.
 const DIRECTORIES: [&str; 3] = ["common/src", "coordinator/src", "worker/src"];
-/// Re-exports that are followed one after the other.
+/// Maximum number of re-exports that are followed one after another.
 const SIGNPOSTS_MAX: usize = 8;
 
 /// A path of names, from the root of the crate.
 type Names = Vec<String>;
 
-/// The source of one module in a file of its own.
+/// The source of one module that has a file of its own.
 struct Module {
     file: String,
-    /// Paths that its code names, as far as they may lead to another file.
+    /// Paths named in its code, as far as they may lead to another file.
     named: Vec<Names>,
-    /// What it re-exports, by name (`*` for all), and from where.
+    /// Its re-exports, by name (`*` for all), with their origin.
     exported: Vec<(String, Names)>,
 }
 
@@ -56,7 +56,7 @@ fn layers_of_the_reactor_call_downwards_only() {
     assert!(count > 20, "only {count} calls were found");
 }
 
-/// The files of a crate, by their paths below a directory.
+/// Returns the files of a crate, by their paths below a directory.
 fn sources(directory: &str) -> BTreeMap<String, String> {
     let mut sources = BTreeMap::new();
     read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(directory), "", &mut sources);
@@ -76,7 +76,7 @@ fn read(folder: &Path, prefix: &str, sources: &mut BTreeMap<String, String>) {
     }
 }
 
-/// The files that each file refers to.
+/// Returns the files to which each file refers.
 fn arrows(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
     let modules = modules(sources);
     let targets = |module: &Module| {
@@ -86,9 +86,9 @@ fn arrows(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<Strin
     modules.values().map(|module| (module.file.clone(), targets(module))).collect()
 }
 
-/// Files that form a circle, the first once more at the end; `None` if there is none.
+/// Returns files that form a circle, with the first repeated at the end; `None` if there is none.
 fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
-    // What leads nowhere is in no circle, and then what leads only there.
+    // A file without arrows is in no circle, nor is one whose arrows lead only to such files.
     loop {
         let left: BTreeSet<String> = arrows.keys().cloned().collect();
         arrows.retain(|_, to| {
@@ -99,7 +99,7 @@ fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>>
             break;
         }
     }
-    // Each of the rest leads to another of the rest: following them comes back.
+    // Each remaining file leads to another one of them, so following the arrows returns.
     let mut way: Vec<String> = arrows.keys().take(1).cloned().collect();
     while let Some(next) = way.last().and_then(|last| arrows[last].first()) {
         let seen = way.iter().position(|file| file == next);
@@ -111,7 +111,7 @@ fn circle(mut arrows: BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>>
     None
 }
 
-/// The file that defines what a path names; `None` if that is no file of the crate.
+/// Returns the file that defines the target of a path; `None` if that is not a file of the crate.
 fn target<'a>(
     modules: &'a BTreeMap<Names, Module>,
     path: &[String],
@@ -132,7 +132,7 @@ fn target<'a>(
     }
 }
 
-/// The modules of a crate that are not for tests only, by their paths.
+/// Returns the modules of a crate that are not only for tests, by their paths.
 fn modules(sources: &BTreeMap<String, String>) -> BTreeMap<Names, Module> {
     let place = |file: &str| -> Names {
         let stem = file.trim_end_matches(".rs");
@@ -161,11 +161,11 @@ fn child(place: &[String], name: &str) -> Names {
     place.iter().cloned().chain([name.to_owned()]).collect()
 }
 
-/// Code in words: names, `::`, and single signs. Comments, texts and what is for tests only are
+/// Code as words: names, `::`, and single characters. Comments, string literals and test code are
 /// left out.
 struct Code {
     words: Vec<String>,
-    /// Modules in files of their own that are for tests only.
+    /// Modules in files of their own that are only for tests.
     test_modules: Vec<String>,
 }
 
@@ -191,7 +191,7 @@ impl Code {
         Self { words: kept, test_modules }
     }
 
-    /// What a module re-exports, and the paths that it names otherwise.
+    /// Returns the re-exports of a module, and the other paths that it names.
     fn paths(
         &self,
         place: &[String],
@@ -225,8 +225,8 @@ impl Code {
         (exported, named)
     }
 
-    /// Collects what a path or a tree of `use` that begins at a word names, and under which name;
-    /// the index of the word after it.
+    /// Collects the targets of a path or a tree of `use` that begins at a word, with their names;
+    /// returns the index of the word after it.
     fn leaves(&self, at: usize, from: &[String], leaves: &mut Vec<(String, Names)>) -> usize {
         let mut path = from.to_vec();
         let mut at = at + 1;
@@ -266,7 +266,7 @@ impl Code {
     }
 }
 
-/// The path that the first word of a path stands for in a module.
+/// Returns the path that the first word of a path denotes in a module.
 fn start(place: &[String], word: &str) -> Names {
     match word {
         "crate" => Names::new(),
@@ -276,7 +276,7 @@ fn start(place: &[String], word: &str) -> Names {
     }
 }
 
-/// How many words an item takes: up to its `;` or the end of its block.
+/// Returns the number of words of an item: up to its `;` or the end of its block.
 fn item_length(words: &[String]) -> usize {
     let mut depth = 0;
     for (at, word) in words.iter().enumerate() {
@@ -291,7 +291,7 @@ fn item_length(words: &[String]) -> usize {
     words.len()
 }
 
-/// The words of a text of Rust.
+/// Returns the words of a Rust source text.
 fn words(text: &str) -> Vec<String> {
     let mut words = Vec::new();
     let mut rest = text;
@@ -318,7 +318,7 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// Length of the text or character at the beginning, if there is one.
+/// Returns the length of the string or character literal at the beginning, if there is one.
 fn quoted(text: &str) -> Option<usize> {
     if let Some(raw) = text.strip_prefix('r') {
         let signs = raw.find(|c| c != '#').filter(|at| raw[*at..].starts_with('"'))?;
@@ -327,7 +327,7 @@ fn quoted(text: &str) -> Option<usize> {
         return text[from..].find(&end).map(|at| from + at + end.len());
     }
     let sign = text.chars().next().filter(|sign| ['"', '\''].contains(sign))?;
-    // A lifetime ends with no such sign.
+    // A lifetime does not end with a quotation mark.
     let is_lifetime = sign == '\'' && !text[1..].starts_with('\\') && {
         let second = text.char_indices().nth(2).map(|(_, second)| second);
         second != Some('\'')
@@ -344,7 +344,7 @@ fn quoted(text: &str) -> Option<usize> {
     end.map(|(at, _)| at + 1)
 }
 
-/// The circle that these files form.
+/// Checks that these files form the expected circle.
 fn check(files: &[(&str, &str)], expected: &[&str]) {
     let sources = files.iter().map(|(file, text)| ((*file).to_owned(), (*text).to_owned()));
     let found = circle(arrows(&sources.collect())).unwrap_or_default();
@@ -363,14 +363,14 @@ fn a_planted_circle_is_found() {
     ] {
         check(&[lib, ("a.rs", a), ("b.rs", b), ("c.rs", "use crate::b::B;")], &circle);
     }
-    // Of three, and of a parent with its child.
+    // A circle of three, and one of a parent with its child.
     let three = [("a.rs", "use crate::c::C;"), ("b.rs", "use crate::a::A;")];
     let expected = ["a.rs", "c.rs", "b.rs", "a.rs"];
     check(&[lib, three[0], three[1], ("c.rs", "use crate::b::B;")], &expected);
     let parent = "mod child; struct P; fn f() { child::f() }";
     let expected = ["a.rs", "a/child.rs", "a.rs"];
     check(&[("lib.rs", "mod a;"), ("a.rs", parent), ("a/child.rs", "use super::P;")], &expected);
-    // By way of a signpost.
+    // A circle by way of a signpost.
     let files = [
         ("lib.rs", "mod a; mod b;"),
         ("a.rs", "mod child; pub use child::C;"),
@@ -394,7 +394,7 @@ fn what_is_no_circle_is_none() {
     ] {
         check(&[lib, a, ("b.rs", b)], &[]);
     }
-    // Files for tests only, and a parent that only shows what its children have.
+    // Files for tests only, and a parent that only re-exports items of its children.
     let tests = ("b/tests.rs", "use crate::a::A;");
     check(&[lib, a, ("b.rs", "#[cfg(test)]\nmod tests;"), tests], &[]);
     let child = ("b/child.rs", "use super::other::O;");

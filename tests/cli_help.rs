@@ -1,4 +1,4 @@
-//! Every help text, as a user sees it.
+//! The help texts of all commands, and the version line.
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
@@ -9,17 +9,17 @@ use std::process::Command;
 use osteon_common::version::{NUMERICS_REVISION, RESULT_SCHEMA};
 use support::run;
 
-/// The subcommands that a help text lists.
+/// Returns the subcommands that a help text lists.
 fn subcommands(help: &str) -> Vec<&str> {
     let listed = help.split("\nCommands:\n").nth(1).unwrap_or_default();
     let entries = listed.lines().take_while(|line| !line.is_empty());
-    // What is wrapped is indented further.
+    // Continuation lines are indented further.
     let entries = entries.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     let names = entries.filter_map(|line| line.split_whitespace().next());
     names.filter(|name| *name != "help").collect()
 }
 
-/// The help of a command and of all below it.
+/// Appends the help of a command and of all its subcommands.
 fn help(words: &[&str], text: &mut String, count: &mut usize) {
     let own = run(&[words, &["--help"]].concat()).succeeded().to_owned();
     if !words.is_empty() {
@@ -61,7 +61,7 @@ fn the_version_names_the_commit_that_is_checked_out() {
     let rest = printed
         .succeeded()
         .strip_prefix(&format!("osteon {} (commit {commit}", env!("CARGO_PKG_VERSION")));
-    // What the tree says now it said when the program was built: cargo has looked at it.
+    // The commit is current, because cargo rebuilds the program when the tree changes.
     let rest = rest.unwrap_or_else(|| panic!("{printed:?} at {commit}"));
     let rest = rest.strip_prefix("-dirty").unwrap_or(rest);
     assert_eq!(rest, format!(", numerics {NUMERICS_REVISION}, result schema {RESULT_SCHEMA})\n"));

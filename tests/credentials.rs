@@ -1,5 +1,5 @@
-//! `certs` and `token`, and what coordinator and clients say of files that cannot be used: exit
-//! code 2, before anything is bound, made or sent.
+//! `certs` and `token`, and the errors of coordinator and clients about files that cannot be used:
+//! exit code 2, before anything is bound, created or sent.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -46,7 +46,7 @@ fn certs_makes_keys_that_only_their_owner_reads_and_replaces_none() {
     refuse(&directory, "ca.pem exists already");
     let after: Vec<Vec<u8>> = listed.iter().map(|path| fs::read(path).unwrap()).collect();
     assert_eq!(before, after);
-    // One file in the way, be it a link to nowhere, and none is made.
+    // If one file exists already, even as a dangling link, none is created.
     let other = scratch.path("other");
     fs::create_dir(&other).unwrap();
     std::os::unix::fs::symlink("/nonexistent", other.join("worker-key.pem")).unwrap();
@@ -103,7 +103,7 @@ fn token_writes_the_token_once_and_shows_only_its_hash() {
     assert!(refused.stderr.contains("a.token exists already"), "{refused:?}");
     assert_eq!(fs::read_to_string(&out).unwrap(), token);
 
-    // Lines are added to a list, even to one whose last line has no end.
+    // Lines are appended to a list, even if its last line has no end.
     let list = scratch.path("tokens");
     let added = make("bob", &scratch.path("b.token"), &["--tokens", text(&list)]);
     assert_eq!(added.succeeded(), "");
@@ -223,7 +223,7 @@ fn a_clients_options_are_checked_before_anything_is_sent() {
             assert!(refused.stderr.contains(expected), "{expected}: {refused:?}");
         }
     };
-    // Nobody is at these addresses: whoever sent something would end with code 1.
+    // Nobody listens at these addresses: a command that sent something would end with code 1.
     let (tls, far, near) = ("https://127.0.0.1:1", "http://10.255.255.1:1", "http://127.0.0.1:1");
     check(tls, &[], "needs --tls-ca");
     check(tls, &["--tls-ca", "/nonexistent"], "cannot read /nonexistent");
@@ -242,7 +242,7 @@ fn a_clients_options_are_checked_before_anything_is_sent() {
     assert!(embedded.stderr.contains("add --coordinator URL"), "{embedded:?}");
 }
 
-/// A named pipe that only its owner reads.
+/// A named pipe that only its owner can read.
 fn pipe(scratch: &Scratch, name: &str) -> PathBuf {
     let path = scratch.path(name);
     let made = Command::new("mkfifo").args(["-m", "600", text(&path)]).status().unwrap();
@@ -250,7 +250,7 @@ fn pipe(scratch: &Scratch, name: &str) -> PathBuf {
     path
 }
 
-/// As of a password manager: `--token-file <(pass show osteon)`.
+/// Like that of a password manager: `--token-file <(pass show osteon)`.
 #[test]
 fn a_token_may_come_through_a_pipe() {
     let secure = Secure::start();
@@ -261,7 +261,7 @@ fn a_token_may_come_through_a_pipe() {
     let mut client = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     client.stdin.take().unwrap().write_all(&fs::read(&token).unwrap()).unwrap();
     Finished::of(client.wait_with_output().unwrap()).succeeded();
-    // One that nobody writes is not waited for for ever.
+    // The wait for a pipe without a writer is limited.
     let silent = pipe(&secure.scratch, "silent");
     let refused = run(&[&jobs[..], &[text(&silent)]].concat());
     assert_eq!(refused.code, Some(2), "{refused:?}");

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use support::{Owned, Scratch, osteon};
 
-/// Commands in the `console` blocks of a page, in order, without the program's name.
+/// Returns the commands in the `console` blocks of a page, in order, without the program's name.
 fn commands(page: &str) -> Vec<String> {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
     text.split("```console\n")
@@ -37,7 +37,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A column of numbers of a CSV file.
+/// Returns a column of numbers of a CSV file.
 fn column(path: &Path, name: &str) -> Vec<f64> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -52,7 +52,7 @@ fn the_readmes_commands_do_what_they_say() {
     let all = commands("README.md");
     assert!(all.len() > 5, "{all:?}");
     for (i, command) in all.iter().enumerate() {
-        // The same command with `--out` comes later: once is enough.
+        // The same command occurs later with `--out`; running it once is enough.
         if all[i + 1..].iter().any(|later| later.starts_with(command.as_str())) {
             continue;
         }
@@ -71,7 +71,8 @@ fn the_readmes_commands_do_what_they_say() {
             fs::write(scratch.path(file), &output.stdout).unwrap();
         }
     }
-    // The example data are what their head says. (A better solver may move them by its accuracy.)
+    // The example data match the description in their header. (A better solver may change them by
+    // its accuracy.)
     let drawn = column(&scratch.path("optimum/realizations.csv"), "velocity");
     let data = column(&scratch.path("examples/data/velocities.csv"), "velocity");
     assert_eq!(drawn.len(), data.len());
@@ -101,7 +102,7 @@ fn the_network_pages_commands_make_what_a_coordinator_takes() {
         let errors = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "osteon {command}: {errors}");
     }
-    // What the page's table lists is there, and the coordinator's command takes it.
+    // The files in the page's table exist, and the coordinator's command accepts them.
     let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/network.md"));
     let listed: Vec<String> = page
         .unwrap()
@@ -123,7 +124,7 @@ fn the_network_pages_commands_make_what_a_coordinator_takes() {
         command.arg("--tls-key").arg(file("server-key.pem"));
         command.arg("--tokens").arg(scratch.path("tokens"));
         let mut process = Owned::spawn(command.env("RUST_LOG", "warn"));
-        // Its name is the certificate's, which other machines know.
+        // The URL contains the name in the certificate, which other machines use.
         let url = process.line();
         assert!(url.starts_with("https://node-1.example:"), "{url}");
     }
@@ -137,7 +138,7 @@ fn the_cluster_pages_commands_for_operators_run_as_they_stand() {
     let all = commands("docs/cluster.md");
     assert!(all.len() >= 8, "{all:?}");
     for command in &all {
-        // As a shell would take it apart: what stands in quotes is one word.
+        // Quoted text is one word, as in a shell.
         let quoted = command.split('"').enumerate();
         let words = quoted.flat_map(|(i, part)| match i % 2 {
             0 => part.split_whitespace().map(str::to_owned).collect::<Vec<_>>(),
@@ -166,7 +167,7 @@ fn the_grpc_pages_code_is_the_tested_clients() {
     for block in &blocks {
         assert!(client.contains(block), "the tested client has not:\n{block}");
     }
-    // And all of it is shown.
+    // The page shows all of it.
     for function in client.lines().filter(|line| line.starts_with("def ")) {
         assert!(blocks.iter().any(|block| block.contains(function)), "{function} is not shown");
     }

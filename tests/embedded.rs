@@ -1,5 +1,5 @@
-//! `identify` and `propagate` on worker processes of their own: same bits however many work,
-//! results kept and continued, nothing left behind.
+//! `identify` and `propagate` on worker processes of their own: the same bits for any number of
+//! workers, results kept and resumed, nothing left behind.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -66,7 +66,7 @@ fn check_draws(job: &str) {
     let job = scratch.write("job.toml", job);
     let out = scratch.path("out");
     let finished = run(&["propagate", text(&job), "--json", "--out", text(&out)]);
-    // Workers that end with the run are no loss.
+    // Workers that end with the run do not count as lost.
     assert!(!finished.stderr.contains("WARN"), "{finished:?}");
     let propagated = finished.json();
     assert_eq!(propagated["realizations"], 39);
@@ -119,7 +119,7 @@ fn a_finished_directory_is_shown_again_and_another_job_refused() {
     assert_eq!(refused.code, Some(2), "{refused:?}");
     assert_eq!(modified(), before);
 
-    // A realization of its best point is one of its own job.
+    // A realization of its best point requires its own job.
     let draw = |job: &Path| run(&["draw", text(job), "--index", "3", "--at", text(&out)]);
     let drawn = draw(&first);
     assert!(drawn.succeeded().contains("mandel"), "{drawn:?}");
@@ -146,7 +146,7 @@ fn long_job() -> String {
     job(60, 50)
 }
 
-/// The result of [`long_job`] without any disturbance.
+/// Returns the result of [`long_job`] without any disturbance.
 fn undisturbed() -> &'static Value {
     static RESULT: OnceLock<Value> = OnceLock::new();
     RESULT.get_or_init(|| {
@@ -160,7 +160,7 @@ fn undisturbed() -> &'static Value {
 struct LongRun {
     process: Owned,
     workers: Vec<u32>,
-    /// Of its coordinator.
+    /// URL of its coordinator.
     url: String,
 }
 
@@ -179,7 +179,8 @@ impl LongRun {
         Self { process, workers, url: url.unwrap() }
     }
 
-    /// As [`start`](Self::start), with some evaluations stored; their number.
+    /// Same as [`start`](Self::start), and waits until some evaluations are stored; returns their
+    /// number.
     fn under_way(scratch: &Scratch, out: &Path) -> (Self, u64) {
         let run = Self::start(scratch, out);
         let mut stored = 0;
@@ -191,7 +192,7 @@ impl LongRun {
     }
 }
 
-/// Stored evaluations of the only job at `url`; `None` while there is none.
+/// Returns the number of stored evaluations of the only job at `url`; `None` if there is none yet.
 fn only_evaluations(url: &str) -> Option<u64> {
     let listed = run(&["jobs", "--json", "--coordinator", url]);
     let listed: Value = serde_json::from_str(&listed.stdout).ok()?;
@@ -200,8 +201,8 @@ fn only_evaluations(url: &str) -> Option<u64> {
     jobs.first().map(|job| job["evaluations"].as_u64().unwrap())
 }
 
-/// Continues the run in `out`: what was stored is there without any worker, and the job that is
-/// continued is the one that stored it.
+/// Resumes the run in `out`: the stored evaluations are there without any worker, and the job is
+/// the same.
 fn continues(scratch: &Scratch, out: &Path, stored: u64) {
     assert!(!out.join("result.json").exists());
     let idle = Coordinator::start(&out.join("store"));
@@ -228,7 +229,7 @@ fn an_interrupted_run_ends_its_workers_and_can_be_continued() {
     let (LongRun { mut process, workers, .. }, stored) = LongRun::under_way(&scratch, &out);
     process.signal("TERM");
     assert_eq!(process.code(), Some(143));
-    // They were reaped by their parent before it ended.
+    // Their parent reaped them before it ended.
     assert!(workers.iter().all(|&worker| !is_alive(worker)), "{workers:?}");
     continues(&scratch, &out, stored);
 }
@@ -248,7 +249,7 @@ fn a_run_whose_store_is_full_says_so_and_can_be_continued() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
     let job = scratch.write("long.toml", &long_job());
-    // No file may grow beyond 128 KiB: there is room for some evaluations.
+    // Files may not grow beyond 128 KiB, which is enough for some evaluations.
     let limited = "trap '' XFSZ; ulimit -f 128; exec \"$@\"";
     let program = osteon();
     let output = Command::new("bash")

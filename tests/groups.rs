@@ -1,4 +1,4 @@
-//! Groups of measured velocities: one job, one identification for each, nothing lost.
+//! Groups of measured velocities: one job, one identification for each group, nothing lost.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use support::{Coordinator, Owned, Scratch, children, eventually, job, option, osteon, run, text};
 
-/// Files that a run of groups leaves.
+/// The files of a run with groups.
 const FILES: [&str; 7] = [
     "job.toml",
     "result.json",
@@ -24,13 +24,14 @@ const FILES: [&str; 7] = [
     "provenance.json",
 ];
 
-/// Velocities of a group around `mean`, about normal, with a coefficient of variation of 0.027.
+/// Velocities of a group around `mean`, about normally distributed, with a coefficient of variation
+/// of 0.027.
 fn velocities(mean: f64) -> Vec<f64> {
     let scores = [-1.63, -1.04, -0.67, -0.39, -0.13, 0.13, 0.39, 0.67, 1.04, 1.63];
     scores.iter().map(|score| mean * (1.0 + 0.03 * score)).collect()
 }
 
-/// A job of `count` groups, whose means differ, by `newton`, with its file of velocities.
+/// A job of `count` groups with different means, by `newton`, with its file of velocities.
 fn grouped(scratch: &Scratch, count: u32) -> PathBuf {
     let mut csv = "velocity,bone\n".to_owned();
     for score in 0..10 {
@@ -51,14 +52,15 @@ fn by_newton() -> String {
     job(32, 20).replace("[search]\n", "[search]\nmethod = \"newton\"\n")
 }
 
-/// Evaluations so far of the only job at `url`.
+/// Returns the number of evaluations so far of the only job at `url`.
 fn evaluations(url: &str) -> Option<u64> {
     let listed = run(&["jobs", "--json", "--coordinator", url]);
     let listed: Value = serde_json::from_str(&listed.stdout).ok()?;
     listed.as_array()?.first()?["evaluations"].as_u64()
 }
 
-/// Every row of a table by the names of its columns. No field but the last one holds a comma.
+/// Returns every row of a table by the names of its columns. Only the last field may contain a
+/// comma.
 fn table(text: &str) -> Vec<BTreeMap<String, String>> {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -96,7 +98,7 @@ fn a_group_is_identified_as_it_would_be_alone() {
         let interval = &found["identified"]["bulk_velocity"]["interval"];
         assert!(interval[0].as_f64() < interval[1].as_f64(), "{found}");
     }
-    // What was found is on each line of the tables.
+    // Each group has a line in the tables.
     assert_eq!(read(&out, "groups.csv").lines().count(), 3);
     let rows = table(&read(&out, "groups.csv"));
     for (row, found) in rows.iter().zip(result["groups"].as_array().unwrap()) {
@@ -153,7 +155,7 @@ fn a_realization_is_drawn_at_the_best_point_of_its_group() {
     }
 }
 
-/// The job of [`grouped`] with `lines` more in the file of velocities.
+/// The job of [`grouped`] with additional `lines` in the file of velocities.
 fn grouped_with(scratch: &Scratch, lines: &str) -> PathBuf {
     let job = grouped(scratch, 2);
     let csv = fs::read_to_string(scratch.path("velocities.csv")).unwrap();
@@ -195,7 +197,7 @@ fn a_group_of_one_velocity_does_not_stop_the_others() {
     assert_eq!((rows[0]["reason"].as_str(), rows[0]["evaluations"].as_str()), (why, "0"));
     let history = read(&mixed, "history.csv");
     assert!(!history.contains("lonely") && history.lines().nth(1).unwrap().ends_with(",bone 0"));
-    // The same on a coordinator of its own.
+    // The same with a separate coordinator.
     let coordinator = Coordinator::start(&scratch.path("store"));
     let _worker = coordinator.worker(1);
     let there = scratch.path("there");
@@ -219,8 +221,8 @@ fn a_job_without_a_group_to_search_is_refused() {
     assert!(!scratch.path("out").exists());
 }
 
-/// The example's velocities are those of the seeds and parameters that their head states. (A better
-/// solver may move them by its accuracy.)
+/// The example's velocities come from the seeds and parameters in the file's header. (A better
+/// solver may change them by its accuracy.)
 #[test]
 fn the_examples_velocities_are_drawn_as_their_head_says() {
     let scratch = Scratch::new();
@@ -269,7 +271,7 @@ fn a_job_of_groups_whose_coordinator_is_killed_loses_nothing() {
     let job = grouped(&scratch, 12);
     let (undisturbed, out) = (scratch.path("undisturbed"), scratch.path("out"));
     run(&["identify", text(&job), "--out", text(&undisturbed)]).succeeded();
-    // Twice, the second time further on.
+    // Interrupted twice, the second time further on.
     let mut stored = 0;
     for _ in 0..2 {
         let mut command = osteon();

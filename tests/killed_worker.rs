@@ -1,4 +1,4 @@
-//! A worker that dies loses nothing but time.
+//! A worker that dies costs nothing but time.
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]

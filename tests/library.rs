@@ -1,4 +1,4 @@
-//! A job in the process of a Rust program against the same job by coordinator and workers.
+//! Compares a job in the process of a Rust program with the same job by coordinator and workers.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -17,7 +17,7 @@ use osteon_common::job_file;
 use osteon_common::parameters::Parameter;
 use support::{Scratch, job, run, text};
 
-/// Compares what the example finds with what `osteon identify` prints.
+/// Compares the example's result with the output of `osteon identify`.
 fn check(file: &Path) {
     let specification = job_file::read(file, JobKind::Identification).unwrap();
     let found = example::run(&specification).unwrap();

@@ -1,5 +1,5 @@
-//! What an operator does with a running coordinator: looks at workers and jobs, reads the log, asks
-//! for its health, copies its store, changes tokens and certificates.
+//! Operations on a running coordinator: listing workers and jobs, reading the log, checking its
+//! health, copying its store, changing tokens and certificates.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -27,7 +27,7 @@ use support::{
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-/// Whether a value is a time by RFC 3339 of the last hour.
+/// Returns whether a value is a time of the last hour by RFC 3339.
 fn is_recent(time: &Value) -> bool {
     let time = time.as_str().and_then(|time| OffsetDateTime::parse(time, &Rfc3339).ok());
     time.is_some_and(|time| {
@@ -69,7 +69,7 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     let number = workers[0]["number"].to_string();
     let drained = coordinator.client(&["workers", "drain", &number, "--json"]).json();
     assert_eq!(drained["standing"], "draining");
-    // It ends as if its own user had wanted it, and nobody is blamed.
+    // It ends as if its own user had asked it to, and nobody is blamed.
     assert_eq!(first.code(), Some(0));
     eventually("it is gone", || listed()["workers"].as_array().map(Vec::len) == Some(1));
     let gone = listed()["departed"][0].clone();
@@ -95,10 +95,10 @@ fn a_job_says_whose_it_is_what_it_is_called_and_when_it_came() {
     };
     let named = ["--name", "left tibia, day 3", "--priority", "7", "--propagate"];
     let id = submit(&[&named[..], &["--request-id", "a"]].concat()).json()["job"].clone();
-    // A repeated request is the same job, whatever it is called.
+    // A repeated request is the same job, whatever its name.
     let other = submit(&["--name", "other", "--propagate", "--request-id", "a"]).json();
     assert_eq!(other["job"], id);
-    // What it waits for is said at once.
+    // The reason for waiting is shown at once.
     let table = client(&url, &["jobs"]).succeeded().to_owned();
     assert!(table.contains("no worker is attached"), "{table}");
     let row = table.lines().nth(1).unwrap().to_owned();
@@ -125,7 +125,7 @@ fn a_job_says_whose_it_is_what_it_is_called_and_when_it_came() {
     service.end();
     service.start_again();
     check(true);
-    // A propagation that is complete has not converged to anything.
+    // A complete propagation is not said to have converged.
     let table = client(&url, &["jobs"]).succeeded().to_owned();
     assert!(table.contains("  done  ") && !table.contains("converged"), "{table}");
     assert_eq!(client(&url, &["jobs", "--json"]).json()[0]["status"], "converged");
@@ -173,7 +173,7 @@ fn the_log_tells_what_happened_to_every_job_and_worker() {
     let recovered = line("jobs recovered");
     assert!(recovered[0].contains("unfinished_jobs=0 ended_jobs=0"), "{recovered:?}");
     assert!(recovered[1].contains("unfinished_jobs=0 ended_jobs=1"), "{recovered:?}");
-    // Nothing of it was out of order.
+    // None of this was an error.
     assert!(!log.contains("WARN") && !log.contains("ERROR"), "{log}");
     let worker = fs::read_to_string(scratch.path("workers.log")).unwrap();
     for what in ["attached", "worker=1", "draining", "ended"] {
@@ -199,14 +199,14 @@ fn a_probe_learns_from_the_exit_code_whether_a_coordinator_serves() {
     let mut secure = Secure::start();
     let ca = secure.scratch.path("certs/ca.pem");
     let url = secure.url.clone();
-    // Without a token, and not hindered by one that cannot be read.
+    // Works without a token, and with one that cannot be read.
     let health = |options: &[&str]| {
         let own = ["health", "--coordinator", &url, "--tls-ca", text(&ca)];
         run_with(("OSTEON_TOKEN_FILE", "/nonexistent"), &[&own, options].concat())
     };
     assert_eq!(health(&[]).succeeded(), "serving\n");
     assert_eq!(health(&["--json"]).json()["serving"], true);
-    // One that is stopped accepts connections, and says nothing.
+    // A stopped coordinator accepts connections, but does not answer.
     secure.process.signal("STOP");
     let silent = health(&["--timeout", "0.5"]);
     secure.process.signal("CONT");
@@ -237,13 +237,13 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
     assert_eq!(made["bytes"], bytes);
     assert_eq!(fs::read_dir(&copy).unwrap().count(), 1, "something else is left there");
     assert!(!scratch.path("store/osteon.backup").exists());
-    // What is there is never replaced.
+    // An existing file is never replaced.
     let before = fs::read(copy.join("osteon.sqlite")).unwrap();
     let again = coordinator.client(&["backup", text(&copy)]);
     assert_eq!(again.code, Some(2), "{again:?}");
     assert!(again.stderr.contains("is there already"), "{again:?}");
     assert_eq!(fs::read(copy.join("osteon.sqlite")).unwrap(), before);
-    // Nor is a store made out of the copy and another one's journal.
+    // Nor is a copy combined with another store's journal.
     let beside = scratch.path("beside");
     scratch.write("beside/osteon.sqlite-wal", "of another store");
     assert_eq!(coordinator.client(&["backup", text(&beside)]).code, Some(2));
@@ -256,7 +256,7 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
         let result = fs::read_to_string(out.join("result.json")).unwrap();
         serde_json::from_str::<Value>(&result).unwrap()["digest"].clone()
     };
-    // The coordinator was not disturbed, and one that starts on the copy goes on from there.
+    // The coordinator was not disturbed, and one that starts on the copy continues from there.
     assert_eq!(ended(&coordinator), digest.as_str());
     drop((worker, coordinator));
     let second = Coordinator::start(&copy);
@@ -278,7 +278,7 @@ fn a_store_is_copied_for_admins_only() {
     assert!(copy.join("osteon.sqlite").exists());
 }
 
-/// Replaces the list of tokens, readable by its owner alone.
+/// Replaces the list of tokens by one that only its owner can read.
 fn write_tokens(secure: &Secure, text: &str) {
     fs::write(secure.scratch.path("tokens"), text).unwrap();
 }
@@ -295,19 +295,19 @@ fn tokens_and_certificates_are_read_again_at_sighup() {
         .collect();
     assert_eq!(code(&secure, "read"), Some(0));
     write_tokens(&secure, &without);
-    // Until then nothing changes.
+    // Nothing changes before the signal.
     assert_eq!(code(&secure, "read"), Some(0));
     secure.process.signal("HUP");
     eventually("the token is withdrawn", || code(&secure, "read") == Some(1));
     assert!(secure.client("read", &["jobs"]).stderr.contains("does not know the token"));
     assert_eq!(code(&secure, "submit"), Some(0));
-    // A list that cannot be used changes nothing, and the log says why.
+    // A list that cannot be used changes nothing, and the log gives the reason.
     write_tokens(&secure, "nonsense\n");
     secure.process.signal("HUP");
     let told = "tokens and certificates stay as they were";
     eventually("the log says so", || secure.read("coordinator.log").contains(told));
     assert_eq!((code(&secure, "submit"), code(&secure, "read")), (Some(0), Some(1)));
-    // And back, with a certificate for another host, which its clients then refuse.
+    // The old list again, with a certificate for another host, which clients then refuse.
     write_tokens(&secure, &list);
     let later = OffsetDateTime::now_utc() + time::Duration::days(1);
     certificate(&secure.scratch, "server", Made::Server("elsewhere.example"), later);
@@ -324,7 +324,7 @@ fn tokens_and_certificates_are_read_again_at_sighup() {
     assert_eq!(secure.process.code(), Some(0));
 }
 
-/// Runs a command with variables of the environment.
+/// Runs a command with environment variables.
 fn with(variables: &[(&str, &Path)], arguments: &[&str]) -> Finished {
     let mut command = osteon();
     command.args(arguments).envs(variables.iter().copied());
@@ -343,13 +343,13 @@ fn the_environment_names_what_every_command_repeats() {
         ("OSTEON_TOKEN_FILE", &token),
     ];
     with(&own, &["jobs"]).succeeded();
-    // An option counts before it.
+    // An option takes precedence.
     let file = scratch.write("job.toml", &job(20, 1));
     let weak = with(&own, &["submit", text(&file)]);
     assert_eq!(weak.code, Some(1), "{weak:?}");
     let strong = scratch.path("submit.token");
     with(&own, &["submit", text(&file), "--token-file", text(&strong)]).succeeded();
-    // A worker takes its certificate from it, too.
+    // A worker takes its certificate from the environment, too.
     let files = ["worker.pem", "worker-key.pem"].map(|name| scratch.path("certs").join(name));
     let mut command = osteon();
     command.args(["worker", "--threads", "1"]).envs(own);
@@ -358,14 +358,14 @@ fn the_environment_names_what_every_command_repeats() {
     eventually("the worker is attached", || {
         with(&own, &["workers", "--json"]).json()["workers"].as_array().map(Vec::len) == Some(1)
     });
-    // A run on this machine has nothing to do with it.
+    // A run on this machine ignores them.
     let nowhere = Path::new("/nonexistent");
     let wrong = ["OSTEON_TLS_CA", "OSTEON_TLS_CERT", "OSTEON_TLS_KEY", "OSTEON_TOKEN_FILE"]
         .map(|it| (it, nowhere));
     with(&wrong, &["identify", text(&file), "--json"]).succeeded();
 }
 
-/// A token is not shown to whoever else a command line names, and the refusal says so.
+/// A token is not sent to a different coordinator on the command line, and the refusal says so.
 #[test]
 fn files_of_the_environment_are_not_used_for_another_coordinator() {
     let secure = Secure::start();
@@ -373,7 +373,7 @@ fn files_of_the_environment_are_not_used_for_another_coordinator() {
     let (ca, token) = (scratch.path("certs/ca.pem"), scratch.path("read.token"));
     let jobs = ["jobs", "--coordinator", &secure.url];
     let own = [("OSTEON_TLS_CA", ca.as_path()), ("OSTEON_TOKEN_FILE", &token)];
-    // Where the environment names no coordinator, its files are for any.
+    // If the environment names no coordinator, its files apply to any.
     with(&own, &jobs).succeeded();
     let files = ["worker.pem", "worker-key.pem"].map(|name| scratch.path("certs").join(name));
     let own = [

@@ -1,5 +1,5 @@
-//! What other programs read: the keys of every JSON file and the columns of every table, their order
-//! and their types. A change here is one of the result schema.
+//! The interface for other programs: the keys of every JSON file and the columns of every table,
+//! their order and their types. A change here changes the result schema.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
 
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value};
 use support::{Scratch, job, run, text};
 
-/// One line for each key below `value`: its path and what it holds.
+/// Returns one line for each key below `value`: its path and the type of its content.
 fn keys(value: &Value) -> String {
     let mut lines = String::new();
     add_keys(&mut lines, "", value);
@@ -23,7 +23,7 @@ fn keys(value: &Value) -> String {
 
 fn add_keys(lines: &mut String, path: &str, value: &Value) {
     let kind = match value {
-        // Built outside a repository it is null.
+        // Null if it was built outside a repository.
         Value::Null if path == "commit" => "text",
         Value::Null => "null",
         Value::Bool(_) => "boolean",
@@ -50,7 +50,7 @@ fn add_keys(lines: &mut String, path: &str, value: &Value) {
                 add_keys(lines, &inside(key), value);
             }
         }
-        // The elements of a list are alike: the one with most keys stands for all.
+        // The elements of a list have the same form: the one with most keys represents all.
         Value::Array(elements) => {
             let fullest = elements.iter().max_by_key(|element| keys(element).lines().count());
             if let Some(element) = fullest {
@@ -61,17 +61,17 @@ fn add_keys(lines: &mut String, path: &str, value: &Value) {
     }
 }
 
-/// Entries of an object that are shown as one, if they are so many and alike: parameters, say.
+/// Minimum number of similar entries of an object, such as parameters, that are shown as one.
 const ALIKE_MIN: usize = 6;
 
-/// What a value holds, and what is below it.
+/// Returns the type of a value, and those of the values below it.
 fn tree(value: &Value) -> String {
     let mut lines = String::new();
     add_keys(&mut lines, "*", value);
     lines
 }
 
-/// One line for each column of a table: its name and what its fields are.
+/// Returns one line for each column of a table: its name and the type of its fields.
 fn columns(table: &str) -> String {
     let mut lines = table.lines();
     let names = fields(lines.next().unwrap());
@@ -79,7 +79,7 @@ fn columns(table: &str) -> String {
     let kind = |column: usize| {
         let kinds: BTreeSet<&str> = rows.iter().map(|row| kind(&row[column])).collect();
         let mut kinds: Vec<&str> = kinds.into_iter().collect();
-        // Where some are whole and some are not, they are numbers.
+        // If some fields are whole numbers and some are not, the column consists of numbers.
         if kinds.contains(&"number") {
             kinds.retain(|kind| *kind != "integer");
         }
@@ -167,7 +167,7 @@ impl Runs {
     }
 }
 
-/// Every file in the document of results, with the keys or columns that its table lists.
+/// Returns the keys or columns that the documentation of results lists for a file.
 fn documented(heading: &str) -> Vec<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
     let page = fs::read_to_string(page).unwrap();
@@ -235,7 +235,8 @@ fn documented_is_real(runs: &Runs) {
     ] {
         let (told, real): (BTreeSet<String>, BTreeSet<String>) =
             (documented(heading).into_iter().collect(), real.into_iter().collect());
-        // What only some runs have, and columns that are named after the free parameters.
+        // Some keys occur only in certain runs, and some columns are named after the free
+        // parameters.
         let told: BTreeSet<_> = told
             .into_iter()
             .flat_map(|name| match name.as_str() {
@@ -283,7 +284,7 @@ fn provenance_tells_of_every_file(runs: &Runs) {
     }
 }
 
-/// Editors and programs take the schema from the repository.
+/// Editors and programs use the schema from the repository.
 #[test]
 fn the_schema_is_the_committed_one_and_describes_every_key() {
     let printed = run(&["schema", "result"]);
@@ -299,12 +300,12 @@ fn the_schema_is_the_committed_one_and_describes_every_key() {
     assert!(undescribed.is_empty(), "without a description: {undescribed:?}");
 }
 
-/// Counts the keys that a schema names, and lists those that it does not describe.
+/// Counts the keys in a schema, and lists those without a description.
 fn undescribed_keys(schema: &Value, path: &str, undescribed: &mut Vec<String>) -> usize {
     let mut count = 0;
     for (name, property) in schema["properties"].as_object().into_iter().flatten() {
         count += 1;
-        // The kind tells the alternatives apart, and so does the method of a solver.
+        // The alternatives are distinguished by the kind, and those of a solver by the method.
         if property.get("description").is_none() && property.get("const").is_none() {
             undescribed.push(format!("{path}.{name}"));
         }

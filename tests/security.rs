@@ -1,4 +1,5 @@
-//! A coordinator with TLS: who gets in, who does not and why, and that nothing secret is told.
+//! Access to a coordinator with TLS: the peers that are admitted or refused, the reasons given, and
+//! that no secret is revealed.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -46,11 +47,11 @@ fn a_job_over_tls_ends_with_the_bits_of_an_embedded_run_and_tells_no_secret() {
     assert_eq!(stdout, embedded.succeeded());
     assert!(secure.client("read", &["jobs"]).succeeded().contains("max_evaluations"));
 
-    // The coordinator noted who submitted.
+    // The coordinator recorded the submitter.
     let log = secure.read("coordinator.log");
     assert!(log.contains("submit-holder"), "nobody is noted");
     assert!(log.contains("TRACE"), "the log is not at its finest level");
-    // Everything that was logged, at the finest level, and what other users see of processes.
+    // All logs, at the finest level, and the process data that other users can see.
     let mut told = vec![log, secure.read("worker-1.log"), secure.read("worker-2.log"), stdout];
     told.push(String::from_utf8_lossy(&output.stderr).into_owned());
     for process in workers.iter().chain([&secure.process]) {
@@ -69,7 +70,7 @@ fn a_job_over_tls_ends_with_the_bits_of_an_embedded_run_and_tells_no_secret() {
     }
 }
 
-/// Every token and every hash, without the parts that all have, and every line of every key.
+/// Returns every token and every hash, without their common parts, and every line of every key.
 fn secrets(scratch: &Scratch) -> Vec<String> {
     let mut secrets = Vec::new();
     for role in ROLES {
@@ -87,8 +88,8 @@ fn secrets(scratch: &Scratch) -> Vec<String> {
     secrets
 }
 
-/// Who may call a method of the services, by role, and whether a certificate is enough. A method that
-/// is not listed here is called by admins only: the one that is made next.
+/// The roles that may call each method of the services, and whether a certificate is sufficient.
+/// Methods that are not listed here, including new ones, may be called by admins only.
 const CALLERS: [(&str, &[&str], bool); 12] = [
     ("/grpc.health.v1.Health/", &["none", "stranger", "read", "submit", "admin"], true),
     ("/grpc.reflection.v1.ServerReflection/", &["read", "submit", "admin"], true),
@@ -104,8 +105,8 @@ const CALLERS: [(&str, &[&str], bool); 12] = [
     ("/osteon.v1.Workers/Attach", &[], true),
 ];
 
-/// Every method that a coordinator describes by reflection or that describes it, who may call it, and
-/// whether a certificate is enough.
+/// Returns every method of the coordinator's services, including reflection and health, with the
+/// roles that may call it, and whether a certificate is sufficient.
 fn methods() -> Vec<(String, &'static [&'static str], bool)> {
     let described = [
         FILE_DESCRIPTOR_SET,
@@ -128,12 +129,12 @@ fn methods() -> Vec<(String, &'static [&'static str], bool)> {
             }
         }
     }
-    // Prune, DrainWorker and Backup are for admins; each of the others is listed.
+    // Prune, DrainWorker and Backup are for admins; all others are listed.
     assert!(methods.len() >= CALLERS.len() + 3, "{methods:?}");
     methods
 }
 
-/// A connection with a token and a certificate, by name, if given.
+/// Returns a connection with a token and a certificate, each by name, if given.
 async fn connection(secure: &Secure, token: Option<&str>, certificate: Option<&str>) -> Connection {
     let file = |name: String| Some(secure.scratch.path(&name));
     let files = CredentialFiles {
@@ -147,7 +148,7 @@ async fn connection(secure: &Secure, token: Option<&str>, certificate: Option<&s
     connect_with(&endpoint, &credentials, TIMEOUT).await.unwrap()
 }
 
-/// Calls a method with an empty message; the status of its answer.
+/// Calls a method with an empty message; returns the status of its answer.
 async fn call(connection: &Connection, path: &str, header: Option<&str>) -> Status {
     let mut grpc = Grpc::new(connection.clone());
     grpc.ready().await.unwrap();
@@ -159,7 +160,7 @@ async fn call(connection: &Connection, path: &str, header: Option<&str>) -> Stat
     let codec = ProstCodec::<(), ()>::default();
     let answer = tokio::time::timeout(TIMEOUT, async {
         let mut stream = grpc.server_streaming(request, path, codec).await?.into_inner();
-        // Some streams have no end.
+        // Some streams do not end.
         stream.message().await?;
         Ok::<_, Status>(())
     });
@@ -173,7 +174,7 @@ fn is_let_in(status: &Status) -> bool {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
     let secure = Secure::start();
-    // A token that nobody entered into the list.
+    // A token that is not in the list.
     let out = secure.scratch.path("stranger.token");
     run(&["token", "stranger", "--role", "admin", "--out", text(&out)]).succeeded();
     for token in ["none", "stranger", "read", "submit", "admin"] {
@@ -207,7 +208,7 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
         assert_eq!(status.code(), Code::Unauthenticated, "{header}: {status}");
         assert!(status.message().contains("must be `Bearer`"), "{header}: {status}");
     }
-    // Nothing was started by any of it.
+    // None of the calls has started anything.
     assert_eq!(secure.client("read", &["jobs", "--json"]).json(), serde_json::json!([]));
 }
 
@@ -257,7 +258,7 @@ fn a_worker_without_a_workers_certificate_is_told_why_and_ends() {
         let told = fs::read_to_string(&log).unwrap();
         assert!(told.contains(expected) && told.contains(&secure.url), "{name:?}: {told}");
     }
-    // Whose certificate is foreign is told so with any token, too.
+    // A certificate of another authority is reported with any token, too.
     let mut options = secure.options("admin");
     options.extend(["--tls-cert", "--tls-key"].into_iter().zip(["", "-key"]).flat_map(
         |(option, suffix)| {
@@ -270,7 +271,8 @@ fn a_worker_without_a_workers_certificate_is_told_why_and_ends() {
     assert!(client.stderr.contains("has not signed"), "{client:?}");
 }
 
-/// What a client and a worker say who believe the authority `ca` and meet `url`.
+/// Returns the messages of a client and a worker that trust the authority `ca` and connect to
+/// `url`.
 fn distrust(scratch: &Scratch, url: &str, ca: &str) -> [String; 2] {
     let (ca, token) = (scratch.path(ca), scratch.path("admin.token"));
     ["jobs", "worker"].map(|command| {
@@ -304,12 +306,12 @@ fn a_coordinator_that_cannot_be_trusted_is_named_with_the_reason() {
 fn an_expired_certificate_is_told_to_whoever_meets_it() {
     let secure = Secure::start();
     let scratch = &secure.scratch;
-    // Its owner, before anything is sent.
+    // The owner of an expired certificate is informed before anything is sent.
     certificate(scratch, "old", Made::Worker, rcgen::date_time_ymd(2001, 1, 1));
     let mut worker = secure.worker("old", "old.log");
     assert_eq!(worker.code(), Some(2));
     assert!(secure.read("old.log").contains("old.pem has expired"), "{}", secure.read("old.log"));
-    // A client, of a coordinator whose certificate expires while it runs.
+    // So is a client of a coordinator whose certificate expires while it runs.
     let scratch = &Scratch::new();
     set_up(scratch);
     let soon = OffsetDateTime::now_utc() + time::Duration::seconds(15);
@@ -355,7 +357,7 @@ fn tls_and_plain_http_meet_with_an_explanation() {
 fn garbage_on_the_port_does_no_harm() {
     let mut secure = Secure::start();
     let address = secure.url.strip_prefix("https://").unwrap().to_owned();
-    // The head of a ClientHello that promises more than it brings.
+    // The beginning of a ClientHello that announces more bytes than are sent.
     let hello = [0x16, 3, 1, 2, 0, 1, 0, 1, 0xfc, 3, 3, 0, 0, 0];
     let noise: Vec<u8> =
         (0..100_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
@@ -367,7 +369,7 @@ fn garbage_on_the_port_does_no_harm() {
         &noise,
         b"",
     ];
-    // These stay, silent or half way through a handshake, while others are served.
+    // These connections stay open, silent or in the middle of a handshake, while others are served.
     let mut open = Vec::new();
     for bytes in garbage {
         for _ in 0..20 {
@@ -378,7 +380,7 @@ fn garbage_on_the_port_does_no_harm() {
         }
     }
     secure.client("read", &["jobs"]).succeeded();
-    // What is no TLS at all is cut off at once, in TLS's own words.
+    // Bytes that are not TLS are rejected at once with a TLS alert.
     open[0].set_read_timeout(Some(TIMEOUT)).unwrap();
     let mut answer = Vec::new();
     let _reset = open[0].read_to_end(&mut answer);
@@ -393,7 +395,7 @@ fn garbage_on_the_port_does_no_harm() {
 fn silent_handshakes_end_and_make_room() {
     let secure = Secure::start();
     let address = secure.url.strip_prefix("https://").unwrap().to_owned();
-    // As many as there is room for: whoever comes then waits until they time out.
+    // Occupies all handshakes, so that the next client waits until they time out.
     let silent: Vec<_> = (0..osteon_common::limits::HANDSHAKES_MAX)
         .map(|_| TcpStream::connect(&address).unwrap())
         .collect();

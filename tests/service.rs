@@ -1,5 +1,4 @@
-//! The services as an operator and a user meet them: coordinator, worker, and every client
-//! command.
+//! The services as operators and users see them: coordinator, worker, and every client command.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -158,7 +157,7 @@ fn a_cancelled_result_gives_way_to_a_finished_one() {
         serde_json::from_str::<Value>(&text).unwrap()["status"].clone()
     };
 
-    // A propagation that did not complete its evaluation has no result.
+    // A propagation whose evaluation is not complete has no result.
     let propagation = fetch(&cancelled(&["submit", file, "--propagate"]));
     assert_eq!(propagation.code, Some(1), "{propagation:?}");
     assert!(propagation.stderr.contains("was cancelled"), "{propagation:?}");
@@ -206,7 +205,7 @@ fn an_unreachable_coordinator_is_named_in_time() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(30, 4));
     let out = scratch.path("out");
-    // A port that was free a moment ago, and one that accepts but never speaks.
+    // A port that was free a moment ago, and one that accepts connections but never answers.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = format!("http://{}", listener.local_addr().unwrap());
     let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
@@ -214,7 +213,7 @@ fn an_unreachable_coordinator_is_named_in_time() {
     let (file, out) = (file.to_str().unwrap(), out.to_str().unwrap());
     let commands = [&["jobs"] as &[&str], &["submit", file], &["identify", file, "--out", out]];
     let each = urls.iter().flat_map(|url| commands.map(|arguments| (url, arguments)));
-    // All at once: each waits for as long as a client may.
+    // Run at the same time, because each waits for the client's full time limit.
     std::thread::scope(|scope| {
         for (url, arguments) in each {
             scope.spawn(move || {
@@ -222,7 +221,7 @@ fn an_unreachable_coordinator_is_named_in_time() {
                 let finished = run(&[arguments, &["--coordinator", url]].concat());
                 assert_eq!(finished.code, Some(1), "{finished:?}");
                 assert!(finished.stderr.contains(url), "{finished:?}");
-                // Connected or not, it does not wait in silence.
+                // Connected or not, it reports what it waits for.
                 let told = ["cannot reach", "no answer from"].map(|what| format!("{what} {url}"));
                 assert!(told.iter().any(|told| finished.stderr.starts_with(told)), "{finished:?}");
                 assert!(finished.stderr.contains(" for 9 more seconds\n"), "{finished:?}");
@@ -234,7 +233,7 @@ fn an_unreachable_coordinator_is_named_in_time() {
     assert!(!scratch.path("out").join("job.toml").exists());
 }
 
-/// Ends `command` by the signal once it handles signals, and asserts the exit code.
+/// Ends `command` by the signal once it handles signals, and checks the exit code.
 fn ended_by(name: &str, code: i32, command: &mut Command, expected: &str) {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let status = format!("/proc/{}/status", child.id());
@@ -263,7 +262,7 @@ fn a_command_that_a_signal_ends_has_its_code() {
          [0.0, 0.0, 0.0, 0.0, 0.0, 1e10]]\n[solver]\nmethod = \"hybrid\"\nrefinement = 16.0\n",
     );
     let (job, case) = (text(&job), text(&case));
-    // Accepts, and never speaks.
+    // Accepts connections, but never answers.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = format!("http://{}", listener.local_addr().unwrap());
     let out = scratch.path("out");
@@ -332,14 +331,14 @@ fn services_end_cleanly_when_told_to() {
 #[test]
 fn who_interrupts_twice_does_not_wait() {
     let scratch = Scratch::new();
-    // A batch that takes long.
+    // A batch that takes a long time.
     let method = "[solver]\nmethod = \"hybrid\"\nrefinement = 16.0\nelement_order = 12\n";
     let file = scratch.write("job.toml", &format!("{}{method}", job(1, 1)));
     let coordinator = Coordinator::start(&scratch.path("store"));
     let mut worker = coordinator.worker(1);
     let id = coordinator.submit(&file);
     eventually("the worker computes", || coordinator.job(&id)["workers"] == 1);
-    // Once would let it finish its batch and end with 0.
+    // A single signal would let it finish its batch and end with 0.
     let mut code = None;
     eventually("the worker ends", || {
         worker.signal("INT");
@@ -403,7 +402,7 @@ fn a_closed_pipe_is_success() {
         osteon().args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    // Too fast or too late for the pipe: success both times.
+    // The program may finish before or after the pipe is closed: both are a success.
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();

@@ -22,7 +22,7 @@ fn simulate(case: &Path, out: &Path, options: &[&str]) -> Finished {
     run(&[&["simulate", text(case), "--out", text(out)], options].concat())
 }
 
-/// Every file of a directory with its bytes.
+/// Returns every file of a directory with its bytes.
 fn files(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(directory).unwrap().map(Result::unwrap);
     let read = entries
@@ -69,7 +69,7 @@ fn a_directory_belongs_to_one_case() {
         refused(&again, &[&to_another[..], &[expected]].concat());
         assert_eq!(files(&out), first, "{expected}");
     }
-    // The same case may be given in another way, here as the file that was written.
+    // The same case may be written differently; here it is the file that was written.
     let same = scratch.write("same.toml", &lines);
     simulate(&same, &out, &[&SHORT[..], &["--check"]].concat()).succeeded();
     assert_eq!(files(&out), first);

@@ -1,4 +1,4 @@
-//! Solvers as a user meets them: instruction sets by name, checks, estimated errors.
+//! Solvers as users see them: instruction sets by name, checks, estimated errors.
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
@@ -54,7 +54,7 @@ fn an_unknown_instruction_set_is_refused_wherever_something_is_computed() {
             assert!(refused.stderr.contains(isa.name()), "{}", refused.stderr);
         }
     }
-    // Nothing is computed here.
+    // A command that computes nothing.
     assert_eq!(run_with((VARIABLE, "sse9"), &["draw", text(&job), "--index", "0"]).code, Some(0));
 }
 
@@ -103,7 +103,7 @@ fn a_hybrid_job_runs_on_workers_and_states_its_discretisation() {
     assert!(0.0 <= median.unwrap() && median <= largest, "{errors}");
     let drawn = run(&["draw", text(&file), "--index", "2"]).succeeded().to_owned();
     assert!(drawn.contains("method = \"hybrid\""), "{drawn}");
-    // The exact method's digest is another one.
+    // The exact method's digest is different.
     let exact = scratch.write("exact.toml", &job(3, 1));
     let exact = coordinator.client(&["propagate", text(&exact), "--json"]).json();
     assert_ne!(exact["digest"], result["digest"]);

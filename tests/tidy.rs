@@ -1,4 +1,4 @@
-//! Reads the repository: what no compiler and no linter holds.
+//! Checks of the repository that no compiler and no linter makes.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -17,7 +17,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Files under the root with one of these endings, without build output.
+/// Returns the files below the root with one of these endings, without build output.
 fn files(endings: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![root().to_owned()];
@@ -72,8 +72,8 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
     assert_eq!(arrows, BTreeSet::from(allowed));
 }
 
-/// `osteon-study` is no dependency of any crate, as the arrows above say, so what it alone needs is not in
-/// the program as long as nobody else asks for it.
+/// As the arrows above show, no crate depends on `osteon-study`. Features that only it enables are
+/// therefore not part of the program as long as no other crate enables them.
 #[test]
 fn what_only_measures_is_not_shipped() {
     let metadata = MetadataCommand::new().no_deps().exec().unwrap();
@@ -118,7 +118,7 @@ fn state_and_reactions_know_no_clock_no_socket_and_no_future() {
     assert!(count > 10, "only {count} files were found");
 }
 
-/// `proptest!` listens to the environment, begins with another seed each time, and writes files.
+/// `proptest!` reads environment variables, uses a new seed each time, and writes files.
 #[test]
 fn properties_are_tested_on_the_same_cases_everywhere() {
     let helper = root().join("fuzz/src");
@@ -163,7 +163,7 @@ fn files_and_functions_are_short() {
             if !opens {
                 continue;
             }
-            // The code is formatted: a function ends at its own indentation.
+            // The code is formatted, so a function ends at its own indentation.
             let end = format!("{}}}", &line[..line.len() - code.len()]);
             let length = lines[start..].iter().position(|line| *line == end).unwrap_or(0);
             if length > FUNCTION_LINES_MAX {
@@ -176,7 +176,7 @@ fn files_and_functions_are_short() {
 
 #[test]
 fn nothing_is_left_over() {
-    // In two pieces, so that this file does not find itself.
+    // Split in two, so that this file does not match itself.
     let words = [
         concat!("todo", "!("),
         concat!("unimplemented", "!("),
@@ -188,7 +188,7 @@ fn nothing_is_left_over() {
     for path in files(&[".rs", ".proto", ".toml", ".md"]) {
         let text = fs::read_to_string(&path).unwrap();
         for word in words {
-            // CONTRIBUTING.md names what is not used.
+            // CONTRIBUTING.md lists what must not be used.
             if !path.ends_with("CONTRIBUTING.md") {
                 assert!(!text.contains(word), "{} contains {word:?}", path.display());
             }
@@ -220,7 +220,7 @@ fn links_in_the_documentation_lead_somewhere() {
     assert!(count > 5, "only {count} links were found");
 }
 
-/// The anchor of a heading: in lower case, words joined by hyphens.
+/// Returns the anchor of a heading: lower case, with words joined by hyphens.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().to_lowercase();
     kept.chars()

@@ -1,4 +1,4 @@
-//! What a field accepts: ranges of numbers, and how a message says them.
+//! The values that fields accept: ranges of numbers, and their description in messages.
 
 use std::fmt;
 
@@ -23,49 +23,50 @@ enum Edge {
 /// A range of whole numbers, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct WholeRange {
-    /// Smallest.
+    /// Smallest accepted number.
     pub(crate) min: u64,
-    /// Largest.
+    /// Largest accepted number.
     pub(crate) max: u64,
 }
 
 impl Interval {
-    /// Every finite number.
+    /// Accepts every finite number.
     pub(crate) const fn finite(unit: &'static str) -> Self {
         Self { lower: Edge::None, upper: Edge::None, unit }
     }
 
-    /// Above `lower`.
+    /// Accepts numbers above `lower`.
     pub(crate) const fn above(lower: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Open(lower), upper: Edge::None, unit }
     }
 
-    /// Above `lower` and below `upper`.
+    /// Accepts numbers above `lower` and below `upper`.
     pub(crate) const fn between(lower: f64, upper: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Open(lower), upper: Edge::Open(upper), unit }
     }
 
-    /// Above `lower`, at most `upper`.
+    /// Accepts numbers above `lower` and at most `upper`.
     pub(crate) const fn above_to(lower: f64, upper: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Open(lower), upper: Edge::Closed(upper), unit }
     }
 
-    /// At least `lower`, below `upper`.
+    /// Accepts numbers of at least `lower` and below `upper`.
     pub(crate) const fn from_below(lower: f64, upper: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Closed(lower), upper: Edge::Open(upper), unit }
     }
 
-    /// At least `lower`.
+    /// Accepts numbers of at least `lower`.
     pub(crate) const fn from(lower: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Closed(lower), upper: Edge::None, unit }
     }
 
-    /// From `lower` to `upper`.
+    /// Accepts numbers from `lower` to `upper`.
     pub(crate) const fn from_to(lower: f64, upper: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Closed(lower), upper: Edge::Closed(upper), unit }
     }
 
-    /// What a parameter of the mean model, or the dispersion, accepts by itself.
+    /// Returns the values accepted for a parameter of the mean model, or the dispersion, regardless
+    /// of other fields.
     pub(crate) fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density
@@ -78,7 +79,7 @@ impl Interval {
         }
     }
 
-    /// Whether `value` is finite and inside.
+    /// Returns whether `value` is finite and inside the interval.
     pub(crate) fn contains(&self, value: f64) -> bool {
         let above = match self.lower {
             Edge::None => true,
@@ -93,7 +94,7 @@ impl Interval {
         value.is_finite() && above && below
     }
 
-    /// The message that refuses `value`.
+    /// Returns the message that refuses `value`.
     pub(crate) fn refusal(&self, value: f64) -> String {
         let finite = if value.is_finite() { "" } else { "finite and " };
         match (self.lower, self.upper) {
@@ -130,10 +131,11 @@ impl fmt::Display for Interval {
     }
 }
 
-/// Numbers from here on are written with an exponent: nobody counts the zeros of 25000000000.
+/// Numbers from here on are written with an exponent, because the zeros of 25000000000 are hard to
+/// count.
 const EXPONENT_FROM: f64 = 1e7;
 
-/// The edge of an interval in a message.
+/// Formats the edge of an interval for a message.
 fn shown(edge: f64) -> String {
     if edge == DISPERSION_MAX {
         format!("{edge:.5}…")
@@ -144,23 +146,23 @@ fn shown(edge: f64) -> String {
     }
 }
 
-/// A number of a file in a message.
+/// Formats a number from a file for a message.
 pub(crate) fn written(value: f64) -> String {
     if value.abs() >= EXPONENT_FROM { format!("{value:e}") } else { format!("{value:?}") }
 }
 
 impl WholeRange {
-    /// From `min` to `max`.
+    /// Accepts whole numbers from `min` to `max`.
     pub(crate) const fn new(min: u64, max: u64) -> Self {
         Self { min, max }
     }
 
-    /// Whether `value` is inside.
+    /// Returns whether `value` is inside the range.
     pub(crate) fn contains(&self, value: u64) -> bool {
         (self.min..=self.max).contains(&value)
     }
 
-    /// The message that refuses `value`.
+    /// Returns the message that refuses `value`.
     pub(crate) fn refusal(&self, value: &impl fmt::Display) -> String {
         format!("is {value}; it must be {self}")
     }

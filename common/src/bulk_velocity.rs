@@ -1,4 +1,5 @@
-//! The velocity of a wave along the bone that does not feel its faces, √(c1111/ρ), in closed form.
+//! The velocity √(c1111/ρ) of a wave along the bone that is not affected by its faces, in closed
+//! form.
 //!
 //! It governs the mean velocity of the first arriving signal, as the dispersion governs the
 //! coefficient of variation: a search starts from its derivatives.
@@ -6,7 +7,7 @@
 use crate::elasticity::Inadmissible;
 use crate::parameters::Point;
 
-/// ln √(c1111/ρ) at a point, and how it changes with the parameters.
+/// ln √(c1111/ρ) at a point, with its derivatives with respect to the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BulkVelocity {
     /// ln √(c1111/ρ), the velocity in m/s.
@@ -16,7 +17,7 @@ pub struct BulkVelocity {
     pub gradient: [f64; 7],
 }
 
-/// The velocity √(c1111/ρ) of the mean model at `point`.
+/// Computes the velocity √(c1111/ρ) of the mean model at `point`.
 ///
 /// By the paper's Eq. (7), c1111 = e_L² (1 - ν_T) / (e_L (1 - ν_T) - 2 e_T ν_L²).
 ///
@@ -74,7 +75,8 @@ pub(crate) mod tests {
         assert!((libm::exp(velocity.logarithm) / expected - 1.0).abs() < 1e-14);
     }
 
-    /// Per relative change of each parameter, with four digits, by an independent computation.
+    /// Derivatives per relative change of each parameter, to four digits, from an independent
+    /// computation.
     #[test]
     fn sensitivities_at_the_papers_optimum() {
         let velocity = bulk_velocity(&OPTIMUM).unwrap();
@@ -84,8 +86,9 @@ pub(crate) mod tests {
         }
     }
 
-    /// Central differences with a step of 1e-5: their error is its square times a third derivative,
-    /// which near the edge of admissibility is large, and 1e-11 of rounding.
+    /// Compares with central differences with a step of 1e-5. Their error is the square of the step
+    /// times a third derivative, which is large near the edge of admissibility, plus 1e-11 of
+    /// rounding.
     #[test]
     fn derivatives_are_those_of_differences() {
         let mut checked = 0;

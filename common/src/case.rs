@@ -5,8 +5,8 @@ use crate::layers::Layers;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
 
-/// Everything but the bone's material: what all realizations of a job share, and all that a
-/// solver's shared tables may depend on.
+/// Everything but the bone's material: the part that all realizations of a job share, and the only
+/// part on which a solver's shared tables may depend.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Setup {
     /// The stack of layers.
@@ -15,23 +15,23 @@ pub struct Setup {
     pub probe: Probe,
     /// The criterion of the first arriving signal.
     pub picking: Picking,
-    /// How waves are computed.
+    /// Settings of the wave solver.
     pub solver: SolverSettings,
 }
 
 /// The bone's material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
-    /// Mass density ρ, kg/m³.
+    /// Returns the mass density ρ, kg/m³.
     pub density: f64,
     /// Elasticity, Pa.
     pub elasticity: Elasticity,
 }
 
-/// One case: a velocity's bits are a function of it alone.
+/// One case. A velocity's bits are a function of the case alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    /// What is probed, with what, and how it is computed.
+    /// Layers, probe, picking and solver.
     pub setup: Setup,
     /// The bone.
     pub bone: Bone,

@@ -25,13 +25,14 @@ const CONSTANTS: [Parameter; 5] = [
     Parameter::TransversePoissonRatio,
 ];
 
-/// A case file with a matrix and all keys has some kilobytes.
+/// Limit of a case file's length; one with a matrix and all keys has a few kilobytes.
 const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
 
-/// Reads and validates the case file at `path`; its extension tells the format.
+/// Reads and validates the case file at `path`; its extension determines the format.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
+/// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
+/// once.
 pub fn read(path: &Path) -> Result<Case, FileError> {
     let (text, format) = file_error::read(path, BOUND)?;
     parse(&text, format).map_err(|content| FileError::Content { path: path.to_owned(), content })
@@ -40,7 +41,7 @@ pub fn read(path: &Path) -> Result<Case, FileError> {
 /// Reads and validates the text of a case file.
 ///
 /// # Errors
-/// When the text is malformed or breaks a rule; then all violations at once.
+/// If the text is malformed or violates a rule; all violations are reported at once.
 pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
     let root = document::parse(file_error::without_byte_order_mark(text), format)?;
     let mut reader = Reader::default();
@@ -58,7 +59,7 @@ pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
     }
 }
 
-/// The bone, or `None` with the reasons recorded.
+/// Returns the bone, or `None` after recording the violations.
 fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
     let mut keys = vec![Parameter::Density.name(), "mandel"];
     keys.extend(CONSTANTS.map(Parameter::name));
@@ -71,7 +72,8 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
         return None;
     }
     let given: Vec<_> = CONSTANTS.into_iter().filter(|key| table.has(key.name())).collect();
-    // Programs write matrices, of any scale; constants are typed.
+    // Matrices are written by programs and may have any scale; constants are typed by people, so
+    // their unit is checked.
     let density = required(reader, &table, Parameter::Density, !given.is_empty());
     let elasticity = match (table.has("mandel"), given.first()) {
         (true, None) => mandel(reader, &table),
@@ -94,11 +96,11 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
     Some(Bone { density: density?, elasticity: elasticity? })
 }
 
-/// How an elasticity may be given.
+/// The forms in which an elasticity may be given.
 const FORMS: &str = "either the five engineering constants or mandel";
 
-/// A number of `[bone]` that must be there and within its range, and where it is `typed` in a unit that
-/// can be meant.
+/// Reads a required number of `[bone]` and checks its range and, if it is `typed` by a person, its
+/// unit.
 fn required(
     reader: &mut Reader,
     table: &Table<'_>,

@@ -1,7 +1,7 @@
-//! The rules that a specification must keep: one set for files and for the wire.
+//! The rules for specifications, which are the same for files and for messages.
 //!
-//! Fields are named as in a job file, e.g. `layers.coupling.density`. A field that is already
-//! known to be wrong is not looked at again, nor is a relation between fields of which one is.
+//! Fields are named as in a job file, e.g. `layers.coupling.density`. A field that is already known
+//! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
 mod job;
 mod setup;
@@ -22,7 +22,7 @@ pub use self::solver::{HYBRID_KEYS, of_hybrid_only};
 pub(crate) use self::{setup::RECEIVERS, solver::ELEMENT_ORDER};
 
 impl JobSpecification {
-    /// Everything that is wrong with the specification, each field named as in a job file.
+    /// Returns all violations of the specification, each with its field named as in a job file.
     pub fn check(&self) -> Violations {
         let mut violations = Violations::new();
         job(self, &mut violations);
@@ -37,8 +37,8 @@ pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &m
     }
 }
 
-/// Records a number outside `accepted`, or one that no bone and no probe has and another unit
-/// explains, unless `field` is known to be wrong.
+/// Records a number outside `accepted`, or one that is physically impossible and would be plausible
+/// in another unit, unless `field` is known to be wrong.
 pub(crate) fn quantity(
     field: &str,
     value: f64,
@@ -66,7 +66,7 @@ pub(crate) fn whole(field: &str, value: u64, accepted: WholeRange, violations: &
     }
 }
 
-/// Whether `field`, something inside it, or a table around it is known to be wrong.
+/// Returns whether `field`, something inside it, or a table around it is known to be wrong.
 fn known_wrong(field: &str, violations: &Violations) -> bool {
     let around =
         |table: &str| field.strip_prefix(table).is_some_and(|rest| rest.starts_with(['.', '[']));

@@ -1,5 +1,5 @@
-//! What measured velocities say of themselves: how well they fix their moments, and whether they can be
-//! of the model's law.
+//! Statistics of measured velocities: how precisely they determine their moments, and whether they
+//! can come from the model's law.
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -12,26 +12,26 @@ use crate::results::DataSummary;
 use crate::special::standard_normal_quantile;
 use crate::statistics::{Sum, moments};
 
-/// Probability with which an interval holds the moment of the law.
+/// Probability with which an interval contains the moment of the law.
 pub const CONFIDENCE: f64 = 0.95;
-/// Resamples of the bootstrap.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
-/// Most velocities that are resampled, in a fraction of a second; for more, the normal law of their moments
-/// says the same.
+/// Largest number of velocities that are resampled, which takes a fraction of a second; for more,
+/// the normal approximation of their moments gives the same result.
 const RESAMPLED_MAX: usize = 5_000;
-/// Independent draws that a Sobol' point is worth to a distribution function, on the safe side. Measured at
-/// the paper's optimum by the scatter of the shares of velocities below their 7, 30, 50 and 90 % quantiles over
-/// 40 scrambles: 14 to 52 at the dispersion 0.1 and 8 to 16 at 0.3 for 64 points, 33 to 78 and 14 to 22 for 256,
-/// 39 to 98 and 19 to 44 for 1024.
+/// Number of independent draws to which a Sobol' point is equivalent for a distribution function,
+/// on the safe side. Measured at the paper's optimum by the scatter of the fractions of velocities
+/// below their 7, 30, 50 and 90 % quantiles over 40 scrambles: 14 to 52 at the dispersion 0.1 and 8
+/// to 16 at 0.3 for 64 points, 33 to 78 and 14 to 22 for 256, 39 to 98 and 19 to 44 for 1024.
 const SOBOL_WORTH: f64 = 10.0;
-/// Terms of Kolmogorov's series; the next one is below rounding.
+/// Terms of Kolmogorov's series; the next one is smaller than rounding errors.
 const SERIES_TERMS: usize = 12;
 
-/// Confidence intervals by the bootstrap, bias-corrected and accelerated (B. Efron, J. Am. Stat. Assoc. 82
-/// (1987)): skewed laws and small samples get intervals that are not symmetric.
+/// Returns confidence intervals by the bootstrap, bias-corrected and accelerated (B. Efron, J. Am.
+/// Stat. Assoc. 82 (1987)): skewed laws and small samples get intervals that are not symmetric.
 ///
-/// `None` for less than two different velocities. The resamples are the same for the same number of
-/// velocities; no seed of a job is in them.
+/// `None` for fewer than two different velocities. The resamples are the same for the same number
+/// of velocities and do not depend on the seed of a job.
 pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
     let found = moments(velocities)?;
     if found.coefficient_of_variation.is_nan() || found.coefficient_of_variation <= 0.0 {
@@ -54,7 +54,8 @@ pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
 }
 
 impl DataSummary {
-    /// Of set number `set` of the data. Resamples velocities, which takes up to a fraction of a second.
+    /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
+    /// of a second.
     pub fn of(data: &Data, set: usize) -> Self {
         let velocities = data.velocities(set);
         Self {
@@ -65,12 +66,13 @@ impl DataSummary {
     }
 }
 
-/// Kolmogorov's test of whether the data are of the law of the model's velocities, the successes among
-/// `outcomes` (N. V. Smirnov, Ann. Math. Stat. 19 (1948)), by the limit law at √n_e + 0.12 + 0.11/√n_e times the
-/// distance (M. A. Stephens, J. R. Stat. Soc. B 32 (1970)). `None` if there are no data, or no successes.
+/// Tests by Kolmogorov and Smirnov whether the data come from the law of the model's velocities,
+/// which are the successes among `outcomes` (N. V. Smirnov, Ann. Math. Stat. 19 (1948)). Uses the
+/// limit law at √n_e + 0.12 + 0.11/√n_e times the distance (M. A. Stephens, J. R. Stat. Soc. B 32
+/// (1970)). `None` if there are no data, or no successes.
 ///
-/// n_e = n m / (n + m) for n data and m independent realizations; a Sobol' point counts for as many as it is
-/// worth.
+/// n_e = n m / (n + m) for n data and m independent realizations; a Sobol' point counts as several
+/// independent realizations.
 pub fn kolmogorov_test(
     data: &[f64],
     outcomes: &[Outcome],
@@ -90,7 +92,7 @@ pub fn kolmogorov_test(
     Some(KolmogorovTest { distance, p_value: exceeded((root + 0.12 + 0.11 / root) * distance) })
 }
 
-/// How much each velocity moves the moments, times their number.
+/// Influence of each velocity on the moments, multiplied by their number.
 struct Influences {
     mean: Vec<f64>,
     coefficient_of_variation: Vec<f64>,
@@ -110,7 +112,7 @@ impl Influences {
         }
     }
 
-    /// Intervals by the normal law of the moments.
+    /// Returns intervals by the normal approximation of the moments.
     fn normal(&self, at: Moments) -> MomentIntervals {
         let interval = |value: f64, influences: &[f64]| {
             let n = influences.len() as f64;
@@ -129,7 +131,7 @@ impl Influences {
     }
 }
 
-/// Means and coefficients of variation of the resamples.
+/// Returns the means and coefficients of variation of the resamples.
 fn resampled(velocities: &[f64]) -> Option<[Vec<f64>; 2]> {
     let mut rng = ChaCha20Rng::from_seed([0; 32]);
     let mut found = [Vec::with_capacity(RESAMPLES), Vec::with_capacity(RESAMPLES)];
@@ -147,12 +149,12 @@ fn resampled(velocities: &[f64]) -> Option<[Vec<f64>; 2]> {
     Some(found)
 }
 
-/// The interval of resampled values around what the sample has.
+/// Returns the interval of resampled values around the value `found` for the sample.
 fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<Interval> {
     values.sort_unstable_by(f64::total_cmp);
     let count = values.len() as f64;
     let below = values.partition_point(|&value| value < found) as f64;
-    // Half a resample away from both ends, where a normal law has no quantile.
+    // Kept half a resample away from both ends, where the normal law has no quantile.
     let bias = standard_normal_quantile((below.clamp(0.5, count - 0.5)) / count);
     let squares = sum(influences.iter().map(|influence| influence * influence));
     let cubes = sum(influences.iter().map(|i| i * i * i));
@@ -167,7 +169,7 @@ fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<I
     Some(Interval { low: end(tail)?, high: end(1.0 - tail)? })
 }
 
-/// Probability of the standard normal law below `z`.
+/// Returns the probability of the standard normal law below `z`.
 fn normal_probability(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
@@ -184,11 +186,12 @@ fn sorted(sample: impl Iterator<Item = f64>) -> Vec<f64> {
     sample
 }
 
-/// Largest difference of the empirical distribution functions of two samples in ascending order.
+/// Returns the largest difference of the empirical distribution functions of two samples in
+/// ascending order.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     let (mut i, mut j, mut largest) = (0, 0, 0.0_f64);
     while i < a.len() && j < b.len() {
-        // Equal values of both are passed together.
+        // Values that occur in both samples are passed together.
         let next = a[i].min(b[j]);
         i += a[i..].partition_point(|&value| value <= next);
         j += b[j..].partition_point(|&value| value <= next);
@@ -197,7 +200,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     largest
 }
 
-/// Probability that Kolmogorov's limit law exceeds `x`: of both forms of the series the one that converges fast.
+/// Returns the probability that Kolmogorov's limit law exceeds `x`, by whichever of the two forms
+/// of the series converges faster.
 fn exceeded(x: f64) -> f64 {
     use std::f64::consts::PI;
     if x <= 0.0 {
@@ -228,7 +232,7 @@ mod tests {
     use crate::parameters::Point;
     use crate::realization::Ensemble;
 
-    /// `count` draws of a normal law with mean 3900 and coefficient of variation 0.03.
+    /// Draws `count` values of a normal law with mean 3900 and coefficient of variation 0.03.
     fn normal(seed: u64, count: usize) -> Vec<f64> {
         let germs = (0..).flat_map(|index| *Germs::draw(seed, index).values());
         germs.take(count).map(|u| 3900.0 * (1.0 + 0.03 * standard_normal_quantile(u))).collect()
@@ -238,7 +242,7 @@ mod tests {
         interval.low <= value && value <= interval.high
     }
 
-    /// How often of `repetitions` both intervals hold the law's moments.
+    /// Counts in how many of `repetitions` each interval contains the law's moment.
     fn coverage(count: usize, repetitions: u64) -> [u64; 2] {
         let mut covered = [0, 0];
         for seed in 0..repetitions {
@@ -251,7 +255,8 @@ mod tests {
 
     #[test]
     fn intervals_hold_the_moments_of_the_law_as_often_as_they_say() {
-        // Of 200 repetitions 190 are expected, with a standard deviation of 3; a bootstrap of few is too short.
+        // Of 200 repetitions 190 are expected, with a standard deviation of 3. For small samples
+        // the bootstrap's intervals are too short.
         for (count, least) in [(40, 176), (300, 181)] {
             let covered = coverage(count, 200);
             assert!(covered.iter().all(|&c| c >= least && c <= 199), "{count}: {covered:?}");
@@ -308,7 +313,7 @@ mod tests {
         assert_eq!(test(&[2.0, 4.0], &model), Some(0.5));
     }
 
-    /// Values of the limit law from tables (N. V. Smirnov 1948).
+    /// Compares with values of the limit law from tables (N. V. Smirnov 1948).
     #[test]
     fn the_limit_law_is_that_of_the_tables() {
         for (x, expected) in [
@@ -325,7 +330,8 @@ mod tests {
         assert!((exceeded(1.0 - 1e-12) - exceeded(1.0)).abs() < 1e-10);
     }
 
-    /// Shares of p-values below 0.5, 0.1 and 0.05 are these, with standard deviations of 0.016, 0.009 and 0.007.
+    /// Checks the fractions of p-values below 0.5, 0.1 and 0.05, which have standard deviations of
+    /// 0.016, 0.009 and 0.007.
     fn check_p_values(of: impl Fn(u64) -> f64) {
         let p: Vec<f64> = (0..1000).map(of).collect();
         for (limit, tolerance) in [(0.5, 0.06), (0.1, 0.03), (0.05, 0.022)] {
@@ -348,7 +354,8 @@ mod tests {
         assert!(p(1, (300, 400), 60.0) < 1e-4, "{}", p(1, (300, 400), 60.0));
     }
 
-    /// Velocities that are a speed of 21 germs but for 5 % of their scatter: data as many as points.
+    /// The velocities are the speed of 21 germs plus 5 % of other scatter; there are as many data
+    /// as points.
     #[test]
     fn p_values_are_uniform_against_sobol_points() {
         let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);

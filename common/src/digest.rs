@@ -1,4 +1,4 @@
-//! The digest that pins a job's result to the bit.
+//! The digest that identifies a job's result to the bit.
 
 use crate::outcome::{Outcome, encode};
 use crate::parameters::Point;
@@ -31,7 +31,7 @@ impl PathDigest {
         }
     }
 
-    /// The digest so far, 64 hexadecimal digits in lower case.
+    /// Returns the digest so far, 64 hexadecimal digits in lower case.
     pub fn finish(&self) -> String {
         self.0.finalize().to_hex().to_string()
     }
@@ -48,7 +48,7 @@ mod tests {
     const SECOND: Point = Point([1700.0, 20e9, 0.3, 5e9, 10e9, 0.4, 0.2]);
     const SECOND_OUTCOMES: [Outcome; 2] = [Err(FailureKind::NoConvergence), Ok(0.1)];
 
-    /// Expected values by the Python package `blake3` over bytes packed with `struct`
+    /// Compares with values computed by the Python package `blake3` over bytes packed with `struct`
     /// (`<7d`, then `<Bd` for each outcome).
     #[test]
     fn the_bytes_are_those_of_the_contract() {

@@ -1,7 +1,7 @@
-//! One tree for TOML and JSON, with line numbers where the parser knows them.
+//! One tree type for TOML and JSON, with line numbers where the parser provides them.
 //!
-//! Nothing is interpreted here: which keys exist and what they mean is the business of
-//! the readers of job and case files.
+//! Nothing is interpreted here: the readers of job and case files decide which keys exist and what
+//! they mean.
 
 mod budget;
 mod json;
@@ -11,10 +11,10 @@ mod toml;
 pub use self::node::{Format, Malformed};
 pub(crate) use self::node::{Node, Value, element_path, entry_path, position, quoted};
 
-/// The tree of a text.
+/// Parses a text into a tree.
 ///
 /// # Errors
-/// Where and why the text is not of the format. A key that is given twice is such an error.
+/// Position and description of the syntax error. A duplicate key is such an error.
 pub(crate) fn parse(text: &str, format: Format) -> Result<Node, Malformed> {
     match format {
         Format::Toml => toml::parse(text),

@@ -27,7 +27,7 @@ pub struct EngineeringConstants {
     pub transverse_poisson_ratio: f64,
 }
 
-/// Why a 6×6 matrix is no elasticity.
+/// Reason why a 6×6 matrix is not an elasticity.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum NotElastic {
     /// An entry is NaN or infinite.
@@ -37,7 +37,7 @@ pub enum NotElastic {
         row: usize,
         /// Column, from 1.
         column: usize,
-        /// What was found.
+        /// The value found.
         value: f64,
     },
     /// Two mirrored entries differ.
@@ -54,7 +54,7 @@ pub enum NotElastic {
         /// The lower entry, Pa.
         lower: f64,
     },
-    /// The Cholesky factorization breaks down.
+    /// The Cholesky factorization fails.
     #[error(
         "is not positive definite (its leading {order}×{order} block is singular or indefinite)"
     )]
@@ -102,12 +102,12 @@ pub enum Inadmissible {
 const ASYMMETRY_MAX: f64 = 1e-9;
 
 impl Elasticity {
-    /// The elasticity with the given Kelvin-Mandel rows, Pa.
+    /// Creates the elasticity with the given Kelvin-Mandel rows, Pa.
     ///
     /// Mirrored entries may differ by 1e-9 of √(C_ii C_jj); then their mean is taken.
     ///
     /// # Errors
-    /// When an entry is not finite, the matrix is not symmetric or not positive definite.
+    /// If an entry is not finite, or if the matrix is not symmetric or not positive definite.
     pub fn new(mut rows: [[f64; 6]; 6]) -> Result<Self, NotElastic> {
         check_finite(&rows)?;
         for i in 0..6 {
@@ -131,18 +131,19 @@ impl Elasticity {
         Ok(Self(rows))
     }
 
-    /// The Kelvin-Mandel rows, Pa; symmetric to the bit.
+    /// Returns the Kelvin-Mandel rows, Pa; they are symmetric to the bit.
     pub fn rows(&self) -> &[[f64; 6]; 6] {
         &self.0
     }
 
-    /// The upper triangular Cholesky factor `[L]` with `[C] = [L]ᵀ [L]` (the paper's Eq. (11)), √Pa.
+    /// Returns the upper triangular Cholesky factor `[L]` with `[C] = [L]ᵀ [L]` (the paper's Eq.
+    /// (11)), √Pa.
     pub fn cholesky(&self) -> [[f64; 6]; 6] {
         // A value of this type has passed the same factorization in its constructor.
         factor(&self.0).unwrap_or([[f64::NAN; 6]; 6])
     }
 
-    /// Component c_ijkl of the tensor, Pa; indices from 0.
+    /// Returns component c_ijkl of the tensor, Pa; indices start at 0.
     pub fn component(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
         const MANDEL: [[usize; 3]; 3] = [[0, 5, 4], [5, 1, 3], [4, 3, 2]];
         let (row, column) = (MANDEL[i][j], MANDEL[k][l]);
@@ -154,9 +155,9 @@ impl Elasticity {
         }
     }
 
-    /// The engineering constants of the transversely isotropic solid with this matrix's
+    /// Returns the engineering constants of the transversely isotropic solid with this matrix's
     /// c_1111, c_1122, c_2222, c_2233 and c_3131: the inverse of
-    /// [`EngineeringConstants::elasticity`]. Other entries are not looked at.
+    /// [`EngineeringConstants::elasticity`]. The other entries are ignored.
     pub fn engineering_constants(&self) -> EngineeringConstants {
         let c = &self.0;
         let (c11, c12, c22, c23) = (c[0][0], c[0][1], c[1][1], c[1][2]);
@@ -179,10 +180,11 @@ impl Elasticity {
 }
 
 impl EngineeringConstants {
-    /// The elasticity of the paper's Eqs. (7)-(9), in Kelvin-Mandel form.
+    /// Returns the elasticity of the paper's Eqs. (7)-(9), in Kelvin-Mandel form.
     ///
     /// # Errors
-    /// The first violated condition of admissibility; [`EngineeringConstants::violated`] has all.
+    /// The first violated condition of admissibility; [`EngineeringConstants::violated`] returns
+    /// all.
     pub fn elasticity(&self) -> Result<Elasticity, Inadmissible> {
         if let Some(&violated) = self.violated().first() {
             return Err(violated);
@@ -205,11 +207,11 @@ impl EngineeringConstants {
             [0.0, 0.0, 0.0, 0.0, c55, 0.0],
             [0.0, 0.0, 0.0, 0.0, 0.0, c55],
         ];
-        // Exact arithmetic would make this succeed; rounding can spoil it at the very edge.
+        // In exact arithmetic this always succeeds; rounding can make it fail at the very edge.
         Elasticity::new(rows).map_err(|_| Inadmissible::NotPositiveDefinite { margin })
     }
 
-    /// Every violated condition of admissibility; empty for an admissible solid.
+    /// Returns every violated condition of admissibility; none for an admissible solid.
     pub fn violated(&self) -> Vec<Inadmissible> {
         let mut violated = Vec::new();
         let moduli = [
@@ -238,7 +240,7 @@ impl EngineeringConstants {
         violated
     }
 
-    /// e_L (1 - ν_T) - 2 e_T ν_L², Pa.
+    /// Returns e_L (1 - ν_T) - 2 e_T ν_L², Pa.
     fn margin(&self) -> f64 {
         let nu_l = self.longitudinal_poisson_ratio;
         self.longitudinal_young_modulus * (1.0 - self.transverse_poisson_ratio)
@@ -257,8 +259,8 @@ fn check_finite(rows: &[[f64; 6]; 6]) -> Result<(), NotElastic> {
     Ok(())
 }
 
-/// Upper triangular `u` with `uᵀ u = c`, or the order of the leading block that is not positive
-/// definite.
+/// Returns the upper triangular `u` with `uᵀ u = c`, or the order of the leading block that is not
+/// positive definite.
 fn factor(c: &[[f64; 6]; 6]) -> Result<[[f64; 6]; 6], usize> {
     let mut u = [[0.0_f64; 6]; 6];
     for j in 0..6 {
@@ -301,7 +303,7 @@ mod tests {
     #[test]
     fn the_papers_optimum_has_the_published_stiffnesses() {
         let c = OPTIMUM.elasticity().unwrap();
-        // Independent evaluation of Eqs. (7)-(9), in Pa.
+        // Values from an independent evaluation of Eqs. (7)-(9), in Pa.
         close(c.rows()[0][0], 25_073_336_534.815_72, 1e-14);
         close(c.rows()[0][1], 9_638_805_732.200_893, 1e-14);
         close(c.rows()[2][2], 16_018_700_105.531_574, 1e-14);

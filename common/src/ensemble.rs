@@ -28,7 +28,7 @@ const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Germs([f64; GERMS]);
 
-/// The law of the random elasticity at one point: everything that the realizations share.
+/// The law of the random elasticity at one point: everything that its realizations share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElasticityLaw {
     /// `[L]`, √Pa.
@@ -48,7 +48,7 @@ struct Diagonal {
     gamma: GammaQuantile,
 }
 
-/// Why there is no law.
+/// Reason why a law does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum LawError {
     /// δ is outside (0, √(7/11)).
@@ -60,7 +60,7 @@ pub enum LawError {
 }
 
 impl Germs {
-    /// The germs of realization `index` of the job with this seed.
+    /// Draws the germs of realization `index` of the job with this seed.
     ///
     /// ChaCha20 with 64-bit block counter from 0, the seed as key (little-endian in bytes 0-7, the
     /// rest 0) and the index as stream; each germ is ((next 64 bits >> 11) + ½) 2⁻⁵³.
@@ -69,23 +69,23 @@ impl Germs {
         Self(std::array::from_fn(|_| uniform(rng.next_u64())))
     }
 
-    /// The first germ that [`Germs::draw`] gives, that of entry 11.
+    /// Returns the first germ that [`Germs::draw`] draws, that of entry 11.
     pub(crate) fn first(seed: u64, index: u64) -> f64 {
         uniform(stream(seed, index).next_u64())
     }
 
-    /// Germs of the highest 53 of 64 bits each, as [`Germs::draw`] makes them of its stream.
+    /// Makes each germ from the highest 53 of 64 bits, as [`Germs::draw`] does.
     pub(crate) fn from_bits(bits: [u64; GERMS]) -> Self {
         Self(bits.map(uniform))
     }
 
-    /// Germs from another source (a low-discrepancy sequence, a test), or `None` if one of them
+    /// Takes germs from another source (a low-discrepancy sequence, a test); `None` if one of them
     /// is outside (0, 1).
     pub fn new(germs: [f64; GERMS]) -> Option<Self> {
         germs.iter().all(|&u| u > 0.0 && u < 1.0).then_some(Self(germs))
     }
 
-    /// The germs, by rows of L_G.
+    /// Returns the germs, by rows of L_G.
     pub fn values(&self) -> &[f64; GERMS] {
         &self.0
     }
@@ -99,18 +99,18 @@ fn stream(seed: u64, index: u64) -> ChaCha20Rng {
     rng
 }
 
-/// ((bits >> 11) + ½) 2⁻⁵³. The largest of these numbers, 1 - 2⁻⁵⁴, is no double and would round
-/// to 1; it becomes the largest double below 1.
+/// Returns ((bits >> 11) + ½) 2⁻⁵³. The largest of these numbers, 1 - 2⁻⁵⁴, is not a double and
+/// would round to 1; it becomes the largest double below 1.
 pub(crate) fn uniform(bits: u64) -> f64 {
     const STEP: f64 = 1.0 / (1u64 << 53) as f64;
     (((bits >> 11) as f64 + 0.5) * STEP).min(BELOW_ONE)
 }
 
 impl ElasticityLaw {
-    /// The law with this mean and dispersion δ, 0 < δ < √(7/11).
+    /// Creates the law with this mean and dispersion δ, 0 < δ < √(7/11).
     ///
     /// # Errors
-    /// When the dispersion is outside its range.
+    /// If the dispersion is outside its range.
     pub fn new(mean: &Elasticity, dispersion: f64) -> Result<Self, LawError> {
         if !(dispersion > 0.0 && dispersion < DISPERSION_MAX) {
             return Err(LawError::Dispersion { value: dispersion });
@@ -127,11 +127,11 @@ impl ElasticityLaw {
         })
     }
 
-    /// The realization `[C]` that belongs to these germs, Pa; symmetric to the bit.
+    /// Returns the realization `[C]` for these germs, Pa; it is symmetric to the bit.
     ///
     /// # Errors
-    /// When rounding spoils positive definiteness: for germs at the very edge of (0, 1) at a
-    /// large dispersion, or a mean that is itself nearly singular.
+    /// If rounding destroys positive definiteness: for germs at the very edge of (0, 1) at a large
+    /// dispersion, or for a mean that is itself nearly singular.
     pub fn realize(&self, germs: &Germs) -> Result<Elasticity, NotElastic> {
         // [C] = [M]ᵀ [M] with [M] = [L_G] [L], upper triangular.
         let m = multiply_triangular(&self.triangle(germs), &self.factor);
@@ -149,15 +149,16 @@ impl ElasticityLaw {
         Elasticity::new(c)
     }
 
-    /// c1111 = C11 of the realization whose germ of entry 11 is `germ`, Pa: with [L] and [L_G] upper
-    /// triangular no other germ enters. The bits are those of [`ElasticityLaw::realize`].
+    /// Returns c1111 = C11, Pa, of the realization whose germ of entry 11 is `germ`. As [L] and
+    /// [L_G] are upper triangular, it depends on no other germ. The bits are those of
+    /// [`ElasticityLaw::realize`].
     pub(crate) fn c1111(&self, germ: f64) -> f64 {
         let root = self.diagonal[0].entry(germ) * self.factor[0][0];
         root * root
     }
 
-    /// Mean, √Pa, and variance, Pa, of √c1111 under the law: c1111 is its mean times the square of
-    /// entry 11 of `[L_G]`, that is times V₁/α₁.
+    /// Returns mean, √Pa, and variance, Pa, of √c1111 under the law: c1111 is its mean times the
+    /// square of entry 11 of `[L_G]`, that is times V₁/α₁.
     pub(crate) fn root_c1111_moments(&self) -> (f64, f64) {
         let (mean, variance) = root_gamma_moments(self.diagonal[0].shape);
         let root = self.factor[0][0];
@@ -182,13 +183,13 @@ impl ElasticityLaw {
 }
 
 impl Diagonal {
-    /// The entry with this germ.
+    /// Returns the entry with this germ.
     fn entry(&self, germ: f64) -> f64 {
         (self.mean_square * self.gamma.relative_quantile(germ)).sqrt()
     }
 }
 
-/// Product of two upper triangular matrices, sums in ascending order of the inner index.
+/// Multiplies two upper triangular matrices; sums run in ascending order of the inner index.
 fn multiply_triangular(a: &[[f64; 6]; 6], b: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
     let mut product = [[0.0; 6]; 6];
     for i in 0..6 {
@@ -220,8 +221,8 @@ mod tests {
         .unwrap()
     }
 
-    /// Seed, index and germs from a ChaCha20 written for this purpose in Python (64-bit counter
-    /// and 64-bit stream, checked against the first block of the published all-zero vector).
+    /// Seed, index and germs from an independent ChaCha20 in Python (64-bit counter and 64-bit
+    /// stream, checked against the first block of the published all-zero vector).
     const PINNED: [(u64, u64, [f64; GERMS]); 3] = [
         (
             0,
@@ -351,7 +352,7 @@ mod tests {
         }
     }
 
-    /// σ U off the diagonal; on it σ √(2 V_j), V_j by the quantile of the shape itself.
+    /// Off the diagonal σ U; on it σ √(2 V_j), with V_j from the quantile function of its shape.
     #[test]
     fn entries_are_the_quantiles_of_the_papers_laws() {
         for dispersion in [0.02, 0.1029, 0.5, 0.79] {

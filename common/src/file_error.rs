@@ -1,4 +1,4 @@
-//! Reading a file within bounds, and what can be wrong with it.
+//! Reading a file within limits, and the errors that can occur.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,74 +9,75 @@ use crate::document::{Format, Malformed, Node};
 use crate::violations::Violation;
 use crate::{user_file, visible};
 
-/// Why a job or case file gives nothing.
+/// Reason why a job or case file cannot be used.
 ///
-/// A message is complete: it contains that of its cause.
+/// A message is complete: it includes that of its cause.
 #[derive(Debug, Error)]
 pub enum FileError {
-    /// The operating system does not give its bytes.
+    /// The operating system cannot read the file.
     #[error("cannot read {}: {error}", visible::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The operating system's error.
         error: std::io::Error,
     },
-    /// The name does not say what it is.
+    /// The extension of the name denotes no known format.
     #[error("{}: the name of a job or case file must end in .toml or .json", visible::path(path))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// Longer than any file of its kind needs to be.
+    /// The file is longer than any file of its kind needs to be.
     #[error("{} is longer than {max_bytes} bytes, more than {purpose}", visible::path(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Most bytes that are read.
+        /// Maximum number of bytes.
         max_bytes: u64,
-        /// Who needs no more.
+        /// The kind of content for which this is sufficient.
         purpose: &'static str,
     },
-    /// Its text is refused.
+    /// The text is refused.
     #[error("{}{}{content}", visible::path(path), if matches!(content, ContentError::Malformed(_)) { ", " } else { ": " })]
     Content {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         content: ContentError,
     },
 }
 
-/// Why a text is not a job or case.
+/// Reason why a text is not a valid job or case.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ContentError {
-    /// It is not TOML or JSON.
+    /// The text is not valid TOML or JSON.
     #[error(transparent)]
     Malformed(#[from] Malformed),
-    /// It breaks rules.
+    /// The text violates rules.
     #[error(transparent)]
     Invalid(#[from] Invalid),
 }
 
-/// Everything that is wrong with a text that is well-formed, in the order of its lines.
+/// All violations of a well-formed text, in the order of its lines.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct Invalid {
     found: Vec<(Option<usize>, Violation)>,
 }
 
 impl Invalid {
-    /// The violations, each with the line of the field, or of the table where it should be;
-    /// without line where the format tells none, or no such table exists.
+    /// Returns the violations, each with the line of the field, or of the table where it should be;
+    /// without line if the format provides none, or if no such table exists.
     pub fn iter(&self) -> impl Iterator<Item = (Option<usize>, &Violation)> {
         self.found.iter().map(|(line, violation)| (*line, violation))
     }
 
-    /// `violations` with the lines of `root`.
+    /// Adds the lines of `root` to `violations`.
     pub(crate) fn locate<'v>(violations: impl Iterator<Item = &'v Violation>, root: &Node) -> Self {
         let locate = |violation: &Violation| (root.line_of(&violation.field), violation.clone());
         let mut found: Vec<_> = violations.map(locate).collect();
-        // Stable: those of one line stay in the order they were found. Those without come last.
+        // The sort is stable: violations of one line stay in the order in which they were found.
+        // Those without line come last.
         found.sort_by_key(|(line, _)| line.unwrap_or(usize::MAX));
         Self { found }
     }
@@ -101,16 +102,16 @@ impl fmt::Display for Invalid {
     }
 }
 
-/// How long a kind of file may be.
+/// Maximum length of a kind of file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bound {
-    /// Most bytes.
+    /// Maximum number of bytes.
     pub(crate) bytes: u64,
-    /// Who needs no more, after "more than".
+    /// The kind of content for which this is sufficient, as it follows "more than" in a message.
     pub(crate) purpose: &'static str,
 }
 
-/// The text of the file at `path` and its format.
+/// Returns the text of the file at `path` and its format.
 pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileError> {
     let Some(format) = Format::of(path) else {
         return Err(FileError::UnknownFormat { path: path.to_owned() });
@@ -139,7 +140,7 @@ fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> Malformed {
     Malformed { format, line, column, message: format!("the byte 0x{byte:02x} is not valid UTF-8") }
 }
 
-/// What an optional byte order mark leaves of a text.
+/// Returns a text without its byte order mark, if it has one.
 pub(crate) fn without_byte_order_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)
 }

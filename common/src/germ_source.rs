@@ -1,36 +1,36 @@
-//! Where the germs of a job's realizations come from.
+//! Source of the germs of a job's realizations.
 
 use std::sync::{Arc, OnceLock};
 
 use crate::ensemble::{Germs, uniform};
 use crate::sobol::Scramble;
 
-/// What fixes the germs at every index.
+/// Everything that determines the germs at every index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GermSource {
     /// Seed of the job.
     pub seed: u64,
-    /// How they are made of it.
+    /// Scheme by which germs are generated from the seed.
     pub scheme: GermScheme,
 }
 
-/// How germs are made of seed and index.
+/// Scheme by which germs are generated from seed and index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GermScheme {
-    /// Independent, one ChaCha stream per realization ([`Germs::draw`]).
+    /// Independent germs, one ChaCha stream per realization ([`Germs::draw`]).
     Streams,
     /// Scrambled Sobol' points: scramble `index / points`, its point `index % points`.
     Sobol {
-        /// Points of each scramble, 1 to 10⁷.
+        /// Number of points of each scramble, 1 to 10⁷.
         points: u64,
     },
 }
 
-/// Makes germs; what several indices share is made once.
+/// Generator of germs; data that several indices share are computed once.
 #[derive(Debug, Clone)]
 pub(crate) struct GermMaker {
     source: GermSource,
-    /// Scrambles, each where its number modulo their count says.
+    /// Cached scrambles, each at the position given by its number modulo their count.
     scrambles: Arc<[OnceLock<Box<Numbered>>; SCRAMBLES_KEPT]>,
 }
 
@@ -41,19 +41,19 @@ struct Numbered {
     scramble: Scramble,
 }
 
-/// Consecutive scrambles that a batch of realizations can have at hand, 4 kB each; one that finds its
-/// place taken is made again whenever it is asked for.
+/// Number of consecutive scrambles that are cached for a batch of realizations, 4 kB each. A
+/// scramble whose position is already occupied by another one is recomputed whenever it is needed.
 const SCRAMBLES_KEPT: usize = 64;
 
 impl GermSource {
-    /// Independent germs of this seed.
+    /// Creates the source of independent germs of this seed.
     pub fn streams(seed: u64) -> Self {
         Self { seed, scheme: GermScheme::Streams }
     }
 }
 
 impl PartialEq for GermMaker {
-    /// What is kept is a function of the source.
+    /// The cache is a function of the source, so it need not be compared.
     fn eq(&self, other: &Self) -> bool {
         self.source == other.source
     }
@@ -64,7 +64,7 @@ impl GermMaker {
         Self { source, scrambles: Arc::new([const { OnceLock::new() }; SCRAMBLES_KEPT]) }
     }
 
-    /// The germs of one realization.
+    /// Returns the germs of one realization.
     pub(crate) fn germs(&self, index: u64) -> Germs {
         match self.source.scheme {
             GermScheme::Streams => Germs::draw(self.source.seed, index),
@@ -77,7 +77,7 @@ impl GermMaker {
         }
     }
 
-    /// Germ 11 of realizations 0, 1, … `count` - 1.
+    /// Returns germ 11 of realizations 0, 1, … `count` - 1.
     pub(crate) fn firsts(&self, count: u64) -> Box<dyn Iterator<Item = f64> + '_> {
         let seed = self.source.seed;
         match self.source.scheme {
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(maker.germs(17), Germs::draw(5, 17));
     }
 
-    /// More scrambles than are kept, forwards and backwards.
+    /// Requests more scrambles than are cached, forwards and backwards.
     #[test]
     fn a_scramble_follows_the_one_before() {
         let scheme = GermScheme::Sobol { points: 4 };

@@ -1,20 +1,21 @@
-//! What the data say of the parameters, and what they cannot say: to first order around the best
-//! point.
+//! Inference from the data: which parameters they determine and which they leave free, to first
+//! order around the best point.
 //!
-//! y = (ln v, ln Δ), the logarithms of mean and coefficient of variation of the velocities, depend on
-//! the free parameters x, in units of the box, through the Jacobian J that the search has measured
-//! by differences on common germs. A small error e of the data's or the model's moments moves the
-//! answer by J⁺ e, with J⁺ the pseudo-inverse, and by nothing that is known along the null space of
-//! J. With the covariance C of e, a quantity whose gradient is g has the variance (g J⁺) C (g J⁺)ᵀ,
-//! as far as g lies in the rows of J; the rest of g is what the data cannot say of it.
+//! y = (ln v, ln Δ), the logarithms of mean and coefficient of variation of the velocities, depend
+//! on the free parameters x, in units of the box, through the Jacobian J that the search has
+//! measured by differences on common germs. A small error e of the data's or the model's moments
+//! moves the solution by J⁺ e, where J⁺ is the pseudo-inverse; nothing is known about its position
+//! along the null space of J. With the covariance C of e, a quantity with the gradient g has the
+//! variance (g J⁺) C (g J⁺)ᵀ, as far as g lies in the row space of J; the data leave the rest of g
+//! undetermined.
 //!
-//! What the search has left between data and model, r, would move it by (g J⁺) r, which intervals
-//! have on top.
+//! The residual r that the search has left between data and model would move the quantity by (g J⁺)
+//! r; intervals are extended by this amount.
 //!
-//! C is the sum of two parts. That of the data, known where the velocities are, is that of the
-//! influence of each velocity on both logarithms (the delta method, without the assumption of a
-//! normal law). That of the model has the squares of the reported standard errors, relative, on its
-//! diagonal; what one error says of the other is neglected.
+//! C is the sum of two parts. The data's part, known if the velocities are, is the covariance of
+//! the influences of each velocity on both logarithms (the delta method, without the assumption of
+//! a normal law). The model's part has the squares of the reported relative standard errors on its
+//! diagonal; the correlation of the two errors is neglected.
 
 mod conclusions;
 mod jacobian;
@@ -44,8 +45,9 @@ pub use crate::conclusions::{
 };
 pub use crate::data_statistics::CONFIDENCE;
 
-/// What set number `set` of the data says, given the best evaluation of its search and all
-/// evaluations of the job. `None` where the derivatives were not measured, or cannot be told.
+/// Returns the conclusions from set number `set` of the data, given the best evaluation of its
+/// search and all evaluations of the job. `None` if the derivatives were not measured, or cannot be
+/// computed.
 pub fn inference(
     specification: &JobSpecification,
     set: usize,
@@ -83,11 +85,12 @@ pub fn inference(
     })
 }
 
-/// Both moments to 1e-4: nobody measures better.
+/// Relative difference below which moments always count as matched: no measurement is more
+/// accurate.
 const EXACT: f64 = 1e-4;
 
-/// Whether the moments differ by no more than three standard errors of all noise, or by hardly
-/// anything.
+/// Returns whether the moments differ by at most three standard errors of all noise, or by a
+/// negligible amount.
 fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
     let covariance = noise.covariance();
     let within = |axis: usize| {
@@ -103,13 +106,13 @@ struct Context<'a> {
     linear: &'a Linear,
     noise: &'a Noise,
     quantile: f64,
-    /// What the search has left between data and model.
+    /// Difference between data and model that the search has left.
     residual: [f64; 2],
     matched: bool,
 }
 
 impl Context<'_> {
-    /// √(c1111/ρ): its logarithm is as good as normal.
+    /// √(c1111/ρ). Its logarithm is close to normally distributed.
     fn bulk_velocity(&self, free: &[Parameter]) -> Option<Quantity> {
         let bulk = bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
@@ -147,7 +150,7 @@ impl Context<'_> {
         free.iter().enumerate().map(quantity).collect()
     }
 
-    /// A quantity, given the gradient of its logarithm in units of the box.
+    /// Returns a quantity, given the gradient of its logarithm in units of the box.
     fn of_logarithm(&self, value: f64, gradient: &[f64]) -> Quantity {
         let known = self.response(gradient).map(|response| {
             let Response { deviation, free_share, .. } = response;
@@ -158,16 +161,16 @@ impl Context<'_> {
         Quantity { value, known }
     }
 
-    /// Half the length of an interval: what noise does, and how far the answer would move for what
-    /// the search has left.
+    /// Returns half the length of an interval: the effect of the noise, plus the distance by which
+    /// the solution would move if the residual were removed.
     fn reach(&self, response: &Response) -> f64 {
         let [mean, variation] = response.transfer;
         let left = mean * self.residual[0] + variation * self.residual[1];
         self.quantile * response.deviation + left.abs()
     }
 
-    /// What noise does to a quantity with this gradient; nothing is known of one where the model
-    /// does not match, or which does not depend on anything that was searched.
+    /// Returns the effect of noise on a quantity with this gradient; `None` if the model does not
+    /// match, or if the quantity does not depend on any free parameter.
     fn response(&self, gradient: &[f64]) -> Option<Response> {
         if !self.matched || gradient.iter().all(|slope| *slope == 0.0) {
             return None;
@@ -176,8 +179,9 @@ impl Context<'_> {
     }
 }
 
-/// Number of the first evaluation of a search from which on its lowest cost was below that of
-/// sampling noise alone: what it still gained is noise, another seed would lead elsewhere.
+/// Returns the number of the first evaluation of a search from which on its lowest cost was below
+/// that of sampling noise alone: further improvement is noise, and another seed would lead
+/// elsewhere.
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];

@@ -8,17 +8,17 @@ use crate::case::Setup;
 use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
 
-/// What a job does.
+/// Kind of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JobKind {
-    /// Searches the point whose moments match the data's.
+    /// Searches for the point whose moments match the data's.
     Identification,
     /// Evaluates the moments at the fixed/start point; no search.
     Propagation,
 }
 
 impl JobKind {
-    /// Name in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identification => "identification",
@@ -27,15 +27,15 @@ impl JobKind {
     }
 }
 
-/// What is known of the measured velocities.
+/// The measured velocities, or their moments.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {
     /// The velocities themselves, m/s, each finite and above 0, at least two.
     Velocities(Vec<f64>),
-    /// Several sets of them: each group is identified by itself, in this order; at least one of them
-    /// has two velocities that differ.
+    /// Several sets of velocities. Each group is identified separately, in this order; at least one
+    /// of them has two different velocities.
     Groups(Vec<Group>),
-    /// Their mean, m/s, and coefficient of variation.
+    /// Their moments.
     Moments {
         /// Mean, m/s.
         mean: f64,
@@ -47,22 +47,22 @@ pub enum Data {
 /// The measured velocities of one group: a bone, a patient, a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Its name, unlike all others'; not empty, no control characters.
+    /// Unique name; not empty, no control characters.
     pub name: String,
-    /// m/s, each finite and above 0, at least one.
+    /// Velocities, m/s, each finite and above 0, at least one.
     pub velocities: Vec<f64>,
 }
 
-/// Why velocities have no coefficient of variation that a model could match.
+/// Reason why velocities have no coefficient of variation that a model could match.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum NoVariation {
-    /// There is one.
+    /// There is only one velocity.
     #[error("only one velocity: {NEEDS_TWO}")]
     OneVelocity,
-    /// All are the same.
+    /// All velocities are equal.
     #[error("all {count} velocities are {velocity:?} m/s: {NEEDS_TWO}")]
     AllEqual {
-        /// How many there are.
+        /// Number of velocities.
         count: usize,
         /// The velocity, m/s.
         velocity: f64,
@@ -72,7 +72,7 @@ pub enum NoVariation {
 const NEEDS_TWO: &str = "a coefficient of variation needs at least two different ones";
 
 impl Group {
-    /// Why no search can be made for this group; `None` if one can.
+    /// Returns the reason why this group cannot be searched; `None` if it can.
     pub fn no_variation(&self) -> Option<NoVariation> {
         match self.velocities.as_slice() {
             [_] => Some(NoVariation::OneVelocity),
@@ -85,7 +85,7 @@ impl Group {
 }
 
 impl Data {
-    /// The groups; none where the data are not grouped.
+    /// Returns the groups; none if the data are not grouped.
     pub fn groups(&self) -> &[Group] {
         match self {
             Self::Groups(groups) => groups,
@@ -93,7 +93,7 @@ impl Data {
         }
     }
 
-    /// How many sets of data there are, each to be identified by itself.
+    /// Returns the number of sets of data, each of which is identified separately.
     pub fn sets(&self) -> usize {
         match self {
             Self::Groups(groups) => groups.len(),
@@ -101,18 +101,18 @@ impl Data {
         }
     }
 
-    /// How many of these a search can be made for.
+    /// Returns the number of sets that can be searched.
     pub fn searched(&self) -> usize {
         let unsearched = self.groups().iter().filter(|group| group.no_variation().is_some());
         self.sets() - unsearched.count()
     }
 
-    /// Name of each group; none where the data are not grouped.
+    /// Returns the name of each group; none if the data are not grouped.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.groups().iter().map(|group| group.name.as_str())
     }
 
-    /// The velocities of a set, by its number; `None` where only their moments are known.
+    /// Returns the velocities of a set, by its number; `None` if only their moments are known.
     pub fn velocities(&self, set: usize) -> Option<&[f64]> {
         match self {
             Self::Velocities(velocities) => Some(velocities),
@@ -122,14 +122,14 @@ impl Data {
     }
 }
 
-/// Range of one parameter.
+/// Returns the range of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// Held at a value.
     Fixed(f64),
     /// Searched between bounds.
     Free {
-        /// First value; lower ≤ start ≤ upper.
+        /// Starting value; lower ≤ start ≤ upper.
         start: f64,
         /// Lower bound.
         lower: f64,
@@ -139,7 +139,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// Distance of the bounds, in the parameter's unit; 0 where it is fixed.
+    /// Returns the distance of the bounds, in the parameter's unit; 0 if it is fixed.
     pub fn edge(&self) -> f64 {
         match *self {
             Self::Fixed(_) => 0.0,
@@ -147,8 +147,8 @@ impl Range {
         }
     }
 
-    /// Where a value lies between the bounds, 0 at the lower and 1 at the upper; `None` where the
-    /// parameter is fixed.
+    /// Returns the position of a value between the bounds, 0 at the lower and 1 at the upper;
+    /// `None` if the parameter is fixed.
     pub fn coordinate(&self, value: f64) -> Option<f64> {
         match *self {
             Self::Fixed(_) => None,
@@ -156,7 +156,7 @@ impl Range {
         }
     }
 
-    /// The fixed value, or the start.
+    /// Returns the fixed value, or the start.
     pub fn start(&self) -> f64 {
         match *self {
             Self::Fixed(value) => value,
@@ -165,7 +165,7 @@ impl Range {
     }
 }
 
-/// How realizations are drawn.
+/// Method of drawing realizations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
@@ -177,10 +177,10 @@ pub enum Sampling {
 }
 
 impl Sampling {
-    /// Every sampling, in the order of a user's file.
+    /// All methods, in the order of a user's file.
     pub const ALL: [Self; 2] = [Self::MonteCarlo, Self::Sobol];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "monte_carlo",
@@ -189,21 +189,23 @@ impl Sampling {
     }
 }
 
-/// The Monte Carlo loop.
+/// Settings of the Monte Carlo loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MonteCarlo {
     /// Realizations of each evaluation, 1 to 10⁷.
     pub realizations: u64,
     /// Seed of the germs, 0 to 2⁶³-1.
     pub seed: u64,
-    /// How germs are drawn.
+    /// Method of drawing the germs.
     pub sampling: Sampling,
-    /// Independent scrambles of the Sobol' points, among which the realizations are divided evenly:
-    /// 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for independent germs.
+    /// Number of independent scrambles of the Sobol' points, among which the realizations are
+    /// divided evenly: 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for
+    /// independent germs.
     pub scrambles: u64,
-    /// Whether the moments are corrected by those of √(c1111/ρ), which the law knows.
+    /// Whether the moments are corrected by the control variate √(c1111/ρ), whose moments under the
+    /// law are known.
     pub control_variate: bool,
-    /// An evaluation with a larger fraction of failures is infeasible; 0 to 1.
+    /// Largest fraction of failures with which an evaluation is feasible; 0 to 1.
     pub max_failed_fraction: f64,
 }
 
@@ -221,7 +223,7 @@ impl Default for MonteCarlo {
 }
 
 impl MonteCarlo {
-    /// Where the germs come from.
+    /// Returns the source of the germs.
     pub fn germs(&self) -> GermSource {
         let scheme = match self.sampling {
             Sampling::MonteCarlo => GermScheme::Streams,
@@ -230,28 +232,29 @@ impl MonteCarlo {
         GermSource { seed: self.seed, scheme }
     }
 
-    /// Realizations of each scramble.
+    /// Returns the number of realizations of each scramble.
     pub fn points(&self) -> u64 {
         self.realizations / self.scrambles.max(1)
     }
 }
 
-/// What is minimised.
+/// The function to be minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Objective {
     /// The paper's cost: relative squared errors of mean and coefficient of variation.
     #[default]
     Moments,
-    /// Minus the mean log likelihood of the measured velocities under the law of the model's.
+    /// Minus the mean log likelihood of the measured velocities under the law of the model's
+    /// velocities.
     Likelihood,
 }
 
 impl Objective {
-    /// Every objective, in the order of a user's file.
+    /// All objectives, in the order of a user's file.
     pub const ALL: [Self; 2] = [Self::Moments, Self::Likelihood];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Moments => "moments",
@@ -260,11 +263,11 @@ impl Objective {
     }
 }
 
-/// How the minimum is searched.
+/// Method of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchMethod {
-    /// The Nelder-Mead simplex (the paper's).
+    /// The Nelder-Mead simplex, the paper's method.
     #[default]
     Simplex,
     /// Minimum-norm Gauss-Newton steps with Broyden's updates.
@@ -272,10 +275,10 @@ pub enum SearchMethod {
 }
 
 impl SearchMethod {
-    /// Every method, in the order of a user's file.
+    /// All methods, in the order of a user's file.
     pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simplex => "simplex",
@@ -284,43 +287,43 @@ impl SearchMethod {
     }
 }
 
-/// A value that a free parameter is drawn to.
+/// A value towards which a free parameter is pulled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Prior {
     /// The value, within the parameter's bounds, in its unit.
     pub value: f64,
-    /// What the cost grows by where the parameter is off by the whole width of its bounds, above 0;
-    /// by the square of less.
+    /// Increase of the cost if the parameter is off by the whole width of its bounds, above 0; for
+    /// smaller distances it decreases with their square.
     pub weight: f64,
 }
 
-/// The search loop.
+/// Settings of the search loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
-    /// How.
+    /// Method of the search.
     pub method: SearchMethod,
-    /// Most evaluations (points whose realizations are run).
+    /// Maximum number of evaluations (points whose realizations are computed).
     pub max_evaluations: u64,
-    /// The search ends when the best cost is at most this; of no use to a likelihood, whose least cost
-    /// nobody knows beforehand.
+    /// The search ends when the best cost is at most this; not used for a likelihood, whose lowest
+    /// cost is unknown beforehand.
     pub cost_tolerance: f64,
-    /// The search ends when the simplex, or a step without gain, is at most this large, as a
-    /// fraction of the box.
+    /// The search ends when the simplex, or a step without sufficient gain, is at most this large,
+    /// as a fraction of the box.
     pub size_tolerance: f64,
-    /// Edge of the first simplex, as a fraction of the box; of no use to other methods.
+    /// Edge of the first simplex, as a fraction of the box; not used by other methods.
     pub initial_step: f64,
-    /// Searches of each set of data: the first from the starts of the parameters, the others from
-    /// random points of the box; 1 to [`crate::limits::STARTS_MAX`].
+    /// Number of searches of each set of data: the first begins at the start of the parameters, the
+    /// others at random points of the box; 1 to [`crate::limits::STARTS_MAX`].
     pub starts: u64,
     /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
     /// free parameter.
     pub sensitivities: bool,
-    /// Values that [`Parameter::ALL`] are drawn to, in that order, where they are free.
+    /// Values towards which the free ones of [`Parameter::ALL`] are pulled, in that order.
     pub priors: [Option<Prior>; 7],
 }
 
 impl Search {
-    /// The settings that a method has by default.
+    /// Returns the default settings of a method.
     pub fn by(method: SearchMethod) -> Self {
         Self {
             method,
@@ -344,7 +347,7 @@ impl Default for Search {
     }
 }
 
-/// Everything that a job's result depends on, defaults filled in, data inlined.
+/// Everything that a job's result depends on, with defaults filled in and data inlined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobSpecification {
     /// Identification or propagation.
@@ -355,22 +358,22 @@ pub struct JobSpecification {
     pub data: Option<Data>,
     /// Ranges of [`Parameter::ALL`], in that order.
     pub parameters: [Range; 7],
-    /// The Monte Carlo loop.
+    /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
-    /// What is minimised.
+    /// The function to be minimised.
     pub objective: Objective,
-    /// How it is searched.
+    /// Settings of the search loop.
     pub search: Search,
 }
 
 impl JobSpecification {
-    /// Range of one parameter.
+    /// Returns the range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]
     }
 
-    /// What priors add to the cost of a point: w (p - prior)²/(upper - lower)², summed over them
-    /// (Tikhonov's regularisation).
+    /// Returns the contribution of the priors to the cost of a point: the sum of w (p -
+    /// prior)²/(upper - lower)² (Tikhonov regularisation).
     pub fn penalty(&self, point: &Point) -> f64 {
         let of = |parameter: Parameter| {
             let prior = self.search.priors[parameter as usize]?;
@@ -381,12 +384,12 @@ impl JobSpecification {
         Parameter::ALL.into_iter().filter_map(of).sum()
     }
 
-    /// Whether there is a prior.
+    /// Returns whether there is a prior.
     pub fn has_priors(&self) -> bool {
         self.search.priors.iter().any(Option::is_some)
     }
 
-    /// Most evaluations of the whole job.
+    /// Returns the maximum number of evaluations of the whole job.
     pub fn evaluations_max(&self) -> u64 {
         if self.kind == JobKind::Propagation {
             return 1;
@@ -398,7 +401,7 @@ impl JobSpecification {
         starts.saturating_mul(max_evaluations).saturating_add(measured).saturating_mul(sets)
     }
 
-    /// The point of fixed values and starts.
+    /// Returns the point of fixed values and starts.
     pub fn start(&self) -> Point {
         Point(self.parameters.map(|range| range.start()))
     }

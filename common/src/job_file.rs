@@ -18,38 +18,39 @@ use crate::setup_section;
 
 pub use crate::toml_text::job as to_toml;
 
-/// Measured velocities may be in it.
+/// Limit of a job file's length; it may contain measured velocities.
 const BOUND: Bound = Bound {
     bytes: limits::JOB_FILE_BYTES_MAX,
     purpose: "a job with a million velocities needs; data.velocities may also name a CSV file",
 };
 
-/// Reads and validates the job file at `path`; its extension tells the format. The file of
-/// measured velocities that it names is read too, relative to the job file, and inlined.
+/// Reads and validates the job file at `path`; its extension determines the format. If it names a
+/// file of measured velocities, that is read too, relative to the job file, and inlined.
 ///
 /// For a propagation, `[data]` may be left out and is not kept; no file of velocities is read.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, or breaks a rule; then all violations at once.
+/// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
+/// once.
 pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
     read_noting(path, kind).map(|noted| noted.specification)
 }
 
-/// A job, with what the user may be told of the file that it was read from.
+/// A job, with warnings and notes about the file from which it was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noted {
     /// The job.
     pub specification: JobSpecification,
-    /// What is allowed and unusual about it.
+    /// Warnings about values that are allowed but unusual.
     pub warnings: Vec<Warning>,
-    /// The file that its measured velocities were read from, if they stand in one of their own.
+    /// The file of its measured velocities, if they are in a separate one.
     pub velocities_file: Option<PathBuf>,
 }
 
-/// Reads a job file as [`read`] does, and notes what the user may be told of it.
+/// Reads a job file as [`read`] does, and also returns warnings and notes.
 ///
 /// # Errors
-/// As [`read`].
+/// Same as [`read`].
 pub fn read_noting(path: &Path, kind: JobKind) -> Result<Noted, FileError> {
     let (text, format) = file_error::read(path, BOUND)?;
     let directory = path.parent().unwrap_or(Path::new(""));
@@ -57,10 +58,10 @@ pub fn read_noting(path: &Path, kind: JobKind) -> Result<Noted, FileError> {
         .map_err(|content| FileError::Content { path: path.to_owned(), content })
 }
 
-/// Reads and validates the text of a job file that lies in `directory`; as [`read`].
+/// Reads and validates the text of a job file in `directory`; otherwise the same as [`read`].
 ///
 /// # Errors
-/// When the text is malformed or breaks a rule; then all violations at once.
+/// If the text is malformed or violates a rule; all violations are reported at once.
 pub fn parse(
     text: &str,
     format: Format,
@@ -113,7 +114,8 @@ fn parse_noting(
     Ok(Noted { specification, warnings, velocities_file })
 }
 
-/// The seven ranges; where one is missing or wrong, that is recorded and it has no meaning.
+/// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no
+/// meaning.
 fn parameters(reader: &mut Reader, root: &Table<'_>) -> [Range; 7] {
     let table = reader.table(root, "parameters", &Parameter::ALL.map(Parameter::name));
     if !table.is_table() {
@@ -127,10 +129,10 @@ fn parameters(reader: &mut Reader, root: &Table<'_>) -> [Range; 7] {
     Parameter::ALL.map(|parameter| range(reader, &table, parameter))
 }
 
-/// Stands for a range that could not be read; a violation always goes with it.
+/// Placeholder for a range that could not be read; a violation is always recorded with it.
 const UNKNOWN: Range = Range::Fixed(f64::NAN);
 
-/// A range; numbers that could not be read are NaN, and recorded.
+/// Reads a range; numbers that cannot be read are recorded and become NaN.
 fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter) -> Range {
     let key = parameter.name();
     let table = reader.table(parameters, key, &["start", "bounds", "fixed"]);

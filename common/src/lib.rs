@@ -1,9 +1,9 @@
-//! The vocabulary of osteon: what every other crate talks about.
+//! The types that all other crates of osteon share.
 //!
 //! Elasticity and its random ensemble, layers, probe, case and job specifications with their
-//! validation, the moments of a set of velocities, results and the digest that pins them.
-//! This crate knows no network, no clock and no thread; all of it is a pure function of its input
-//! except [`job_file`], [`case_file`] and [`user_file`], which read the files a user names.
+//! validation, the moments of a set of velocities, results, and the digest that identifies them.
+//! This crate uses no network, clock or thread; everything in it is a pure function of its input
+//! except [`job_file`], [`case_file`] and [`user_file`], which read the files that a user names.
 //!
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 

@@ -1,22 +1,24 @@
-//! Every bound of the software in one place, unit in the name.
+//! Limits that several crates share, with the unit in the name. Other limits are beside the code
+//! that uses them.
 
-/// Fewest receivers a probe may have: a line needs residuals.
+/// Minimum number of receivers of a probe: with fewer, the fit of a line leaves no residuals.
 pub const RECEIVERS_MIN: u32 = 3;
-/// Most receivers a probe may have.
+/// Maximum number of receivers of a probe.
 pub const RECEIVERS_MAX: u32 = 64;
-/// Most realizations of one evaluation.
+/// Maximum number of realizations of one evaluation.
 pub const REALIZATIONS_MAX: u64 = 10_000_000;
-/// Most scrambles of one evaluation: enough for an error, and made in a blink.
+/// Maximum number of scrambles of one evaluation: enough to estimate an error, and quick to
+/// generate.
 pub const SCRAMBLES_MAX: u64 = 1024;
 /// Largest seed: 2⁶³ - 1, so that every tool can hold it in a signed integer.
 pub const SEED_MAX: u64 = (1 << 63) - 1;
-/// Most evaluations of one job.
+/// Maximum number of evaluations of one job.
 pub const EVALUATIONS_MAX: u64 = 1_000_000;
-/// Most measured velocities of one job.
+/// Maximum number of measured velocities of one job.
 pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
-/// Most groups of measured velocities of one job.
+/// Maximum number of groups of measured velocities of one job.
 pub const GROUPS_MAX: usize = 1000;
-/// Most searches of one set of data, from as many starts.
+/// Maximum number of searches of one set of data, each from a different start.
 pub const STARTS_MAX: u64 = 1000;
 /// Smallest refinement of the solver's sampling.
 pub const REFINEMENT_MIN: f64 = 0.5;
@@ -30,77 +32,81 @@ pub const ELEMENT_SIZE_MAX: f64 = 1e-2;
 pub const ELEMENT_ORDER_MIN: u32 = 2;
 /// Highest polynomial degree of the hybrid method's elements.
 pub const ELEMENT_ORDER_MAX: u32 = 12;
-/// Most (frequency, wavenumber) pairs of one realization.
+/// Maximum number of (frequency, wavenumber) pairs of one realization.
 pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
-/// Longest file of measured velocities, and longest file of a run that is read again, bytes.
+/// Longest file of measured velocities, and longest file of a run that is read back, bytes.
 pub const FILE_BYTES_MAX: u64 = 64 << 20;
 /// Longest line of a file of measured velocities, bytes.
 pub const LINE_BYTES_MAX: usize = 64 << 10;
-/// Longest job file, bytes. (A million velocities inlined take 20 MB, one on each line 24 MB.)
+/// Longest job file, bytes. (A million velocities inlined take 20 MB, or 24 MB with one on each
+/// line.)
 pub const JOB_FILE_BYTES_MAX: u64 = 32 << 20;
-/// Longest case file, bytes. (Its 36 entries of a matrix take 1 kB.)
+/// Longest case file, bytes. (The 36 entries of its matrix take 1 kB.)
 pub const CASE_FILE_BYTES_MAX: u64 = 1 << 20;
-/// Most values in a job or case file: measured velocities, and room for everything else.
+/// Maximum number of values in a job or case file: measured velocities, and room for everything
+/// else.
 pub const DOCUMENT_VALUES_MAX: usize = DATA_VELOCITIES_MAX + 100_000;
-/// Most keys, tables and lists in a job or case file: two for each group, and room for everything
-/// else. Each may take a kilobyte of memory.
+/// Maximum number of keys, tables and lists in a job or case file: two for each group, and room for
+/// everything else. Each may take a kilobyte of memory.
 pub const DOCUMENT_KEYS_MAX: usize = 10_000;
-/// Most words, marks, spaces, comments and line ends in a TOML file: six for each value, as many as
-/// `    3900.5,` on a line of its own has. A parser keeps each.
+/// Maximum number of words, punctuation marks, spaces, comments and line ends in a TOML file: six
+/// for each value, which is how many `    3900.5,` on a line of its own has. A parser stores each
+/// of them.
 pub const TOML_TOKENS_MAX: usize = 6 * DOCUMENT_VALUES_MAX;
 /// Longest message on the wire, bytes.
 pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
-/// Most realizations in one batch: 17 bytes each on the wire.
+/// Maximum number of realizations in one batch; each takes 17 bytes on the wire.
 pub const BATCH_REALIZATIONS_MAX: u32 = 1 << 16;
-/// Most threads a worker may announce.
+/// Maximum number of threads that a worker may announce.
 pub const WORKER_THREADS_MAX: u32 = 4096;
-/// Most workers attached to a coordinator at a time.
+/// Maximum number of workers attached to a coordinator at the same time.
 pub const WORKERS_MAX: usize = 4096;
-/// Most jobs that wait or run at a time.
+/// Maximum number of jobs that wait or run at the same time.
 pub const JOBS_MAX: usize = 10_000;
-/// Most bytes that the specifications of jobs that wait or run take together.
+/// Maximum total size of the specifications of jobs that wait or run, bytes.
 pub const JOBS_BYTES_MAX: u64 = 1 << 30;
-/// One client's jobs may take this part of that.
+/// The jobs of one client may take one part in this many of [`JOBS_BYTES_MAX`].
 pub const JOBS_BYTES_CLIENT_DIVISOR: u64 = 4;
-/// Most realizations of the jobs that are computed at a time: some 50 bytes each.
+/// Maximum number of realizations of all jobs that are computed at the same time; each takes some
+/// 50 bytes.
 pub const ACTIVE_REALIZATIONS_MAX: u64 = 2 * REALIZATIONS_MAX;
-/// Most jobs that are computed at a time, unless an operator chooses otherwise.
+/// Default maximum number of jobs that are computed at the same time.
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;
-/// Longest message of a worker, bytes: a batch's answer has 1.1 MB.
+/// Longest message of a worker, bytes: the answer to a batch has 1.1 MB.
 pub const WORKER_MESSAGE_BYTES_MAX: usize = 4 << 20;
 /// Longest file of certificates, keys or tokens, bytes.
 pub const CREDENTIAL_FILE_BYTES_MAX: u64 = 4 << 20;
-/// Longest wait for the end of a pipe in the place of such a file, s.
+/// Longest wait for the end of a pipe that replaces such a file, s.
 pub const CREDENTIAL_PIPE_S_MAX: u64 = 10;
-/// Most tokens that a coordinator knows.
+/// Maximum number of tokens in a coordinator's list.
 pub const TOKENS_MAX: usize = 10_000;
-/// Most connections to a coordinator at a time.
+/// Maximum number of connections to a coordinator at the same time.
 pub const CONNECTIONS_MAX: usize = 3 * WORKERS_MAX;
-/// Most TLS handshakes that a coordinator has under way.
+/// Maximum number of TLS handshakes of a coordinator at the same time.
 pub const HANDSHAKES_MAX: usize = 256;
-/// Longest message of a submission that is read whatever else is read, bytes.
+/// Longest submission that is read without a permit of the concurrency limiter, bytes.
 pub const SMALL_SUBMISSION_BYTES_MAX: u64 = 64 << 10;
-/// Most larger submissions whose messages a coordinator reads at a time; others wait.
+/// Maximum number of larger submissions that a coordinator reads at the same time; others wait.
 pub const SUBMISSIONS_AT_ONCE_MAX: usize = 16;
-/// Most of them that are of one caller.
+/// Maximum number of these from one caller.
 pub const SUBMISSIONS_OF_ONE_MAX: usize = 4;
-/// Longest time that such a message takes, s.
+/// Longest time for reading such a submission, s.
 pub const SUBMISSION_S_MAX: u64 = 10;
 /// Longest time from a call to the beginning of its answer, s.
 pub const CALL_S_MAX: u64 = 60;
-/// Longest list of headers of a call, bytes.
+/// Maximum size of the headers of a call, bytes.
 pub const HEADER_BYTES_MAX: u32 = 16 << 10;
-/// Most fetches that a coordinator holds results for at a time; others wait.
+/// Maximum number of fetches for which a coordinator holds results at the same time; others wait.
 pub const FETCHES_AT_ONCE_MAX: usize = 8;
-/// Most of them that are of one caller.
+/// Maximum number of these for one caller.
 pub const FETCHES_OF_ONE_MAX: usize = 2;
-/// Longest time that a fetch takes, s.
+/// Longest duration of a fetch, s.
 pub const FETCH_S_MAX: u64 = 300;
-/// Longest time that a backup takes, s.
+/// Longest duration of a backup, s.
 pub const BACKUP_S_MAX: u64 = 3600;
-/// A fetch ends when its reader takes nothing for this long, s.
+/// A fetch is cancelled if its reader accepts no data for this long, s.
 pub const READER_PATIENCE_S: u64 = 30;
 /// Highest priority of a job among those of its client.
 pub const PRIORITY_MAX: u32 = 9;

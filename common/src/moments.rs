@@ -1,4 +1,4 @@
-//! Moments of velocities, and what is said of them: plain data.
+//! Moments of velocities, their errors and tests, as plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of nothing.
+    /// Moments that are not known.
     pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
 }
 
@@ -24,12 +24,12 @@ pub struct Estimate {
     pub moments: Moments,
     /// Their standard errors: that of the mean in m/s, that of the coefficient of variation.
     pub standard_error: Moments,
-    /// Whether they are those that the control variate gives.
+    /// Whether they were computed with the control variate.
     pub controlled: bool,
 }
 
 impl Estimate {
-    /// Standard errors over the moments themselves: of the mean, of the coefficient of variation.
+    /// Returns the relative standard errors: of the mean, of the coefficient of variation.
     pub fn relative_errors(&self) -> [f64; 2] {
         let (moments, error) = (self.moments, self.standard_error);
         [
@@ -42,38 +42,38 @@ impl Estimate {
 /// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatedError {
-    /// Their median.
+    /// Median of the errors.
     pub median: f64,
-    /// The largest.
+    /// Largest error.
     pub largest: f64,
 }
 
-/// An interval that holds a value with some probability.
+/// An interval that contains a value with some probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Its lower end.
+    /// Lower end.
     pub low: f64,
-    /// Its upper end.
+    /// Upper end.
     pub high: f64,
 }
 
-/// Confidence intervals of the moments of the law that velocities were drawn from.
+/// Confidence intervals of the moments of the law from which velocities were drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MomentIntervals {
-    /// Of the mean, m/s.
+    /// Interval of the mean, m/s.
     pub mean: Interval,
-    /// Of the coefficient of variation.
+    /// Interval of the coefficient of variation.
     pub coefficient_of_variation: Interval,
-    /// Probability with which each holds its moment.
+    /// Probability with which each interval contains its moment.
     pub level: f64,
 }
 
-/// Kolmogorov's test of two samples.
+/// Result of the two-sample Kolmogorov-Smirnov test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KolmogorovTest {
     /// Largest difference of the empirical distribution functions, 0 to 1.
     pub distance: f64,
-    /// Probability of at least this distance if both samples are of one law. Where the model was fitted to
-    /// the data it is too large: a small one is conclusive, a large one is not.
+    /// Probability of at least this distance if both samples come from one law. If the model was
+    /// fitted to the data it is too large: a small value is conclusive, a large one is not.
     pub p_value: f64,
 }

@@ -1,8 +1,8 @@
-//! Where measured velocities stand in a file, for messages about one of them.
+//! Positions of measured velocities in a file, for messages about one of them.
 
 use std::path::{Path, PathBuf};
 
-/// Where the velocities of a job stand.
+/// File and lines of a job's velocities.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Origin {
     /// The file.
@@ -12,17 +12,18 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
-    /// The file.
+    /// Returns the path of the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The line of a velocity of a set.
+    /// Returns the line of a velocity of a set.
     pub(crate) fn line(&self, set: usize, index: usize) -> Option<u32> {
         self.lines.get(set)?.get(index).copied()
     }
 
-    /// File and line of a velocity as the beginning of a message; nothing where there is no file.
+    /// Returns file and line of a velocity as the beginning of a message; empty if there is no
+    /// file.
     pub(crate) fn place(origin: Option<&Self>, set: usize, index: usize) -> String {
         let place = origin.and_then(|origin| {
             let line = origin.line(set, index)?;

@@ -1,10 +1,10 @@
-//! What became of one realization: a velocity, or a typed failure.
+//! Outcome of one realization: a velocity, or a typed failure.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Why a realization has no velocity. The discriminant is the code byte of the digest, of the
-/// wire format and of the store; 0 is success. Codes are never reused.
+/// Reason why a realization has no velocity. The discriminant is the code byte of the digest, of
+/// the wire format and of the store; 0 is success. Codes are never reused.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
 )]
@@ -19,12 +19,12 @@ pub enum FailureKind {
     DirectWaveFirst = 3,
     /// The computation produced a number that is not finite.
     NotFinite = 4,
-    /// An iteration, or the sampling, did not reach its tolerance within its bounds.
+    /// An iteration, or the sampling, did not reach its tolerance within its limits.
     NoConvergence = 5,
 }
 
 impl FailureKind {
-    /// Every kind, in the order of its code.
+    /// All kinds, in the order of their codes.
     pub const ALL: [Self; 5] = [
         Self::NoArrival,
         Self::InconsistentArrival,
@@ -33,12 +33,12 @@ impl FailureKind {
         Self::NoConvergence,
     ];
 
-    /// Code byte, 1 to 5.
+    /// Returns the code byte, 1 to 5.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoArrival => "no_arrival",
@@ -50,13 +50,13 @@ impl FailureKind {
     }
 }
 
-/// The outcome of one realization: velocity of the first arriving signal in m/s, or why not.
+/// Outcome of one realization: velocity of the first arriving signal in m/s, or the failure.
 ///
 /// A velocity is finite and above 0.
 pub type Outcome = Result<f64, FailureKind>;
 
-/// The two numbers that stand for an outcome on the wire, in the store and in the digest:
-/// code byte (0 = success) and velocity (0 on failure).
+/// Returns the two numbers that encode an outcome on the wire, in the store and in the digest: code
+/// byte (0 = success) and velocity (0 on failure).
 pub fn encode(outcome: Outcome) -> (u8, f64) {
     match outcome {
         Ok(velocity) => (0, velocity),
@@ -64,8 +64,8 @@ pub fn encode(outcome: Outcome) -> (u8, f64) {
     }
 }
 
-/// The outcome that [`encode`] wrote; `None` if the pair is not one it can have written
-/// (unknown code, a velocity that is not finite and positive, a failure with a velocity).
+/// Returns the outcome encoded by [`encode`]; `None` if the pair is invalid (unknown code, a
+/// velocity that is not finite and positive, a failure with a velocity).
 pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
     if code == 0 {
         return (velocity.is_finite() && velocity > 0.0).then_some(Ok(velocity));
@@ -74,22 +74,22 @@ pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
     (velocity.to_bits() == 0).then_some(Err(kind))
 }
 
-/// One realization as a worker answers it.
+/// One realization as returned by a worker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved {
-    /// What became of it.
+    /// The outcome.
     pub outcome: Outcome,
-    /// Estimate of the velocity's relative error by discretisation, ≥ 0; 0 on failure.
+    /// Estimated relative error of the velocity by discretisation, ≥ 0; 0 on failure.
     pub estimated_error: f64,
 }
 
 impl Solved {
-    /// A realization without a velocity.
+    /// Returns a realization without a velocity.
     pub fn failed(kind: FailureKind) -> Self {
         Self { outcome: Err(kind), estimated_error: 0.0 }
     }
 
-    /// Whether the estimate is one that such an outcome can have.
+    /// Returns whether the estimated error is allowed for such an outcome.
     pub fn is_sound(&self) -> bool {
         match self.outcome {
             Ok(_) => self.estimated_error.is_finite() && self.estimated_error >= 0.0,
@@ -98,7 +98,7 @@ impl Solved {
     }
 }
 
-/// How many realizations failed, by kind.
+/// Number of failed realizations, by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FailureCounts([u64; 5]);
 
@@ -117,17 +117,17 @@ impl FailureCounts {
         self.0[usize::from(kind.code()) - 1] += count;
     }
 
-    /// How many failures of one kind.
+    /// Returns the number of failures of one kind.
     pub fn get(&self, kind: FailureKind) -> u64 {
         self.0[usize::from(kind.code()) - 1]
     }
 
-    /// How many failures of all kinds.
+    /// Returns the number of failures of all kinds.
     pub fn total(&self) -> u64 {
         self.0.iter().sum()
     }
 
-    /// The kinds that occurred, with their counts, in the order of their codes.
+    /// Returns the kinds that occurred, with their counts, in the order of their codes.
     pub fn iter(&self) -> impl Iterator<Item = (FailureKind, u64)> + '_ {
         FailureKind::ALL
             .into_iter()

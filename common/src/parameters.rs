@@ -30,7 +30,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// All seven, in their order.
+    /// All seven parameters, in their order.
     pub const ALL: [Self; 7] = [
         Self::Density,
         Self::LongitudinalYoungModulus,
@@ -41,7 +41,7 @@ impl Parameter {
         Self::Dispersion,
     ];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Density => "density",
@@ -54,7 +54,7 @@ impl Parameter {
         }
     }
 
-    /// Unit as printed after a number, empty for pure numbers.
+    /// Returns the unit as printed after a number; empty for pure numbers.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Density => "kg/m³",
@@ -71,17 +71,17 @@ impl Parameter {
 pub struct Point(pub [f64; 7]);
 
 impl Point {
-    /// The value of one parameter.
+    /// Returns the value of one parameter.
     pub fn get(&self, parameter: Parameter) -> f64 {
         self.0[parameter as usize]
     }
 
-    /// Mass density ρ, kg/m³.
+    /// Returns the mass density ρ, kg/m³.
     pub fn density(&self) -> f64 {
         self.0[0]
     }
 
-    /// The engineering constants of the mean elasticity.
+    /// Returns the engineering constants of the mean elasticity.
     pub fn constants(&self) -> EngineeringConstants {
         EngineeringConstants {
             longitudinal_young_modulus: self.0[1],
@@ -92,7 +92,7 @@ impl Point {
         }
     }
 
-    /// Dispersion δ.
+    /// Returns the dispersion δ.
     pub fn dispersion(&self) -> f64 {
         self.0[6]
     }

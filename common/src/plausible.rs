@@ -1,8 +1,8 @@
-//! What a number in a file can mean: the range in which a physical value lies, and the units that
-//! people write in place of the one that is asked for.
+//! Plausible values of the numbers in a file: the range in which a physical value lies, and the
+//! units that people write instead of the required one.
 //!
-//! A number that no bone and no probe has is refused where one of those units explains it; one
-//! that is only unusual is computed with, after a [warning](Warning).
+//! A physically impossible number is refused if one of these units explains it; one that is only
+//! unusual is accepted with a [warning](Warning).
 
 mod warnings;
 
@@ -12,32 +12,34 @@ use crate::parameters::Parameter;
 pub(crate) use self::warnings::job_warnings_from;
 pub use self::warnings::{Warning, case_warnings, job_warnings};
 
-/// A unit in place of the one that is asked for.
+/// A unit that people use instead of the required one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OtherUnit {
-    /// As printed after a number.
+    /// The unit as printed after a number.
     name: &'static str,
-    /// It is 10 to this power of the unit that is asked for.
+    /// Its value as a power of 10 of the required unit.
     exponent: i32,
 }
 
-/// What is known beforehand about one kind of number. All of it is about values above 0.
+/// Prior knowledge about one kind of number. All of it refers to values above 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Quantity {
-    /// The unit that is asked for; empty for pure numbers.
+    /// The required unit; empty for pure numbers.
     pub(crate) unit: &'static str,
-    /// Of several units that explain a number, the one counts that brings it nearest to this.
+    /// Typical value: if several units explain a number, the one that brings it nearest to this is
+    /// chosen.
     typical: f64,
-    /// What is outside (from, to) is worth a warning.
+    /// Values outside this range (from, to) cause a warning.
     usual: (f64, f64),
-    /// What is below the first or not below the second is refused if another unit explains it. At least
-    /// ten times beyond whatever can be meant.
+    /// A value below the first, or not below the second, is refused if another unit explains it.
+    /// The range extends at least ten times beyond every meaningful value.
     possible: (f64, f64),
-    /// Units that explain numbers outside.
+    /// Units that explain numbers outside the range.
     units: &'static [OtherUnit],
 }
 
-/// How far beyond the usual range a number may lie that another unit explains.
+/// Factor by which a number in another unit may lie beyond the usual range to count as explained by
+/// it.
 const EXPLAINED: f64 = 10.0;
 
 const fn other(name: &'static str, exponent: i32) -> OtherUnit {
@@ -68,7 +70,7 @@ pub(crate) const BONE_THICKNESS: Quantity = Quantity {
     possible: (0.0, 1.0),
     units: LENGTHS,
 };
-/// Thickness of a fluid. One that is far too thick has no echo and does no harm.
+/// Thickness of a fluid. A layer that is far too thick has no echo and does no harm.
 pub(crate) const FLUID_THICKNESS: Quantity = Quantity {
     unit: "m",
     typical: 10e-3,
@@ -76,7 +78,7 @@ pub(crate) const FLUID_THICKNESS: Quantity = Quantity {
     possible: (0.0, f64::INFINITY),
     units: LENGTHS,
 };
-/// Density of a fluid; next to nothing stands for a vacuum.
+/// Density of a fluid; a very small one represents a vacuum.
 pub(crate) const FLUID_DENSITY: Quantity = Quantity {
     unit: "kg/m³",
     typical: 1000.0,
@@ -132,7 +134,7 @@ pub(crate) const ELEMENT_SIZE: Quantity = Quantity {
     possible: (0.0, 0.1),
     units: LENGTHS,
 };
-/// Time step of the hybrid method. One that is far too long fails at once.
+/// Time step of the hybrid method. A step that is far too long fails at once.
 pub(crate) const TIME_STEP: Quantity = Quantity {
     unit: "s",
     typical: 1e-8,
@@ -161,7 +163,7 @@ const DISPERSION: Quantity =
     Quantity { unit: "", typical: 0.1, usual: (2e-3, 0.7), possible: (0.0, 1.0), units: PER_CENT };
 
 impl Quantity {
-    /// What a parameter of the mean model, or the dispersion, is.
+    /// Returns the prior knowledge about a parameter of the mean model, or the dispersion.
     pub(crate) fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density => DENSITY,
@@ -175,13 +177,13 @@ impl Quantity {
         }
     }
 
-    /// Whether no bone and no probe has such a value.
+    /// Returns whether such a value is physically impossible.
     pub(crate) fn is_impossible(&self, value: f64) -> bool {
         let (from, to) = self.possible;
         !(from..to).contains(&value)
     }
 
-    /// The unit that is asked for, in words.
+    /// Returns the required unit in words.
     pub(crate) fn asked_for(&self) -> String {
         match self.unit {
             "" => "values are pure numbers".to_owned(),
@@ -189,15 +191,15 @@ impl Quantity {
         }
     }
 
-    /// From which value on, and below which, anything can be.
+    /// Returns the limits between which every value is possible.
     pub(crate) fn possible(&self) -> (f64, f64) {
         self.possible
     }
 
-    /// The question whether impossible `values` of one field are in another unit; `None` if one of them
-    /// is possible, or no unit explains them all.
+    /// Returns the question whether impossible `values` of one field are in another unit; `None` if
+    /// one of them is possible, or if no unit explains all of them.
     ///
-    /// `accepted` is what the field accepts besides.
+    /// `accepted` are the values that the field accepts in addition.
     pub(crate) fn question(&self, values: &[f64], accepted: Interval) -> Option<String> {
         let impossible = |&value: &f64| value > 0.0 && self.is_impossible(value);
         let (from, to) = self.usual;
@@ -212,7 +214,7 @@ impl Quantity {
         self.asked(values, meant)
     }
 
-    /// What is unusual about a value that can be computed with.
+    /// Returns a warning about an unusual but possible value.
     pub(crate) fn doubt(&self, value: f64) -> Option<String> {
         let (from, to) = self.usual;
         if (from..=to).contains(&value) || value.is_nan() {
@@ -231,7 +233,8 @@ impl Quantity {
         Some(format!("is {}{unit}; usual is {usual}{question}", short(value)))
     }
 
-    /// The question whether `values` are in the unit that brings all of them to what is `meant`.
+    /// Returns the question whether `values` are in the unit that brings all of them into the range
+    /// `meant`.
     fn asked(&self, values: &[f64], meant: impl Fn(f64) -> bool) -> Option<String> {
         let explains = |unit: &&OtherUnit| values.iter().all(|&value| meant(unit.si(value)));
         let distance = |unit: &OtherUnit| {
@@ -253,13 +256,13 @@ impl Quantity {
 }
 
 impl OtherUnit {
-    /// `value` of this unit, in the unit that is asked for, correctly rounded.
+    /// Converts `value` of this unit to the required unit, correctly rounded.
     fn si(self, value: f64) -> f64 {
         // A number with an exponent always parses.
         format!("{value}e{}", self.exponent).parse().unwrap_or(f64::NAN)
     }
 
-    /// The same as it may be typed.
+    /// Returns the converted value as it may be typed.
     fn written(self, value: f64) -> String {
         if self.exponent == -2 {
             short(self.si(value))
@@ -269,7 +272,7 @@ impl OtherUnit {
     }
 }
 
-/// A number of a sentence, with four digits.
+/// Formats a number for a sentence, with four digits.
 pub(crate) fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
     let magnitude = rounded.abs();

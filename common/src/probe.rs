@@ -16,22 +16,22 @@ pub struct Receivers {
     pub first_x1: f64,
     /// Distance between neighbours, m, above 0.
     pub pitch: f64,
-    /// How many receivers: 3 to 64.
+    /// Number of receivers, 3 to 64.
     pub count: u32,
     /// Height above the bone's upper face, m.
     pub x3: f64,
 }
 
 impl Receivers {
-    /// Position of receiver `j` (from 0) along the bone, m.
+    /// Returns the position of receiver `j` (from 0) along the bone, m.
     ///
-    /// One rounding of the product and one of the sum, so that the position has the same bits
+    /// The product and the sum are rounded once each, so that the position has the same bits
     /// wherever it is computed.
     pub fn x1(&self, j: u32) -> f64 {
         self.first_x1 + f64::from(j) * self.pitch
     }
 
-    /// Positions of all receivers along the bone, m.
+    /// Returns the positions of all receivers along the bone, m.
     pub fn positions(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.count).map(|j| self.x1(j))
     }
@@ -42,8 +42,8 @@ impl Receivers {
 pub struct Probe {
     /// Centre frequency fc of the pulse, Hz.
     pub center_frequency: f64,
-    /// Amplitude F1 of the pulse. The paper prints N; by dimensions it is m²/s², and with that
-    /// number pressures are in Pa.
+    /// Amplitude F1 of the pulse. The paper gives its unit as N; dimensionally it is m²/s², and
+    /// then pressures are in Pa.
     pub amplitude: f64,
     /// The line source.
     pub source: Source,

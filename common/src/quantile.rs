@@ -2,21 +2,22 @@
 
 use crate::moments::EstimatedError;
 
-/// Quantile of probability `p` (0 to 1) of numbers in ascending order, linear between neighbours
-/// (Hyndman and Fan's definition 7: half-way between both middle ones is the median of an even
-/// count); `None` of no numbers.
+/// Returns the quantile of probability `p` (0 to 1) of numbers in ascending order, linear between
+/// neighbours (Hyndman and Fan's definition 7: the median of an even count is the mean of the two
+/// middle values); `None` for no numbers.
 pub fn quantile(ascending: &[f64], p: f64) -> Option<f64> {
     let last = ascending.len().checked_sub(1)?;
     let position = p.clamp(0.0, 1.0) * last as f64;
     let below = (position.floor() as usize).min(last);
     let above = (below + 1).min(last);
     let (low, high) = (ascending[below], ascending[above]);
-    // Of infinite neighbours the difference is no number, and not needed.
+    // The difference of infinite neighbours would be NaN, and is not needed.
     let fraction = position - below as f64;
     Some(if fraction == 0.0 || low == high { low } else { fraction.mul_add(high - low, low) })
 }
 
-/// Median and largest of the estimated errors of a set, in any order; `None` of none.
+/// Returns median and largest of the estimated errors of a set, in any order; `None` if there are
+/// none.
 pub fn estimated_error(mut errors: Vec<f64>) -> Option<EstimatedError> {
     errors.sort_unstable_by(f64::total_cmp);
     Some(EstimatedError { median: quantile(&errors, 0.5)?, largest: *errors.last()? })

@@ -1,8 +1,8 @@
-//! What points within the bounds of a job can reach at all, in closed form.
+//! The moments that points within the bounds of a job can reach, in closed form.
 //!
-//! The first arriving signal is a compressional wave along the bone. In a thick plate it runs at about
-//! √(c1111/ρ) of the mean model, in a thin one slower, but no slower than in a bar, √(e_L/ρ); its
-//! coefficient of variation is about δ/√14.
+//! The first arriving signal is a compressional wave along the bone. In a thick plate it runs at
+//! about √(c1111/ρ) of the mean model, in a thin one slower, but no slower than in a bar, √(e_L/ρ);
+//! its coefficient of variation is about δ/√14.
 
 use crate::bulk_velocity::bulk_velocity;
 use crate::case::Setup;
@@ -12,34 +12,36 @@ use crate::parameters::{Parameter, Point};
 use crate::plausible::short;
 use crate::sampling;
 
-/// Mean velocities over √(e_L/ρ) of the slowest and √(c1111/ρ) of the fastest point: measured in the
-/// paper's geometry all over the usual bounds, 0.98 to 1.055 of √(c1111/ρ).
+/// Ratio of mean velocities to √(e_L/ρ) of the slowest and √(c1111/ρ) of the fastest point.
+/// Measured in the paper's geometry all over the usual bounds: 0.98 to 1.055 of √(c1111/ρ).
 const VELOCITY: (f64, f64) = (0.98, 1.055);
-/// Coefficients of variation over δ/√14, measured there.
+/// Ratio of coefficients of variation to δ/√14, measured in the same way.
 const VARIATION: (f64, f64) = (0.985, 1.145);
-/// Data are out of reach whose mean is beyond all that can be reached by more than this factor …
+/// Data are out of reach if their mean is beyond everything that can be reached by more than this
+/// factor …
 const MEAN_BEYOND: f64 = 2.0;
-/// … or whose coefficient of variation is above all that can be reached by more than this factor. One
-/// that is too small is no sign of another unit.
+/// … or if their coefficient of variation is above everything that can be reached by more than this
+/// factor. One that is too small does not indicate another unit.
 const VARIATION_BEYOND: f64 = 5.0;
-/// Fewer velocities may differ this much by chance.
+/// Smaller numbers of velocities may differ this much by chance.
 const VELOCITIES_MIN: usize = 10;
-/// Where the receivers are nearer to the source than this many times the sum of the heights, reflections
-/// come first, whose apparent velocity has no bound.
+/// If the receivers are nearer to the source than this many times the sum of the heights,
+/// reflections arrive first, whose apparent velocity is unbounded.
 const NEAR: f64 = 2.0;
 
-/// Mean velocities (m/s) and coefficients of variation of all points within some bounds, roughly.
+/// Approximate mean velocities (m/s) and coefficients of variation of all points within some
+/// bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
-    /// Slowest and fastest mean, m/s; the fastest is infinite where the bounds include the edge of
-    /// what is admissible.
+    /// Slowest and fastest mean, m/s; the fastest is infinite if the bounds include the edge of
+    /// admissibility.
     pub velocity: (f64, f64),
     /// Smallest and largest coefficient of variation.
     pub variation: (f64, f64),
 }
 
 impl Reach {
-    /// What points within `ranges` reach in `setup`.
+    /// Returns the moments that points within `ranges` reach in `setup`.
     pub fn of(ranges: &[Range; 7], setup: &Setup) -> Self {
         let (density, modulus) =
             (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
@@ -57,21 +59,21 @@ impl Reach {
     }
 }
 
-/// The point within `ranges` whose √(c1111/ρ) is smallest; the shear modulus and the dispersion, of
-/// which that is no function, are those of the start.
+/// Returns the point within `ranges` whose √(c1111/ρ) is smallest. It has the shear modulus and the
+/// dispersion of the start, as √(c1111/ρ) does not depend on them.
 pub fn slowest(ranges: &[Range; 7]) -> Point {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
     let transverse = ends(ranges, Parameter::TransverseYoungModulus).0;
     let poisson = smallest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
     let across = ends(ranges, Parameter::TransversePoissonRatio).0;
-    // c1111 falls with e_L as long as that is below this, and grows from there on.
+    // c1111 falls with e_L below this value, and grows above it.
     let least = 4.0 * transverse * poisson * poisson / (1.0 - across);
     let longitudinal = least.clamp(from, to);
     corner(ranges, [ends(ranges, Parameter::Density).1, longitudinal, poisson, transverse, across])
 }
 
-/// The point within `ranges` whose √(c1111/ρ) is largest, as [`slowest`]; `None` where it has no
-/// bound, because the edge of what is admissible lies within the ranges.
+/// Returns the point within `ranges` whose √(c1111/ρ) is largest, as [`slowest`]; `None` if it is
+/// unbounded, because the edge of admissibility lies within the ranges.
 pub fn fastest(ranges: &[Range; 7]) -> Option<Point> {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
     let transverse = ends(ranges, Parameter::TransverseYoungModulus).1;
@@ -86,7 +88,7 @@ pub fn fastest(ranges: &[Range; 7]) -> Option<Point> {
     Some(if soft.0 > stiff.0 { soft.1 } else { stiff.1 })
 }
 
-/// Where no set of the data can be come near to: the field to name, and why.
+/// Returns the field at fault and the reason if no set of the data can be approached.
 pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static str, String)> {
     let data = specification.data.as_ref()?;
     if specification.kind != JobKind::Identification {
@@ -96,7 +98,7 @@ pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static 
     let mut first = None;
     for set in 0..data.sets() {
         let count = data.velocities(set).map(<[f64]>::len);
-        // Where others can be matched, one that cannot is its own business.
+        // If other groups can be matched, one that cannot be is not an error.
         let missed = reach.missed(data.moments(set), count)?;
         first.get_or_insert(missed);
     }
@@ -118,7 +120,7 @@ pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static 
     })
 }
 
-/// One of the two moments.
+/// The two moments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Moment {
     Mean,
@@ -142,8 +144,8 @@ impl Moment {
 }
 
 impl Reach {
-    /// The moment of data, of so many velocities, that is far out of reach: which, its value, and what
-    /// can be reached.
+    /// Returns the moment of data with this number of velocities that is far out of reach: its
+    /// kind, its value, and the reachable range.
     fn missed(&self, data: Moments, count: Option<usize>) -> Option<(Moment, f64, String)> {
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
         let (slowest, fastest) = self.velocity;
@@ -168,7 +170,7 @@ impl Reach {
     }
 }
 
-/// A range in words, with its unit.
+/// Formats a range with its unit.
 fn span((from, to): (f64, f64), unit: &str) -> String {
     let round = |value: f64| {
         let rounded: f64 = format!("{value:.1e}").parse().unwrap_or(value);
@@ -187,7 +189,7 @@ fn is_near(setup: &Setup) -> bool {
     nearest < NEAR * heights
 }
 
-/// The bounds of a parameter, or twice its fixed value.
+/// Returns the bounds of a parameter, or its fixed value twice.
 fn ends(ranges: &[Range; 7], parameter: Parameter) -> (f64, f64) {
     match ranges[parameter as usize] {
         Range::Fixed(value) => (value, value),
@@ -203,7 +205,7 @@ fn largest_magnitude((from, to): (f64, f64)) -> f64 {
     if from.abs() > to.abs() { from } else { to }
 }
 
-/// The point with this density, e_L, ν_L, e_T and ν_T.
+/// Returns the point with this density, e_L, ν_L, e_T and ν_T.
 fn corner(ranges: &[Range; 7], [density, e_l, nu_l, e_t, nu_t]: [f64; 5]) -> Point {
     let start = |parameter: Parameter| ranges[parameter as usize].start();
     let (shear, dispersion) =
@@ -217,7 +219,7 @@ mod tests {
     use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
     use crate::ensemble::Germs;
 
-    /// All of `bounds` free.
+    /// Returns ranges that leave all parameters free within `bounds`.
     fn free(bounds: [(f64, f64); 7]) -> [Range; 7] {
         bounds.map(|(lower, upper)| Range::Free { start: 0.5 * (lower + upper), lower, upper })
     }
@@ -226,7 +228,7 @@ mod tests {
         bulk_velocity(point).unwrap().logarithm
     }
 
-    /// In boxes cut at random from the usual one, no random point is slower or faster than the corners.
+    /// In random boxes within the usual one, no random point is slower or faster than the corners.
     #[test]
     fn no_point_is_beyond_the_corners() {
         let mut bounded = 0;
@@ -264,7 +266,7 @@ mod tests {
         assert_eq!(reach.velocity.1, f64::INFINITY);
     }
 
-    /// Where e_L and δ are free, as in a search for them alone.
+    /// e_L and δ are free, as in a search for these two alone.
     #[test]
     fn what_is_out_of_reach_is_told() {
         let mut ranges = OPTIMUM.0.map(Range::Fixed);
@@ -299,7 +301,7 @@ mod tests {
         }
     }
 
-    /// Reflections that come first have any apparent velocity.
+    /// Reflections that arrive first may have any apparent velocity.
     #[test]
     fn near_receivers_have_no_fastest_velocity() {
         let ranges = OPTIMUM.0.map(Range::Fixed);

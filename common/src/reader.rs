@@ -1,7 +1,7 @@
-//! Walks the tree of a file: names what is unknown, missing or of the wrong type.
+//! Walks the tree of a file and records keys that are unknown, missing or of the wrong type.
 //!
-//! Ranges of numbers are not its business, they are [`crate::check`]'s, which also serves
-//! specifications that never were a file.
+//! Ranges of numbers are not checked here but in [`crate::check`], which also serves specifications
+//! that do not come from a file.
 
 use std::fmt;
 use std::slice;
@@ -11,21 +11,21 @@ use crate::document::{Node, Value, element_path, entry_path, quoted};
 use crate::file_error::Invalid;
 use crate::violations::{Violation, Violations};
 
-/// Most violations reported of one list, and most unknown keys of one table.
+/// Maximum number of violations reported for one list, and of unknown keys for one table.
 const REPORTED_MAX: usize = 10;
 
-/// Collects what is wrong with a file while it is read.
+/// Collects the violations of a file while it is read.
 #[derive(Debug, Default)]
 pub(crate) struct Reader {
-    /// What is wrong so far.
+    /// Violations found so far.
     pub(crate) violations: Violations,
-    /// Paths that an unknown key was taken for.
+    /// Paths of known keys that an unknown key was assumed to mean.
     suggested: Vec<String>,
-    /// Violations that only repeat that a key is misspelt.
+    /// Violations that are only consequences of a misspelt key.
     repeated: Vec<Violation>,
 }
 
-/// A table of a file; one that is absent is empty.
+/// A table of a file; an absent table is empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Table<'a> {
     path: String,
@@ -33,46 +33,46 @@ pub(crate) struct Table<'a> {
     is_table: bool,
 }
 
-/// A closed set of names that a key may take.
+/// A closed set of names that a key may have as its value.
 #[derive(Debug)]
 pub(crate) struct Choice<'c, T> {
-    /// What there is.
+    /// All values.
     pub(crate) all: &'c [T],
-    /// Its name in a file.
+    /// Returns the name of a value in a file.
     pub(crate) name: fn(T) -> &'static str,
-    /// Names that the file format defines, and this version does not offer.
+    /// Names that the file format defines but this version does not support.
     pub(crate) reserved: &'c [&'static str],
 }
 
 impl<'a> Table<'a> {
-    /// Path of an entry.
+    /// Returns the path of an entry.
     pub(crate) fn path(&self, key: &str) -> String {
         entry_path(&self.path, key)
     }
 
-    /// Whether it is there, and a table.
+    /// Returns whether the node is present, and a table.
     pub(crate) fn is_table(&self) -> bool {
         self.is_table
     }
 
-    /// The entry with this key.
+    /// Returns the entry with this key.
     pub(crate) fn get(&self, key: &str) -> Option<&'a Node> {
         self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
 
-    /// Whether there is an entry with this key.
+    /// Returns whether there is an entry with this key.
     pub(crate) fn has(&self, key: &str) -> bool {
         self.get(key).is_some()
     }
 }
 
 impl Reader {
-    /// The outermost table, which may have `keys` and no others.
+    /// Returns the outermost table, which may have `keys` and no others.
     pub(crate) fn root<'a>(&mut self, root: &'a Node, keys: &[&'static str]) -> Table<'a> {
         self.open(root, String::new(), keys)
     }
 
-    /// The table `key` of `parent`, which may have `keys` and no others.
+    /// Returns the table `key` of `parent`, which may have `keys` and no others.
     pub(crate) fn table<'a>(
         &mut self,
         parent: &Table<'a>,
@@ -111,9 +111,9 @@ impl Reader {
         Table { path, entries, is_table: true }
     }
 
-    /// Records that `field` lacks something, which each of `cures` (paths) would supply.
+    /// Records that `field` lacks something that each of `cures` (paths) would supply.
     ///
-    /// A user who has misspelt one of them reads only of that.
+    /// If the user has misspelt one of them, only that is reported.
     pub(crate) fn lacks(&mut self, field: &str, cures: &[String], message: impl Into<String>) {
         let violation = Violation { field: field.to_owned(), message: message.into(), more: false };
         self.violations.add(&violation.field, &violation.message);
@@ -122,24 +122,24 @@ impl Reader {
         }
     }
 
-    /// Whether a key of `table` was taken for a misspelt `key`.
+    /// Returns whether a key of `table` was assumed to be a misspelt `key`.
     pub(crate) fn is_misspelt(&self, table: &Table<'_>, key: &str) -> bool {
         self.suggested.contains(&table.path(key))
     }
 
-    /// Records that `key` of `table` is absent, though it is needed.
+    /// Records that the required `key` of `table` is absent.
     pub(crate) fn missing(&mut self, table: &Table<'_>, key: &str, expected: impl fmt::Display) {
         let path = table.path(key);
         self.lacks(&path, slice::from_ref(&path), format!("is missing; it must be {expected}"));
     }
 
-    /// Everything that is wrong, each mistake once, with its line in `root`.
+    /// Returns all violations, each mistake once, with its line in `root`.
     pub(crate) fn refuse(&self, root: &Node) -> Invalid {
         let once = |violation: &&Violation| !self.repeated.contains(violation);
         Invalid::locate(self.violations.iter().filter(once), root)
     }
 
-    /// The number `key`; an integer will do.
+    /// Reads the number `key`; an integer is accepted.
     pub(crate) fn number(&mut self, table: &Table<'_>, key: &str) -> Option<f64> {
         let node = table.get(key)?;
         let number = as_number(&node.value);
@@ -149,7 +149,7 @@ impl Reader {
         number
     }
 
-    /// The whole number `key` within `accepted`.
+    /// Reads the whole number `key` within `accepted`.
     pub(crate) fn whole(
         &mut self,
         table: &Table<'_>,
@@ -168,7 +168,7 @@ impl Reader {
         whole
     }
 
-    /// Whether `key` is true.
+    /// Reads the Boolean `key`.
     pub(crate) fn truth(&mut self, table: &Table<'_>, key: &str) -> Option<bool> {
         let node = table.get(key)?;
         let Value::Boolean(truth) = node.value else {
@@ -178,7 +178,7 @@ impl Reader {
         Some(truth)
     }
 
-    /// The choice that the string `key` names.
+    /// Reads the choice that the string `key` names.
     pub(crate) fn choice<T: Copy>(
         &mut self,
         table: &Table<'_>,
@@ -203,7 +203,7 @@ impl Reader {
         chosen
     }
 
-    /// The elements of the list `key`.
+    /// Reads the elements of the list `key`.
     pub(crate) fn list<'a>(
         &mut self,
         table: &Table<'a>,
@@ -218,7 +218,7 @@ impl Reader {
         None
     }
 
-    /// The numbers among `elements` of the list at `path`; `None` if one is no number.
+    /// Reads the numbers `elements` of the list at `path`; `None` if one is not a number.
     pub(crate) fn numbers(&mut self, path: &str, elements: &[Node]) -> Option<Vec<f64>> {
         let numbers: Vec<f64> =
             elements.iter().filter_map(|element| as_number(&element.value)).collect();
@@ -246,19 +246,19 @@ impl Reader {
 fn as_number(value: &Value) -> Option<f64> {
     match *value {
         Value::Number(number) => Some(number),
-        // Correctly rounded, as the same digits with a decimal point would be.
+        // Correctly rounded, like the same digits with a decimal point.
         #[expect(clippy::cast_precision_loss, reason = "rounding is what is wanted")]
         Value::Integer(integer) => Some(integer as f64),
         _ => None,
     }
 }
 
-/// How alike two keys must be for one to be taken for the other misspelt (Jaro-Winkler).
+/// Minimum similarity of two keys (Jaro-Winkler) for one to count as a misspelling of the other.
 const LIKENESS_MIN: f64 = 0.7;
-/// Longer keys are nobody's misspelling.
+/// Longer keys are not considered as misspellings.
 const MISSPELT_BYTES_MAX: usize = 64;
 
-/// The known key that `key` is most likely meant to be.
+/// Returns the known key that `key` is most probably meant to be.
 fn nearest_key(key: &str, known: &[&'static str]) -> Option<&'static str> {
     if key.len() > MISSPELT_BYTES_MAX {
         return None;

@@ -1,4 +1,4 @@
-//! One realization: from (point, seed, index) to the bone's material.
+//! One realization: the bone's material from (point, seed, index).
 
 use thiserror::Error;
 
@@ -8,10 +8,10 @@ use crate::ensemble::{ElasticityLaw, LawError};
 use crate::germ_source::{GermMaker, GermSource};
 use crate::parameters::Point;
 
-/// The bones of one point of the search: everything that fixes the material at each index.
+/// The bones of one point of the search: everything that determines the material at each index.
 ///
-/// Whoever needs a realization, a worker or a user who wants to look at one, takes it from here:
-/// the same point, seed and index give the same bits.
+/// All code that needs a realization uses this type, whether a worker or a user's inspection: the
+/// same point, seed and index give the same bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ensemble {
     density: f64,
@@ -19,7 +19,7 @@ pub struct Ensemble {
     germs: GermMaker,
 }
 
-/// Why a point has no ensemble.
+/// Reason why a point has no ensemble.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum PointError {
     /// The density or the engineering constants are not admissible.
@@ -31,7 +31,7 @@ pub enum PointError {
 }
 
 impl Ensemble {
-    /// The ensemble at a point, with independent germs of this seed.
+    /// Creates the ensemble at a point, with independent germs of this seed.
     ///
     /// # Errors
     /// The first violated condition: density, constants of the mean model, dispersion.
@@ -39,7 +39,7 @@ impl Ensemble {
         Self::drawn(point, GermSource::streams(seed))
     }
 
-    /// The ensemble at a point, with the germs of its job.
+    /// Creates the ensemble at a point, with the germs of its job.
     ///
     /// # Errors
     /// The first violated condition: density, constants of the mean model, dispersion.
@@ -53,23 +53,24 @@ impl Ensemble {
         Ok(Self { density, law, germs: GermMaker::new(germs) })
     }
 
-    /// The bone at `index`.
+    /// Returns the bone at `index`.
     ///
     /// # Errors
-    /// When the drawn matrix is not positive definite within rounding
-    /// (see [`ElasticityLaw::realize`]).
+    /// If the drawn matrix is not positive definite within rounding (see
+    /// [`ElasticityLaw::realize`]).
     pub fn bone(&self, index: u64) -> Result<Bone, NotElastic> {
         let elasticity = self.law.realize(&self.germs.germs(index))?;
         Ok(Bone { density: self.density, elasticity })
     }
 
-    /// √(c1111/ρ), m/s, of the bones at 0, 1, … `count` - 1, to the bit; without their other
-    /// constants, a hundredth of the work. A speed may be there where the whole bone is not.
+    /// Returns √(c1111/ρ), m/s, of the bones at 0, 1, … `count` - 1, to the bit. The other
+    /// constants are not computed, which saves 99 % of the work. A speed may exist even if the
+    /// whole bone does not.
     pub(crate) fn longitudinal_speeds(&self, count: u64) -> impl Iterator<Item = f64> {
         self.germs.firsts(count).map(|germ| (self.law.c1111(germ) / self.density).sqrt())
     }
 
-    /// Mean, m/s, and variance, m²/s², of √(c1111/ρ) under the law.
+    /// Returns mean, m/s, and variance, m²/s², of √(c1111/ρ) under the law.
     pub(crate) fn longitudinal_speed_moments(&self) -> (f64, f64) {
         let (mean, variance) = self.law.root_c1111_moments();
         (mean / self.density.sqrt(), variance / self.density)
@@ -106,7 +107,7 @@ mod tests {
         }
     }
 
-    /// 2¹⁶ scrambled points are within 1e-6 of the mean and 1e-4 of the variance.
+    /// With 2¹⁶ scrambled points the mean is accurate to 1e-6 and the variance to 1e-4.
     #[test]
     fn moments_of_the_longitudinal_speed_are_those_of_its_law() {
         for dispersion in [0.02, 0.1029, 0.3, 0.79] {

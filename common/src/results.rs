@@ -1,4 +1,4 @@
-//! What a job leaves: the result and the history of its evaluations.
+//! Output of a job: the result and the history of its evaluations.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,26 +14,26 @@ use crate::version::Program;
 
 pub use crate::moments::{Estimate, EstimatedError, Moments};
 
-/// How a job ended.
+/// Final status of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// The search met a tolerance, or the propagation is complete.
     Converged,
-    /// The search used up its evaluations.
+    /// The search reached its maximum number of evaluations.
     MaxEvaluations,
     /// A user cancelled the job.
     Cancelled,
-    /// The job has no result to rely on.
+    /// The job has no reliable result.
     Failed,
 }
 
 impl Status {
-    /// Every status.
+    /// All statuses.
     pub const ALL: [Self; 4] =
         [Self::Converged, Self::MaxEvaluations, Self::Cancelled, Self::Failed];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -44,27 +44,27 @@ impl Status {
     }
 }
 
-/// The kind of a job's failure.
+/// Kind of a job's failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobFailure {
-    /// No point that was evaluated is feasible: too many realizations failed at each, or it has no
-    /// cost.
+    /// No evaluated point is feasible: at each, too many realizations failed, or there is no cost.
     NoFeasiblePoint,
-    /// Workers gave different answers for one realization, and none was left to decide.
+    /// Workers gave different answers for one realization, and no further worker was available to
+    /// decide.
     IntegrityError,
-    /// Workers vanished over one realization, again and again.
+    /// Workers were lost repeatedly over one realization.
     LostRealization,
-    /// What the store holds of the job is not what was put there.
+    /// The store's data of the job differ from what was written.
     Store,
 }
 
 impl JobFailure {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [Self; 4] =
         [Self::NoFeasiblePoint, Self::IntegrityError, Self::LostRealization, Self::Store];
 
-    /// Name in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoFeasiblePoint => "no_feasible_point",
@@ -74,8 +74,8 @@ impl JobFailure {
         }
     }
 
-    /// Whether the machines that the job ran on caused the failure, so that running the job again may
-    /// succeed.
+    /// Returns whether the machines that the job ran on caused the failure, so that running the job
+    /// again may succeed.
     pub fn is_retryable(self) -> bool {
         match self {
             Self::NoFeasiblePoint => false,
@@ -84,35 +84,35 @@ impl JobFailure {
     }
 }
 
-/// What an evaluation is for.
+/// Purpose of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Role {
-    /// Number of the set of data that it is for, from 0.
+    /// Number of its set of data, from 0.
     pub group: u32,
-    /// Number of the start of its search, from 0, the job's own.
+    /// Number of the start of its search, from 0; 0 is the job's own start.
     pub start: u32,
-    /// The parameter in which it differs from the best point, to measure a derivative; `None` of a
-    /// search.
+    /// The parameter in which it differs from the best point, to measure a derivative; `None` for
+    /// an evaluation of the search itself.
     pub varied: Option<Parameter>,
 }
 
-/// One evaluation: of a search, a row of `history.csv`.
+/// One evaluation; those of the search are the rows of `history.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
-    /// The point.
+    /// The evaluated point.
     pub point: Point,
-    /// Moments over the successes, unless there are none; of one that measures a derivative, `None`
-    /// too if other realizations failed than at the best point.
+    /// Moments over the successes, unless there are none. For an evaluation that measures a
+    /// derivative, also `None` if other realizations failed than at the best point.
     pub moments: Option<Moments>,
     /// Cost; infinite at an infeasible point; `None` for a propagation.
     pub cost: Option<f64>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
-    /// Estimated errors of the successes, unless there are none, or they are not known.
+    /// Estimated errors of the successes, unless there are none, or the errors are unknown.
     pub estimated_error: Option<EstimatedError>,
 }
 
@@ -123,106 +123,106 @@ impl Evaluation {
     }
 }
 
-/// What the best point of a search is.
+/// Meaning of the best point of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PointMeaning {
-    /// Of the points that were evaluated, the one with the least cost.
+    /// The evaluated point with the lowest cost.
     #[serde(rename = "of the points evaluated, the one with the least cost")]
     LeastCost,
-    /// Of the points that match the data, the one where the simplex ended.
+    /// One of the points that match the data: that at which the simplex ended.
     #[serde(rename = "of the points that match the data, the one where the simplex ended")]
     SimplexEnd,
-    /// Of the points that match the data, the one nearest to the start.
+    /// One of the points that match the data: that nearest to the start.
     #[serde(rename = "of the points that match the data, the one nearest to the start")]
     NearestToStart,
 }
 
 impl PointMeaning {
-    /// Every meaning.
+    /// All meanings.
     pub const ALL: [Self; 3] = [Self::LeastCost, Self::SimplexEnd, Self::NearestToStart];
 }
 
-/// What is known of the data of one search.
+/// Summary of the data of one search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataSummary {
-    /// Their moments.
+    /// Moments of the data.
     pub moments: Moments,
-    /// Number of the velocities; `None` where only their moments are known.
+    /// Number of velocities; `None` if only their moments are known.
     pub count: Option<u64>,
-    /// Confidence intervals of the moments of their law; `None` where only the moments are known, and
-    /// where the velocities give no interval.
+    /// Confidence intervals of the moments of their law; `None` if only the moments are known, or
+    /// if the velocities give no interval.
     pub intervals: Option<MomentIntervals>,
 }
 
-/// How the search for one group ended.
+/// Ending of the search for one group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupEnding {
-    /// How.
+    /// Final status.
     pub status: Status,
-    /// Why, in a sentence, where the status needs one.
+    /// Reason as a sentence, where the status needs one.
     pub reason: Option<String>,
     /// Number of its best evaluation, if a point was feasible.
     pub best: Option<u64>,
 }
 
-/// What was found for one group of the data. One that failed has no feasible point.
+/// Result for one group of the data. A failed group has no feasible point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupResult {
-    /// Its name.
+    /// Name of the group.
     pub name: String,
-    /// How its search ended.
+    /// Final status of its search.
     pub status: Status,
-    /// Why, in a sentence, where the status needs one.
+    /// Reason as a sentence, where the status needs one.
     pub reason: Option<String>,
     /// Its best feasible evaluation.
     pub best: Option<BestPoint>,
     /// Its data.
     pub data: DataSummary,
-    /// What its data say.
+    /// Conclusions from its data.
     pub conclusions: Conclusions,
 }
 
-/// The result of a job. No wall times in it: one job, the same bytes.
+/// Result of a job. It contains no wall times, so that one job always gives the same bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobResult {
-    /// How it ended.
+    /// Final status.
     pub status: Status,
-    /// Of which kind the failure is; `None` with any other status than failed.
+    /// Kind of the failure; `None` unless the status is failed.
     pub failure: Option<JobFailure>,
-    /// Why, in a sentence, where the status needs one (failed).
+    /// Reason as a sentence, where the status needs one.
     pub reason: Option<String>,
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
     pub digest: String,
-    /// The best feasible evaluation (of a propagation: the only one), if any was complete; `None`
-    /// where the data are groups.
+    /// The best feasible evaluation (for a propagation: its only one), if any was complete; `None`
+    /// if the data are groups.
     pub best: Option<BestPoint>,
-    /// The data; `None` for a propagation, and where the data are groups.
+    /// The data; `None` for a propagation, and if the data are groups.
     pub data: Option<DataSummary>,
-    /// What the data say; nothing for a propagation, and where the data are groups.
+    /// Conclusions from the data; empty for a propagation, and if the data are groups.
     pub conclusions: Conclusions,
-    /// What was found for each group of the data; empty where there are none.
+    /// Result for each group of the data; empty if there are no groups.
     pub groups: Vec<GroupResult>,
-    /// What was minimised; of no use to a propagation.
+    /// The function that was minimised; unused by a propagation.
     pub objective: Objective,
-    /// How it was searched; of no use to a propagation.
+    /// Settings of the search; unused by a propagation.
     pub search: Search,
-    /// Points that the search went to, and whose realizations were run.
+    /// Number of points evaluated by the search, without those that measure derivatives.
     pub evaluations: u64,
     /// Realizations of each evaluation.
     pub realizations: u64,
     /// Seed of the germs.
     pub seed: u64,
-    /// How germs were drawn.
+    /// Method of drawing the germs.
     pub sampling: Sampling,
-    /// Scrambles among which the realizations were divided.
+    /// Number of scrambles among which the realizations were divided.
     pub scrambles: u64,
-    /// Whether the control variate was asked for.
+    /// Whether the control variate was requested.
     pub control_variate: bool,
-    /// Solver settings that were used.
+    /// The solver settings used.
     pub solver: SolverSettings,
-    /// The exact method's sampling of the usual bone; `None` of other methods.
+    /// The exact method's sampling of the usual bone; `None` for other methods.
     pub nominal: Option<NominalSampling>,
-    /// Criterion that was used.
+    /// The criterion used.
     pub picking: Picking,
     /// The program that computed it.
     pub program: Program,
@@ -231,30 +231,30 @@ pub struct JobResult {
 /// The best point of a job, with its realizations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestPoint {
-    /// The point.
+    /// The evaluated point.
     pub point: Point,
-    /// What it is among the points that the search knows; `None` for a propagation.
+    /// Meaning of the point; `None` for a propagation.
     pub meaning: Option<PointMeaning>,
     /// Its cost; `None` for a propagation.
     pub cost: Option<f64>,
-    /// Standard error of a likelihood's cost; `None` of other costs.
+    /// Standard error of a likelihood's cost; `None` for other costs.
     pub cost_error: Option<f64>,
-    /// What priors have added to the cost; `None` where there is no prior.
+    /// Contribution of the priors to the cost; `None` if there is no prior.
     pub penalty: Option<f64>,
-    /// Number of the first evaluation whose cost was no larger than what sampling noise alone makes of
-    /// it; `None` if there was none, and of costs that are no moments' alone.
+    /// Number of the first evaluation whose cost was within the range that sampling noise alone
+    /// causes; `None` if there was none, and for costs that do not depend on the moments alone.
     pub below_noise_from: Option<u64>,
     /// Its moments with standard errors, unless every realization failed.
     pub velocity: Option<Estimate>,
-    /// What the failed realizations would change the moments by, had they the velocities that are
-    /// expected of their tensors; `None` where that cannot be known.
+    /// Change of the moments if the failed realizations had the velocities expected from their
+    /// tensors; `None` if that is unknown.
     pub failure_bias: Option<Moments>,
-    /// Whether the measured velocities can be of the model's law; `None` where only moments were measured,
-    /// and for a propagation.
+    /// Test of whether the measured velocities can come from the model's law; `None` if only
+    /// moments were measured, and for a propagation.
     pub kolmogorov: Option<KolmogorovTest>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
-    /// Estimated errors of the successes, unless there are none, or they are not known.
+    /// Estimated errors of the successes, unless there are none, or the errors are unknown.
     pub estimated_error: Option<EstimatedError>,
     /// Outcomes in index order.
     pub outcomes: Vec<Outcome>,

@@ -1,4 +1,5 @@
-//! Results as CSV: `history.csv` and `realizations.csv`, of groups `groups.csv` and `comparison.csv`.
+//! Results as CSV: `history.csv` and `realizations.csv`, for groups also `groups.csv` and
+//! `comparison.csv`.
 
 use std::fmt::{self, Write as _};
 
@@ -9,10 +10,11 @@ use crate::outcome::Outcome;
 use crate::parameters::Parameter;
 use crate::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
 
-/// The text of `history.csv`: one row per evaluation of the search, the seven parameters between its
-/// number and its moments; with groups or several starts, also which of them it was for.
+/// Returns the text of `history.csv`: one row per evaluation of the search, with the seven
+/// parameters between its number and its moments; with groups or several starts, also the group and
+/// start.
 ///
-/// Moments are empty where every realization failed; a cost is `inf` at an infeasible point.
+/// Moments are empty if every realization failed; a cost is `inf` at an infeasible point.
 pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> String {
     let parameters = Parameter::ALL.map(Parameter::name).join(",");
     let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
@@ -34,10 +36,10 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     out
 }
 
-/// A text as a field that no spreadsheet takes for a formula: a `'` is put before a [`FORMULA`] that
-/// begins it or, since some take `;` for the end of a field, that follows a `;`; before a `'` in such
-/// a place, too, so that whoever takes one `'` away there has the text again. In quotes where that is
-/// needed.
+/// Returns a text as a field that no spreadsheet interprets as a formula. A `'` is put before a
+/// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
+/// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
+/// removing one `'` there. The field is quoted if necessary.
 fn field(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
     let mut begins = true;
@@ -56,7 +58,7 @@ fn field(text: &str) -> String {
     }
 }
 
-/// What begins a formula, or is passed over before one (OWASP, "CSV Injection").
+/// Characters that begin a formula, or are skipped before one (OWASP, "CSV Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
 fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
@@ -78,18 +80,20 @@ fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
     write!(out, ",{}", evaluation.failures.total())
 }
 
-/// Most groups of which each is compared with each other; more are compared with the first.
+/// Maximum number of groups of which all pairs are compared; more groups are compared with the
+/// first only.
 const COMPARED_MAX: usize = 200;
 
-/// The text of `groups.csv`: one row per group, with what was measured and what is identified of it (m/s,
-/// kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty where they are unknown.
+/// Returns the text of `groups.csv`: one row per group, with the measured and the identified
+/// quantities (m/s, kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty if
+/// they are unknown.
 pub fn groups(
     specification: &JobSpecification,
     result: &JobResult,
     history: &[Evaluation],
 ) -> String {
     let free = |name: &Parameter| matches!(specification.range(*name), Range::Free { .. });
-    // The dispersion has its columns whether it is free or not.
+    // The dispersion has its own columns whether it is free or not.
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     let free: Vec<Parameter> = elastic.filter(free).collect();
     let mut out = header(&free);
@@ -120,7 +124,7 @@ pub fn groups(
     out
 }
 
-/// The header of `groups.csv`, given the free parameters of the mean model.
+/// Returns the header of `groups.csv`, given the free parameters of the mean model.
 fn header(free: &[Parameter]) -> String {
     let with_interval =
         |name: &str| [name.to_owned(), format!("{name}_lower"), format!("{name}_upper")];
@@ -137,7 +141,7 @@ fn header(free: &[Parameter]) -> String {
     columns.join(",") + "\n"
 }
 
-/// A free parameter with the ends of its interval, where the data fix it.
+/// Returns a free parameter with the ends of its interval, if the data determine it.
 fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
     let found = group.conclusions.inference.as_ref();
     let of = found.and_then(|found| found.parameters.iter().find(|(known, _)| *known == name));
@@ -147,7 +151,8 @@ fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
     [number(quantity.map(|quantity| quantity.value)), lower, upper]
 }
 
-/// Moments of a group's data with their intervals, and the test against the model's law.
+/// Returns the moments of a group's data with their intervals, and the test against the model's
+/// law.
 fn measured(group: &GroupResult) -> [String; 8] {
     let DataSummary { moments, intervals, .. } = group.data;
     let both = |interval: Option<Interval>| ends(interval.map(|found| [found.low, found.high]));
@@ -167,7 +172,8 @@ fn measured(group: &GroupResult) -> [String; 8] {
     ]
 }
 
-/// Why a group did not converge, or why it has no intervals; empty where there is nothing to say.
+/// Returns the reason why a group did not converge, or has no intervals; empty if neither is the
+/// case.
 fn reason(group: &GroupResult) -> &str {
     let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
     let unknown = match (&group.best, &group.conclusions.inference) {
@@ -182,16 +188,17 @@ fn reason(group: &GroupResult) -> &str {
     told.unwrap_or(unknown)
 }
 
-/// Both ends of an interval.
+/// Formats both ends of an interval.
 fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
     [0, 1].map(|end| number(interval.map(|ends| ends[end])))
 }
 
-/// The text of `comparison.csv`: one row per pair of groups, with the differences of what is
-/// identified, the first less the second, and the ends of their confidence intervals, each by itself of
-/// the level of the groups' own; empty where they are unknown.
+/// Returns the text of `comparison.csv`: one row per pair of groups, with the differences (first
+/// minus second) of the identified quantities and the ends of their confidence intervals, empty if
+/// they are unknown. Each interval has the confidence level of the groups' own intervals.
 ///
-/// The noise of sampling, which all groups share, is counted in both: intervals are rather too wide.
+/// The sampling noise, which all groups share, is counted in both groups: intervals tend to be too
+/// wide.
 pub fn comparison(result: &JobResult) -> String {
     let mut out = "first,second".to_owned();
     for name in ["bulk_velocity", "dispersion"] {
@@ -215,14 +222,14 @@ pub fn comparison(result: &JobResult) -> String {
     out
 }
 
-/// Difference of two quantities, and the ends of its interval.
+/// Returns the difference of two quantities, and the ends of its interval.
 fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<f64>; 3] {
     let Some((first, second)) = first.zip(second) else { return [None; 3] };
     let difference = first.value - second.value;
     let Some((one, other)) = first.known.zip(second.known) else {
         return [Some(difference), None, None];
     };
-    // Half the length of each interval counts the degrees of freedom of its data.
+    // Half the length of each interval already accounts for the degrees of freedom of its data.
     let half = |known: Known| 0.5 * (known.interval[1] - known.interval[0]);
     let reach = libm::hypot(half(one), half(other));
     [Some(difference), Some(difference - reach), Some(difference + reach)]
@@ -233,13 +240,13 @@ fn quantities_of(group: &GroupResult) -> [Option<Quantity>; 2] {
     [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
 }
 
-/// A number, if there is one that is finite.
+/// Formats a number; empty if it is absent or not finite.
 fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 
-/// The text of `realizations.csv` of groups: the rows of each group after those of the one before, at
-/// its best point.
+/// Returns the text of `realizations.csv` for groups: the rows of each group at its best point, one
+/// group after another.
 pub fn realizations_of_groups(groups: &[GroupResult]) -> String {
     let mut out = "index,velocity,failure,group\n".to_owned();
     for group in groups {
@@ -253,8 +260,8 @@ pub fn realizations_of_groups(groups: &[GroupResult]) -> String {
     out
 }
 
-/// The text of `realizations.csv`: one row per index; the velocity (m/s) is empty where there is
-/// a failure, and the failure where there is a velocity.
+/// Returns the text of `realizations.csv`: one row per index; the velocity (m/s) is empty for a
+/// failure, and the failure is empty for a velocity.
 pub fn realizations(outcomes: &[Outcome]) -> String {
     let mut out = "index,velocity,failure\n".to_owned();
     for (index, outcome) in outcomes.iter().enumerate() {
@@ -264,7 +271,7 @@ pub fn realizations(outcomes: &[Outcome]) -> String {
     out
 }
 
-/// A row without what comes behind its failure.
+/// Formats a row without the columns after its failure.
 fn realization(index: usize, outcome: &Outcome) -> String {
     match outcome {
         Ok(velocity) => format!("{index},{velocity:?},"),
@@ -276,7 +283,7 @@ fn realization(index: usize, outcome: &Outcome) -> String {
 mod tests {
     use super::*;
 
-    /// The text of a field, as docs/results.md says that it is got back.
+    /// Recovers the text of a field as described in docs/results.md.
     fn text_of(field: &str) -> String {
         let inner = field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
         let text = inner.unwrap_or(field).replace("\"\"", "\"");
@@ -324,7 +331,7 @@ mod tests {
         }
     }
 
-    /// Every text of up to five of the characters that matter.
+    /// Every text of up to five of the relevant characters.
     #[test]
     fn names_that_differ_have_fields_that_differ() {
         let mut texts = vec![String::new()];

@@ -1,22 +1,23 @@
-//! How finely frequencies and wavenumbers are sampled: derived from geometry, band and the
-//! fastest wave, never hard-wired to one geometry.
+//! Sampling of frequencies and wavenumbers: derived from geometry, band and the fastest wave, and
+//! not tuned to one geometry.
 //!
 //! The method computes p̂(k, s) at s = α + i 2πn/T and k = m Δk. Summing over k repeats the source
 //! along x1 with period L = 2π/Δk; summing over n repeats the signal in time with period T, the
-//! repetition weakened by exp(-α T). Both repetitions are kept away from what is looked at:
+//! repetition weakened by exp(-α T). Both repetitions are kept out of the windows that are
+//! evaluated:
 //!
-//! - L: the wave of the nearest repeated source reaches the last receiver, at the speed that the
-//!   sampling is made for, only after the first packet;
-//! - T: from a receiver's earliest possible arrival on, one period takes in the first packet
-//!   and the large wave that the bone's face reflects: were that to wrap round, it would come down
-//!   on the first arrival, a thousand times smaller;
-//! - band: the pulse's spectrum is cut smoothly below [`Sampling::first_band`] at a first look and,
-//!   where that is not enough, below [`Sampling::band`]: the same lines and more;
+//! - L: the wave of the nearest repeated source reaches the last receiver, at the speed for which
+//!   the sampling is made, only after the first packet;
+//! - T: from a receiver's earliest possible arrival on, one period includes the first packet and
+//!   the large wave that the bone's face reflects: if that wrapped round, it would overlap the
+//!   first arrival, which is a thousand times smaller;
+//! - band: the pulse's spectrum is cut smoothly below [`Sampling::first_band`] in the first pass
+//!   and, where that is not enough, below [`Sampling::band`]: the same lines and more;
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
-//! High in the band nothing is left but the tail of the pulse's kink at t = 0. There a shorter
-//! period does, so frequencies are thinned out (`thinning.rs`), and so do the wavenumbers of the first
-//! packet, so that those of the later, slower waves are left out smoothly.
+//! High in the band only the tail of the pulse's kink at t = 0 remains. There a shorter period
+//! suffices, so frequencies are thinned out (`thinning.rs`). The wavenumbers of the first packet
+//! suffice there, too, so those of the later, slower waves are faded out smoothly.
 
 mod thinning;
 
@@ -28,69 +29,70 @@ use crate::settings::Method;
 
 pub use thinning::{RUN, Run, smooth_step};
 
-/// Ratio of neighbouring speeds on the ladder.
+/// Ratio of neighbouring speeds of the speed grid.
 const RUNG_RATIO: f64 = 1.05;
-/// Rungs of the ladder: its last speed is 270 times the first.
+/// Number of speeds of the grid: the last is 270 times the first.
 pub const RUNGS: usize = 116;
-/// Share of a rung's highest speed over which it passes into the next.
+/// Fraction of a rung's highest speed over which it is blended into the next.
 const RUNG_OVERLAP: f64 = 5e-4;
-/// Speed, m/s, at which a setup's sampling is sized before any bone is known: the usual bound of
-/// speeds in cortical bone.
+/// Speed, m/s, for which a setup's sampling is sized before any bone is known: the usual upper
+/// limit of speeds in cortical bone.
 const NOMINAL_SPEED: f64 = 4000.0;
 /// Plates thinner than this many millimetres at 1 MHz (m·Hz) need a wider band: the first extremum
 /// lies closer to the wave of the pulse's kink at t = 0, whose spectrum falls slowly.
 const THIN_PLATE: f64 = 2000.0;
 /// The band grows as this power of the thinness.
 const THIN_PLATE_POWER: f64 = 1.6;
-/// Most widening of the band for a thin plate.
+/// Largest widening of the band for a thin plate.
 const THIN_PLATE_MAX: f64 = 3.0;
-/// Highest frequency of traces over centre frequency: a trace is right to 1e-3 of its largest value.
+/// Ratio of the highest frequency of traces to the centre frequency: a trace is accurate to 1e-3 of
+/// its largest value.
 const TRACE_BAND: f64 = 12.0;
 /// Where the taper of a trace starts, as a fraction of the band.
 const TRACE_TAPER_START: f64 = 0.4;
 /// Where the taper of a velocity starts, as a fraction of the band.
 const TAPER_START: f64 = 0.5;
-/// α T: what wraps round is weaker by exp(-this). More amplifies rounding and truncation, which
-/// grow as e^(αt), beyond what it gains.
+/// α T: a wave that wraps round is weakened by exp(-this). A larger value amplifies rounding and
+/// truncation, which grow as e^(αt), by more than it gains.
 const WRAP_DAMPING: f64 = 12.0;
-/// Largest α t at which an extremum is picked: whatever is left out or rounded off in a spectrum grows
-/// as e^(αt).
+/// Largest α t at which an extremum is picked: truncation and rounding errors of a spectrum grow as
+/// e^(αt).
 const GROWTH_MAX: f64 = 13.5;
 /// Shortest period, in periods of the centre frequency.
 const SHORTEST_PERIOD: f64 = 6.0;
-/// Period, in periods of the centre frequency, of which the thinning of frequencies takes away what is
-/// not needed high in the band; a shorter one is thinned later.
+/// Period, in periods of the centre frequency, from which the thinning of frequencies removes those
+/// that are not needed high in the band; a shorter period is thinned higher up.
 const THINNED_PERIOD: f64 = 8.0;
 /// Exponent at which the sum over wavenumbers ends, at refinement 1.
 const EVANESCENCE: f64 = 18.5;
 /// Frequencies whose weight is below this are left out.
 const TAPER_MIN: f64 = 1e-9;
-/// Share of the period left free after what it has to take in.
+/// Ratio of the period to the time that it must include.
 const PERIOD_MARGIN: f64 = 1.03;
-/// The same for traces.
+/// The same ratio for traces.
 const TRACE_MARGIN: f64 = 1.15;
-/// Frequencies, over the centre frequency, between which the sum over wavenumbers draws in from
-/// every wave to those of the first packet.
+/// Frequencies, as multiples of the centre frequency, between which the sum over wavenumbers
+/// narrows from all waves to those of the first packet.
 const SLOW_WAVES_END: (f64, f64) = (3.5, 4.0);
-/// Slowness at which waves begin to be left out, over that of the fastest wave.
+/// Slowness at which waves begin to be left out, as a multiple of that of the fastest wave.
 const SLOWNESS_START: f64 = 0.8;
-/// Range of slowness over which they fade, over that of the coupling fluid.
+/// Range of slowness over which they fade, as a fraction of that of the coupling fluid.
 const SLOWNESS_FADE: f64 = 0.5;
-/// Periods of the centre frequency by which the waves at the two ends of the fading have to be apart at
-/// the nearest receiver, for frequencies to be thinned and slow waves to be left out from where they
-/// usually are; where they are less far apart, this happens higher in the band.
+/// Minimum separation, at the nearest receiver, of the waves at the two ends of the fading, in
+/// periods of the centre frequency, for frequencies to be thinned and slow waves to be left out
+/// from their usual place on; if the separation is smaller, this happens higher in the band.
 const APART: f64 = 2.2;
 
-/// How much a sampling has to allow for.
+/// Grade of a sampling: the kind of bone for which it suffices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grade {
-    /// What most bones need.
+    /// Sufficient for most bones.
     Quick,
-    /// The same with no frequency thinned out and no slow wave left out: what a bone needs whose first
-    /// arrival is small against the waves that come later.
+    /// The same without thinning of frequencies and without leaving out slow waves: for bones whose
+    /// first arrival is small compared to the later waves.
     Plain,
-    /// What a bone needs whose first arrival is weak or slow, or lies close to later ones: twice
-    /// the band, and period and length that take in the whole window before the direct wave.
+    /// For bones whose first arrival is weak or slow, or close to later ones: twice the band, and a
+    /// period and length that include the whole window before the direct wave.
     Thorough,
 }
 
@@ -105,7 +107,7 @@ pub struct Sampling {
     pub frequency_step: f64,
     /// α, 1/s.
     pub damping: f64,
-    /// Highest frequency of a first look, Hz.
+    /// Highest frequency of the first pass, Hz.
     pub first_band: f64,
     /// Highest frequency, Hz.
     pub band: f64,
@@ -118,31 +120,31 @@ pub struct Sampling {
     /// Whether reflections of the marrow's outer face can arrive inside a window.
     pub lower_echoes: bool,
     sound_speed: f64,
-    /// What stands for the centre frequency where the top of the band is sampled more coarsely, Hz;
-    /// infinite where it is not.
+    /// Frequency that replaces the centre frequency where the top of the band is sampled more
+    /// coarsely, Hz; infinite if it is not.
     unit: f64,
 }
 
-/// The quick sampling of a setup at the usual speeds of bone.
+/// Returns the quick sampling of a setup at the usual speeds of bone.
 pub fn nominal(setup: &Setup) -> Sampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
     let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
     Sampling::at_rung(setup, rung, first_grade(setup))
 }
 
-/// How finely the exact method samples the waves of the usual bone.
+/// The exact method's sampling for the waves of the usual bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NominalSampling {
     /// Highest frequency, Hz.
     pub band: f64,
     /// Period, s.
     pub period: f64,
-    /// Number of (frequency, wavenumber) pairs.
+    /// Returns the number of (frequency, wavenumber) pairs.
     pub pairs: u64,
 }
 
 impl NominalSampling {
-    /// Of a setup; `None` of other methods than the exact one.
+    /// Returns the sampling of a setup; `None` for methods other than the exact one.
     pub fn of(setup: &Setup) -> Option<Self> {
         (setup.solver.method == Method::Exact).then(|| {
             let sampling = nominal(setup);
@@ -152,22 +154,22 @@ impl NominalSampling {
     }
 }
 
-/// The grade that a bone is first computed with.
+/// Returns the grade with which a bone is first computed.
 ///
-/// Above refinement 1 there is one grade only.
+/// Above refinement 1 there is only one grade.
 pub fn first_grade(setup: &Setup) -> Grade {
     if setup.solver.refinement > 1.0 { Grade::Thorough } else { Grade::Quick }
 }
 
-/// Number of (frequency, wavenumber) pairs of one realization that a first look is enough for, at the
-/// usual speeds of bone.
+/// Returns the number of (frequency, wavenumber) pairs of one realization for which the first pass
+/// is sufficient, at the usual speeds of bone.
 pub fn pair_count(setup: &Setup) -> f64 {
     let sampling = nominal(setup);
     sampling.pairs(sampling.first_band)
 }
 
-/// The lowest rung whose speed is at least `speed` (m/s); `None` above the ladder, or if `speed`
-/// is not finite.
+/// Returns the lowest rung whose speed is at least `speed` (m/s); `None` above the highest rung, or
+/// if `speed` is not finite.
 pub fn rung(setup: &Setup, speed: f64) -> Option<usize> {
     let mut top = first_rung(setup);
     for rung in 0..RUNGS {
@@ -179,22 +181,23 @@ pub fn rung(setup: &Setup, speed: f64) -> Option<usize> {
     None
 }
 
-/// How near the upper edge of its rung a speed (m/s) is: 0 up to shortly below it, 1 at the edge,
-/// linear between. What is computed at two rungs differs by a little; there both count.
+/// Returns how near a speed (m/s) is to the upper edge of its rung: 0 up to shortly below the edge,
+/// 1 at the edge, linear between. The results of two neighbouring rungs differ slightly; near the
+/// edge they are blended.
 pub fn nearness_to_next(setup: &Setup, rung: usize, speed: f64) -> f64 {
     let edge = rung_speed(setup, rung);
     ((speed / edge - (1.0 - RUNG_OVERLAP)) / RUNG_OVERLAP).clamp(0.0, 1.0)
 }
 
-/// Highest speed of a rung, m/s.
+/// Returns the highest speed of a rung, m/s.
 pub fn rung_speed(setup: &Setup, rung: usize) -> f64 {
     (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO)
 }
 
-/// Earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels along the
-/// bone at `speed` (m/s) and through the coupling fluid at its ends.
+/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
+/// along the bone at `speed` (m/s) and through the coupling fluid at its ends.
 ///
-/// A lower bound at every distance: within the critical one the reflected wave comes later.
+/// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
 pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
     let c1 = setup.layers.coupling.sound_speed;
     let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
@@ -204,30 +207,33 @@ pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
     x / speed + heights * slowness(c1, speed)
 }
 
-/// Arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
+/// Returns the arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
 pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
     let across = setup.probe.receivers.x3 - setup.probe.source.x3;
     x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
 }
 
-/// Arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper face.
+/// Returns the arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper
+/// face.
 fn reflected_arrival(setup: &Setup, x: f64) -> f64 {
     let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
     x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
 }
 
-/// Horizontal distances of the receivers from the source, m.
+/// Returns the horizontal distances of the receivers from the source, m.
 pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
     setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
 }
 
 impl Sampling {
-    /// The sampling that picks velocities of bones whose waves are no faster than the rung's speed.
+    /// Returns the sampling for picking velocities of bones whose waves are no faster than the
+    /// rung's speed.
     pub fn at_rung(setup: &Setup, rung: usize, grade: Grade) -> Self {
         let speed = rung_speed(setup, rung);
         let fc = setup.probe.center_frequency;
-        // In periods: length of the reflected wave; how late after the earliest possible arrival a
-        // picked extremum is provided for, and how late a repeated source may be heard.
+        // All in periods: length of the reflected wave; latest time of a picked extremum after the
+        // earliest possible arrival; latest time for which the wave of a repeated source must be
+        // kept out.
         let (reflected_length, latest_pick, latest_source) = match grade {
             Grade::Quick | Grade::Plain => (1.0, 1.4, 1.4),
             Grade::Thorough => (4.0, 2.5, f64::INFINITY),
@@ -247,8 +253,8 @@ impl Sampling {
         Self::new(setup, grade, speed, longest, last)
     }
 
-    /// The sampling for traces from 0 to `duration` (s) of bones whose waves are no faster than
-    /// `speed` (m/s).
+    /// Returns the sampling for traces from 0 to `duration` (s) of bones whose waves are no faster
+    /// than `speed` (m/s).
     pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let period = TRACE_MARGIN * duration;
@@ -296,41 +302,42 @@ impl Sampling {
         }
     }
 
-    /// Number of frequencies below the band's end, n = 0 … this - 1; [`Sampling::runs`] says which
-    /// of them are computed.
+    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`Sampling::runs`]
+    /// lists those that are computed.
     pub fn frequencies(&self) -> usize {
         // The taper vanishes at the band's end.
         (self.band * self.period).ceil() as usize
     }
 
-    /// Angular frequency of sample `n`, rad/s.
+    /// Returns the angular frequency of sample `n`, rad/s.
     pub fn angular_frequency(&self, n: usize) -> f64 {
         n as f64 * self.frequency_step
     }
 
-    /// Number of wavenumbers at frequency `n`, m = 0 … this - 1: a multiple of [`RUN`].
+    /// Returns the number of wavenumbers at frequency `n`, m = 0 … this - 1: a multiple of [`RUN`].
     pub fn wavenumbers(&self, n: usize) -> usize {
         ((self.fading(n).1 / self.wavenumber_step) as usize + 1).next_multiple_of(RUN)
     }
 
-    /// Smooth weight of wavenumber `k` (rad/m) at frequency `n`: 1 except where slow waves are left
-    /// out.
+    /// Returns the smooth weight of wavenumber `k` (rad/m) at frequency `n`: 1 except where slow
+    /// waves are left out.
     pub fn wavenumber_weight(&self, n: usize, k: f64) -> f64 {
         let (start, end) = self.fading(n);
         if start < end { smooth_step((end - k) / (end - start)) } else { 1.0 }
     }
 
-    /// Smooth weight of frequency `n` that cuts the band: 1 up to `start` Hz, 0 from `end` Hz on.
+    /// Returns the smooth weight of frequency `n` that cuts the band: 1 up to `start` Hz, 0 from
+    /// `end` Hz on.
     pub fn taper(&self, n: usize, (start, end): (f64, f64)) -> f64 {
         smooth_step((end - n as f64 / self.period) / (end - start))
     }
 
-    /// Whether frequency `n` counts in a signal whose band is cut by a taper.
+    /// Returns whether frequency `n` contributes to a signal whose band is cut by a taper.
     pub fn is_within(&self, n: usize, taper: (f64, f64)) -> bool {
         self.share(n) > 0.0 && self.taper(n, taper) > TAPER_MIN
     }
 
-    /// Wavenumbers, rad/m, at which the sum at frequency `n` begins to fade and ends.
+    /// Returns the wavenumbers, rad/m, at which the sum at frequency `n` begins to fade and ends.
     fn fading(&self, n: usize) -> (f64, f64) {
         let omega = self.angular_frequency(n);
         let all = self.last_wavenumber(omega);
@@ -350,14 +357,14 @@ impl Sampling {
         (limit * (1.0 - (1.0 - start / end) * fade), limit)
     }
 
-    /// Where g (x3 + x3S) has damped the integrand away, rad/m.
+    /// Returns the wavenumber at which g (x3 + x3S) has damped the integrand away, rad/m.
     fn last_wavenumber(&self, omega: f64) -> f64 {
         let propagating = omega / self.sound_speed;
         propagating.mul_add(propagating, self.evanescent_limit * self.evanescent_limit).sqrt()
     }
 
-    /// Number of (frequency, wavenumber) pairs up to `band` (Hz), estimated from above, without a loop
-    /// over frequencies, when there are very many.
+    /// Returns the number of (frequency, wavenumber) pairs up to `band` (Hz). If there are very
+    /// many, it is estimated from above without a loop over frequencies.
     pub fn pairs(&self, band: f64) -> f64 {
         let frequencies = band * self.period;
         let highest = 2.0 * PI * band / self.sound_speed;
@@ -374,7 +381,7 @@ impl Sampling {
     }
 }
 
-/// Highest frequencies of the first look, and at all, over the centre frequency.
+/// Highest frequencies of the first pass, and overall, as multiples of the centre frequency.
 fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> (f64, f64) {
     let wide = (10.5 * thinness).min(24.0);
     match grade {
@@ -384,19 +391,19 @@ fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> (f64, f64) {
     }
 }
 
-/// The taper that cuts a velocity's band, given where it ends: start and end, Hz.
+/// Returns the taper that cuts a velocity's band, given its end: start and end, Hz.
 pub fn velocity_taper(band: f64) -> (f64, f64) {
     (TAPER_START * band, band)
 }
 
-/// The taper that cuts a trace's band, given where it ends: start and end, Hz.
+/// Returns the taper that cuts a trace's band, given its end: start and end, Hz.
 pub fn trace_taper(band: f64) -> (f64, f64) {
     (TRACE_TAPER_START * band, band)
 }
 
-/// How much higher in the band than usual the first packet comes apart from slower waves, at the
-/// nearest receiver: there the signals of both, cut off sharply in one of time and slowness, would
-/// overlap.
+/// Returns how much higher in the band than usual the first packet separates from slower waves, at
+/// the nearest receiver: below that, the signals of both would overlap if they were cut off sharply
+/// in time and slowness.
 fn crowding(setup: &Setup, speed: f64) -> f64 {
     let c1 = setup.layers.coupling.sound_speed;
     let start = SLOWNESS_START * c1 / speed;
@@ -406,42 +413,43 @@ fn crowding(setup: &Setup, speed: f64) -> f64 {
     }
     let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
     let nearest = distances(setup).fold(f64::INFINITY, f64::min);
-    // Slowness over that of the fluid, along and across.
+    // Slowness relative to that of the fluid, along and across.
     let across = |along: f64| (1.0 - along * along).sqrt();
     let apart = nearest * (end - start) - heights * (across(start) - across(end));
     let periods = apart / c1 * setup.probe.center_frequency;
     if periods > 0.0 { (APART / periods).max(1.0) } else { f64::INFINITY }
 }
 
-/// How much wider the band has to be than that of a thick plate.
+/// Returns how much wider the band must be than that of a thick plate.
 fn thinness(setup: &Setup) -> f64 {
     let product = setup.layers.bone_thickness * setup.probe.center_frequency;
     libm::pow((THIN_PLATE / product).max(1.0), THIN_PLATE_POWER).min(THIN_PLATE_MAX)
 }
 
-/// Speed of the lowest rung, m/s: waves no faster than the coupling fluid never come first.
+/// Speed of the lowest rung, m/s: waves no faster than the coupling fluid never arrive first.
 fn first_rung(setup: &Setup) -> f64 {
     setup.layers.coupling.sound_speed * RUNG_RATIO
 }
 
-/// √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at `v`.
+/// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
+/// `v`.
 pub fn slowness(c: f64, v: f64) -> f64 {
     (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
 }
 
-/// Height in fluid 1, m, that the first head wave by way of the outer face crosses.
+/// Returns the height in fluid 1, m, that the first head wave by way of the outer face crosses.
 fn upper_echo_path(setup: &Setup) -> f64 {
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
     2.0 * setup.layers.coupling.thickness - (receivers - source).abs()
 }
 
-/// Whether a head wave that crosses `path` (m) of fluid of sound speed `c` arrives before the
-/// direct wave at some receiver.
+/// Returns whether a head wave that crosses `path` (m) of fluid of sound speed `c` arrives before
+/// the direct wave at some receiver.
 fn echoes(setup: &Setup, speed: f64, path: f64, c: f64) -> bool {
     distances(setup).any(|x| x / speed + path * slowness(c, speed) <= direct_arrival(setup, x))
 }
 
-/// Whether a head wave by way of the marrow's outer face can arrive before the direct wave.
+/// Returns whether a head wave by way of the marrow's outer face can arrive before the direct wave.
 fn lower_echoes(setup: &Setup, speed: f64) -> bool {
     let marrow = &setup.layers.marrow;
     let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
@@ -452,7 +460,7 @@ fn lower_echoes(setup: &Setup, speed: f64) -> bool {
 mod tests {
     use super::*;
 
-    /// The paper's geometry with changes.
+    /// Returns the paper's geometry with changes.
     fn setup(change: impl Fn(&mut Setup)) -> Setup {
         let mut setup = Setup::default();
         change(&mut setup);
@@ -476,7 +484,7 @@ mod tests {
     fn arrivals_at_the_papers_probe() {
         let setup = Setup::default();
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-8, "{a} against {b}");
-        // Worked out by hand: 11 mm / 3960.1 m/s + 4 mm · √(1/1500² - 1/3960.1²).
+        // Computed by hand: 11 mm / 3960.1 m/s + 4 mm · √(1/1500² - 1/3960.1²).
         close(earliest_arrival(&setup, 11e-3, 3960.1), 2.7777e-6 + 2.4680e-6);
         close(direct_arrival(&setup, 21.4e-3), 14.2667e-6);
         // No wave along a slow bone overtakes the reflection from its face.

@@ -1,9 +1,9 @@
-//! How a velocity is picked, and how the waves are computed.
+//! Settings of picking and of the wave solver.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which extremum of the first arriving packet gives the time of flight.
+/// The extremum of the first arriving packet that gives the time of flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Extremum {
@@ -15,10 +15,10 @@ pub enum Extremum {
 }
 
 impl Extremum {
-    /// Every criterion, in the order of a user's file.
+    /// All criteria, in the order of a user's file.
     pub const ALL: [Self; 2] = [Self::First, Self::Second];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::First => "first",
@@ -30,9 +30,9 @@ impl Extremum {
 /// The criterion of the first arriving signal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Picking {
-    /// Which extremum of the packet.
+    /// The extremum of the packet.
     pub extremum: Extremum,
-    /// An extremum opens the packet when its ratio to the packet's peak, in the median over the
+    /// An extremum opens the packet if its ratio to the packet's peak, in the median over the
     /// receivers, is above this threshold; 0 < threshold < 1.
     pub threshold: f64,
 }
@@ -43,22 +43,22 @@ impl Default for Picking {
     }
 }
 
-/// How the transient waves are computed.
+/// Method of computing the transient waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Exact layers in (frequency, wavenumber).
+    /// Exact layers in the (frequency, wavenumber) domain.
     #[default]
     Exact,
-    /// The paper's: Fourier in x1, spectral elements in x3, time steps.
+    /// The paper's method: Fourier in x1, spectral elements in x3, time steps.
     Hybrid,
 }
 
 impl Method {
-    /// Every method, in the order of a user's file.
+    /// All methods, in the order of a user's file.
     pub const ALL: [Self; 2] = [Self::Exact, Self::Hybrid];
 
-    /// Name in files and messages.
+    /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
@@ -72,17 +72,16 @@ impl Method {
 pub struct SolverSettings {
     /// The method.
     pub method: Method,
-    /// 0.5 to 16: larger is more accurate and slower. Of the hybrid method, it divides element
-    /// size and time step by its square root.
+    /// 0.5 to 16: larger is more accurate and slower. For the hybrid method, its square root
+    /// divides element size and time step.
     pub refinement: f64,
-    /// Largest element of the hybrid method along x3 at refinement 1, m, 1e-6 to 1e-2. The default
-    /// under any other method.
+    /// Largest element of the hybrid method along x3 at refinement 1, m, 1e-6 to 1e-2. Other
+    /// methods have the default.
     pub element_size: f64,
-    /// Polynomial degree of the hybrid method's elements, 2 to 12. The default under any other
-    /// method.
+    /// Polynomial degree of the hybrid method's elements, 2 to 12. Other methods have the default.
     pub element_order: u32,
-    /// Time step of the hybrid method's first pass at refinement 1, s, above 0; `None`: chosen from the
-    /// stability limit. `None` under any other method.
+    /// Time step of the hybrid method's first pass at refinement 1, s, above 0; `None`: chosen from
+    /// the stability limit. Other methods have `None`.
     pub time_step: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! `[layers]`, `[probe]`, `[picking]` and `[solver]`: what case and job files share.
+//! `[layers]`, `[probe]`, `[picking]` and `[solver]`: the sections that case and job files share.
 
 use crate::case::Setup;
 use crate::check::{self, ELEMENT_ORDER, RECEIVERS};
@@ -7,7 +7,7 @@ use crate::probe::{Probe, Receivers, Source};
 use crate::reader::{Choice, Reader, Table};
 use crate::settings::{Extremum, Method, Picking, SolverSettings};
 
-/// The setup that `root` describes, with defaults where it is silent or wrong.
+/// Reads the setup in `root`; missing or wrong values are replaced by defaults.
 pub(crate) fn read(reader: &mut Reader, root: &Table<'_>) -> Setup {
     Setup {
         layers: layers(reader, root),
@@ -88,7 +88,7 @@ fn solver(reader: &mut Reader, root: &Table<'_>) -> SolverSettings {
     let method = chosen.unwrap_or(default.method);
     let refinement = reader.number(&table, "refinement").unwrap_or(default.refinement);
     if method != Method::Hybrid {
-        // Of a method that could not be read, nobody knows what belongs to it.
+        // If the method cannot be read, it cannot be decided which keys belong to it.
         if chosen.is_some() || !table.has("method") {
             for key in check::HYBRID_KEYS.into_iter().filter(|key| table.has(key)) {
                 reader.violations.add(table.path(key), check::of_hybrid_only(method));

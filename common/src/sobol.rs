@@ -1,11 +1,12 @@
 //! Scrambled Sobol' points for the germs.
 //!
-//! The sequence of I. M. Sobol' (USSR Comput. Math. Math. Phys. 7 (1967)) with the direction numbers
-//! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654), of which the first 21
-//! dimensions are used. A scramble multiplies the digits of each coordinate by a random lower
+//! The sequence of I. M. Sobol' (USSR Comput. Math. Math. Phys. 7 (1967)) with the direction
+//! numbers of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654), of which the first
+//! 21 dimensions are used. A scramble multiplies the digits of each coordinate by a random lower
 //! triangular matrix with a unit diagonal and adds a random shift (J. Matoušek, J. Complexity 14
-//! (1998), 527-556): every point is then uniform in the cube, every scramble is as evenly spread as
-//! the sequence itself, and independent scrambles tell the error of their mean.
+//! (1998), 527-556). Every point is then uniform in the cube, every scramble is as evenly
+//! distributed as the sequence itself, and independent scrambles allow the error of their mean to
+//! be estimated.
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -16,7 +17,7 @@ use crate::ensemble::GERMS;
 const INDEX_DIGITS: usize = 24;
 /// Binary digits of a coordinate.
 const DIGITS: usize = 64;
-/// Bytes 8 to 12 of the key, so that no stream of independent germs is a scramble's.
+/// Bytes 8 to 12 of the key, so that no stream of independent germs equals that of a scramble.
 const KEY_MARK: [u8; 5] = *b"sobol";
 
 /// Primitive polynomials and initial direction numbers of dimensions 2 to 21: the degree, the inner
@@ -44,26 +45,27 @@ const DIRECTIONS: [(u32, u32, &[u32]); GERMS - 1] = [
     (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
 ];
 
-/// The germ, numbered by rows of L_G, that each dimension of the sequence drives: the earlier a
-/// dimension, the better its points are spread, and 11, 55, 33, 23, 22, 13, 12 move the velocity
-/// most, in this order; the rest follow by rows.
+/// The germ, numbered by rows of L_G, for which each dimension of the sequence is used. The earlier
+/// a dimension, the more evenly its points are distributed, and 11, 55, 33, 23, 22, 13, 12
+/// influence the velocity most, in this order; the rest follow by rows.
 const GERM_OF_DIMENSION: [usize; GERMS] =
     [0, 18, 11, 7, 6, 2, 1, 3, 4, 5, 8, 9, 10, 12, 13, 14, 15, 16, 17, 19, 20];
 
 /// One scramble of the sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scramble {
-    /// For each dimension, what each digit of the index adds (exclusive or).
+    /// For each dimension, the contribution of each digit of the index (exclusive or).
     columns: [[u64; INDEX_DIGITS]; GERMS],
     shift: [u64; GERMS],
 }
 
 impl Scramble {
-    /// Scramble `number` of the job with this seed.
+    /// Creates scramble `number` of the job with this seed.
     ///
-    /// ChaCha20, the seed in bytes 0-7 of the key (little-endian), "sobol" in bytes 8-12, the number
-    /// as stream. For each dimension 63 words, of which word i-1 gives row i of the matrix left of
-    /// the diagonal by its highest i bits, then one word of shift; the first digit is the highest bit.
+    /// ChaCha20, the seed in bytes 0-7 of the key (little-endian), "sobol" in bytes 8-12, the
+    /// number as stream. For each dimension 63 words, of which word i-1 gives row i of the matrix
+    /// left of the diagonal by its highest i bits, then one word of shift; the first digit is the
+    /// highest bit.
     pub(crate) fn new(seed: u64, number: u64) -> Self {
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
@@ -83,8 +85,8 @@ impl Scramble {
         scramble
     }
 
-    /// Coordinates of point `index`, below 2²⁴, of which each digit is a fair coin; in the order of
-    /// the germs.
+    /// Returns the coordinates of point `index`, below 2²⁴, in the order of the germs. Each of
+    /// their digits is 0 or 1 with probability ½.
     pub(crate) fn point(&self, index: u64) -> [u64; GERMS] {
         let mut point = [0; GERMS];
         for (dimension, &germ) in GERM_OF_DIMENSION.iter().enumerate() {
@@ -93,7 +95,7 @@ impl Scramble {
         point
     }
 
-    /// The coordinate of germ 11 alone, the first in either order.
+    /// Returns the coordinate of germ 11 alone, which is the first in both orders.
     pub(crate) fn first(&self, index: u64) -> u64 {
         self.coordinate(0, index)
     }
@@ -108,7 +110,7 @@ impl Scramble {
     }
 }
 
-/// Direction numbers of a dimension, the first digit in the highest bit.
+/// Returns the direction numbers of a dimension, with the first digit in the highest bit.
 fn directions(dimension: usize) -> [u64; INDEX_DIGITS] {
     let first = |m: u64, column: usize| m << (DIGITS - 1 - column);
     let Some((degree, inner, initial)) =
@@ -135,7 +137,7 @@ fn directions(dimension: usize) -> [u64; INDEX_DIGITS] {
     columns
 }
 
-/// The product of a matrix of bits, by rows, with a vector of digits.
+/// Returns the product of a bit matrix, by rows, with a vector of digits.
 fn product(rows: &[u64; DIGITS], digits: u64) -> u64 {
     rows.iter().fold(0, |product, row| (product << 1) | u64::from((row & digits).count_ones() & 1))
 }
@@ -144,7 +146,7 @@ fn product(rows: &[u64; DIGITS], digits: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// Joe and Kuo's own first points, without scramble; dimensions 1 to 5.
+    /// Compares with Joe and Kuo's own first points, without scramble; dimensions 1 to 5.
     #[test]
     fn the_sequence_is_sobols() {
         let point = |index: usize| {
@@ -177,7 +179,7 @@ mod tests {
         assert_eq!(germs, std::array::from_fn(|germ| germ));
     }
 
-    /// 2ᵏ points that begin at a multiple of 2ᵏ: one in each of 2ᵏ equal intervals, in every
+    /// Of 2ᵏ points that begin at a multiple of 2ᵏ, one is in each of 2ᵏ equal intervals, in every
     /// dimension and every scramble.
     #[test]
     fn every_coordinate_is_stratified() {

@@ -1,7 +1,7 @@
 //! Quantile functions of the standard normal and of the gamma law, on `libm` alone: the same bits
 //! on every platform.
 //!
-//! They turn uniform germs into the entries of the random matrix by the inverse distribution
+//! They transform uniform germs into the entries of the random matrix by the inverse distribution
 //! function, so that a realization is a continuous function of the parameters of its law.
 
 mod gamma;

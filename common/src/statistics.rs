@@ -1,8 +1,8 @@
 //! Moments of a set of velocities, their standard errors, and the cost of a point.
 //!
-//! Every sum runs over the index order with Neumaier's compensation, or adds neighbours in pairs:
-//! its bits depend on the values in their order alone, and its rounding error hardly grows with
-//! their number.
+//! Every sum runs in index order with Neumaier's compensation, or adds neighbours in pairs: its
+//! bits depend only on the values in their order, and its rounding error hardly grows with their
+//! number.
 
 mod blocks;
 mod central;
@@ -25,16 +25,17 @@ pub use self::failure_bias::failure_bias;
 pub use self::likelihood::{likelihood_cost, likelihood_error};
 pub(crate) use self::sum::Sum;
 
-/// Mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no velocity.
+/// Returns mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no
+/// velocity.
 ///
-/// Two passes: the mean first, then the deviations from it, so that nothing cancels. The variance
-/// is that of the set (division by N, as in the paper).
+/// Two passes, first the mean and then the deviations from it, avoid cancellation. The variance is
+/// that of the set (division by N, as in the paper).
 pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
 }
 
 impl Data {
-    /// Moments of a set, by its number; NaN where there is none.
+    /// Returns the moments of a set, by its number; NaN if there is no such set.
     pub fn moments(&self, set: usize) -> Moments {
         if let Self::Moments { mean, coefficient_of_variation } = *self {
             return Moments { mean, coefficient_of_variation };
@@ -43,10 +44,10 @@ impl Data {
     }
 }
 
-/// Covariance of the logarithms of mean and coefficient of variation of independent velocities, by
-/// the delta method, or `None` for fewer than two different ones.
+/// Returns the covariance of the logarithms of mean and coefficient of variation of independent
+/// velocities, by the delta method, or `None` if there are no two different ones.
 ///
-/// That of the mean of their influences, with division by N - 1.
+/// It is the covariance of the mean of their influences, with division by N - 1.
 pub fn covariance_of_logarithms(velocities: &[f64]) -> Option<[[f64; 2]; 2]> {
     let central = central(velocities.iter().copied()).filter(Central::scatters)?;
     let moments = central.moments();
@@ -65,23 +66,23 @@ pub fn covariance_of_logarithms(velocities: &[f64]) -> Option<[[f64; 2]; 2]> {
     Some([[mean, both], [both, variation]])
 }
 
-/// Moments over the successes of an evaluation at `point` with their standard errors, or `None` if
-/// every realization failed.
+/// Returns the moments over the successes of an evaluation at `point` with their standard errors,
+/// or `None` if every realization failed.
 ///
-/// They are those of the velocities, or, where `monte_carlo` asks for the control variate and no
-/// realization failed, those that the regression on √(c1111/ρ) gives.
+/// They are the moments of the velocities, or, if `monte_carlo` requests the control variate and no
+/// realization failed, those of the regression on √(c1111/ρ).
 ///
-/// Standard errors of independent germs: with N successes, s² their variance with division by N - 1,
-/// m₂, m₃, m₄ their central moments and Δ = √m₂ / v, that of the mean is s/√N, and that of Δ is by
-/// the delta method, without the assumption of a normal law,
+/// Standard errors for independent germs: with N successes, s² their variance with division by N -
+/// 1, m₂, m₃, m₄ their central moments and Δ = √m₂ / v, that of the mean is s/√N, and that of Δ is
+/// by the delta method, without the assumption of a normal law,
 ///
 /// Δ/√N · √((m₄/m₂² - 1)/4 - Δ m₃/m₂^(3/2) + Δ²).
 ///
-/// Of Sobol' points they come from the scatter of parts of the sample: of its scrambles, or, if there
-/// is only one, of its blocks of consecutive points.
+/// For Sobol' points they come from the scatter of parts of the sample: of its scrambles, or, if
+/// there is only one, of its blocks of consecutive points.
 ///
-/// It takes at least two different velocities to know an error: with one, both errors are NaN
-/// (unknown); with several equal ones, both are 0, and so is Δ.
+/// An error can be estimated only from at least two different velocities: with one velocity, both
+/// errors are NaN (unknown); with several equal ones, both are 0, and so is Δ.
 pub fn estimate(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Option<Estimate> {
     let sample = Sample::of(monte_carlo, point, outcomes)?;
     Some(Estimate {
@@ -91,7 +92,7 @@ pub fn estimate(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -
     })
 }
 
-/// The paper's cost: (v_exp - v_mod)²/v_exp² + (Δ_exp - Δ_mod)²/Δ_exp².
+/// Returns the paper's cost: (v_exp - v_mod)²/v_exp² + (Δ_exp - Δ_mod)²/Δ_exp².
 pub fn cost(data: Moments, model: Moments) -> f64 {
     let mean = (data.mean - model.mean) / data.mean;
     let variation = (data.coefficient_of_variation - model.coefficient_of_variation)
@@ -99,18 +100,19 @@ pub fn cost(data: Moments, model: Moments) -> f64 {
     mean * mean + variation * variation
 }
 
-/// What one complete evaluation says about its point.
+/// Moments and feasibility of a point, computed from one complete evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
     /// Moments over the successes, unless there are none.
     pub moments: Option<Moments>,
-    /// Whether the failures stay within the accepted fraction and some realization succeeded.
+    /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
     pub feasible: bool,
 }
 
 impl Verdict {
-    /// The verdict on the outcomes of every index of an evaluation at `point`: feasible when at
-    /// least one realization succeeded and at most `max_failed_fraction` of all failed.
+    /// Computes moments and feasibility from the outcomes of every index of an evaluation at
+    /// `point`. It is feasible if at least one realization succeeded and at most
+    /// `max_failed_fraction` of all failed.
     pub fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Self {
         let failed = outcomes.iter().filter(|outcome| outcome.is_err()).count();
         let moments = Sample::of(monte_carlo, point, outcomes).map(|sample| sample.moments());
@@ -118,7 +120,7 @@ impl Verdict {
         Self { moments, feasible: moments.is_some() && within }
     }
 
-    /// The cost against the data's moments: infinite at an infeasible point, never NaN.
+    /// Returns the cost against the data's moments: infinite at an infeasible point, never NaN.
     pub fn cost(&self, data: Moments) -> f64 {
         match self.moments {
             Some(model) if self.feasible => {
@@ -130,7 +132,7 @@ impl Verdict {
     }
 }
 
-/// The outcomes of an evaluation, and what was made of them.
+/// The outcomes of an evaluation, with the quantities derived from them.
 struct Sample<'a> {
     outcomes: &'a [Outcome],
     central: Central,
@@ -162,8 +164,8 @@ impl<'a> Sample<'a> {
         }
     }
 
-    /// What each realization adds to N times mean and coefficient of variation, to first order, in
-    /// index order; nothing where it failed.
+    /// Returns the influence of each realization on N times mean and coefficient of variation, to
+    /// first order, in index order; zero for failed realizations.
     fn influences(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
         let influence = |outcome: &Outcome| match outcome {
             Ok(velocity) => self.central.influence(*velocity),
@@ -228,7 +230,7 @@ mod tests {
         let estimate = plain(&with).unwrap();
         close(estimate.moments.mean, 4.0);
         close(estimate.moments.coefficient_of_variation, 0.25);
-        // s = √2; of a symmetric two-point law m₄ = m₂² and m₃ = 0: Δ/√N · Δ.
+        // s = √2; for a symmetric two-point law m₄ = m₂² and m₃ = 0: Δ/√N · Δ.
         close(estimate.standard_error.mean, 1.0);
         close(estimate.standard_error.coefficient_of_variation, 0.25 * 0.25 / 2.0_f64.sqrt());
         assert_eq!(plain(&[Err(FailureKind::NoArrival)]), None);
@@ -246,8 +248,8 @@ mod tests {
         assert_eq!(equal.standard_error, zero);
     }
 
-    /// The scatter of many samples of the exponential law (skewness 2, kurtosis 9) against the
-    /// standard errors of each. The formula for a normal law would be 22 % off.
+    /// Compares the scatter of many samples of the exponential law (skewness 2, kurtosis 9) with
+    /// the standard errors of each. The formula for a normal law would be 22 % off.
     #[test]
     fn standard_errors_are_those_of_a_skewed_law() {
         let seed = 6;

@@ -1,5 +1,5 @@
-//! Canonical TOML of cases and jobs: every key with its value, shortest decimals that read back
-//! to the same bits.
+//! Canonical TOML of cases and jobs: every key with its value, in the shortest decimals that read
+//! back to the same bits.
 
 use std::fmt::{self, Write as _};
 
@@ -10,13 +10,13 @@ use crate::layers::Fluid;
 use crate::parameters::Parameter;
 use crate::settings::{Method, SolverSettings};
 
-/// Velocities on one line of an inlined data set.
+/// Number of velocities per line of an inlined data set.
 const VELOCITIES_PER_LINE: usize = 6;
 
-/// The complete case file of `case`, with `mandel`.
+/// Returns the complete case file of `case`, with `mandel`.
 ///
-/// Reading it gives `case` back to the bit, if it passes [`crate::check::setup`] and its density
-/// is finite and above 0.
+/// Reading it gives `case` back to the bit, if it passes [`crate::check::setup`] and its density is
+/// finite and above 0.
 pub fn case(case: &Case) -> String {
     written(|out| {
         setup(out, &case.setup)?;
@@ -25,7 +25,7 @@ pub fn case(case: &Case) -> String {
     })
 }
 
-/// The complete job file of `specification`, defaults filled in and data inlined.
+/// Returns the complete job file of `specification`, with defaults filled in and data inlined.
 ///
 /// Reading it as the same kind of job gives `specification` back to the bit, if it passes
 /// [`JobSpecification::check`].
@@ -44,7 +44,7 @@ pub fn job(specification: &JobSpecification) -> String {
 
 fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
     let mut out = String::new();
-    // Writing to a string only fails when a value's own formatting does, and none here does.
+    // Writing to a string fails only if a value's own formatting does, and none here does.
     let _infallible = write(&mut out);
     out
 }
@@ -127,7 +127,7 @@ fn velocities(out: &mut String, key: &str, velocities: &[f64]) -> fmt::Result {
     writeln!(out, "]")
 }
 
-/// A name as a key; it holds no control characters.
+/// Returns a name as a quoted key; it contains no control characters.
 fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }

@@ -1,8 +1,9 @@
-//! Files that a user names: opened without waiting, refused unless they are regular files, read
-//! within a bound.
+//! Files that a user names: opened without blocking, refused unless they are regular files, and
+//! read within a size limit.
 //!
-//! A named pipe would keep the program waiting for somebody who writes, a device may never end. Where
-//! a pipe is of use, as for a secret that shall not be on a disk, its reader must bound the time.
+//! A named pipe would block the program until somebody writes to it, and a device may never end.
+//! Where a pipe is useful, as for a secret that should not be on a disk, its reader must limit the
+//! time.
 
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, Read as _};
@@ -12,60 +13,61 @@ use std::path::Path;
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-/// What stands at a path is no regular file; the payload of an [`io::Error`].
+/// The path does not denote a regular file; used as the payload of an [`io::Error`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("it is {kind}, and must be a regular file")]
 pub struct NotRegular {
-    /// What it is.
+    /// Kind of the file.
     pub kind: &'static str,
 }
 
-/// Opens the regular file at `path`, or that a link there leads to, for reading.
+/// Opens the regular file at `path`, or the one that a link there leads to, for reading.
 ///
 /// # Errors
-/// What the operating system says, or [`NotRegular`].
+/// The operating system's error, or [`NotRegular`].
 pub fn open(path: &Path) -> io::Result<File> {
     open_with(OpenOptions::new().read(true), path)
 }
 
-/// Makes an empty file at `path` for writing, or empties the regular file that is there.
+/// Creates an empty file at `path` for writing, or empties the regular file that exists there.
 ///
 /// # Errors
-/// As [`open`].
+/// Same as [`open`].
 pub fn create(path: &Path) -> io::Result<File> {
     let file = open_with(OpenOptions::new().write(true).create(true).truncate(false), path)?;
     file.set_len(0)?;
     Ok(file)
 }
 
-/// Opens the regular file at `path` with `options`, which must not truncate: what it is is known
-/// only when it is open.
+/// Opens the regular file at `path` with `options`, which must not truncate, because the kind of
+/// the file is known only after it is open.
 ///
 /// # Errors
-/// As [`open`].
+/// Same as [`open`].
 pub fn open_with(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let (kind, opened) = open_any(options, path)?;
     if kind.is_file() { opened } else { Err(not_regular(kind)) }
 }
 
-/// Opens the regular file or the pipe at `path` for reading. Reading from it never blocks;
-/// a pipe that nobody has opened for writing seems to be at its end.
+/// Opens the regular file or the pipe at `path` for reading. Reading from it never blocks; a pipe
+/// that has not been opened for writing appears to be at its end.
 ///
 /// # Errors
-/// As [`open`].
+/// Same as [`open`].
 pub fn open_or_pipe(path: &Path) -> io::Result<File> {
     let (kind, opened) = open_any(OpenOptions::new().read(true), path)?;
     if kind.is_file() || kind.is_fifo() { opened } else { Err(not_regular(kind)) }
 }
 
-/// Opens whatever stands at `path`, if it can be opened, and says what it is.
+/// Opens the file of any kind at `path`, if it can be opened, and returns its kind.
 fn open_any(options: &mut OpenOptions, path: &Path) -> io::Result<(FileType, io::Result<File>)> {
-    // Neither has an effect on a regular file. A terminal must not become that of this process.
+    // Neither flag affects a regular file. A terminal must not become the controlling terminal of
+    // this process.
     let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
     let opened = options.custom_flags(flags.bits().cast_signed()).open(path);
     match opened {
         Ok(file) => Ok((file.metadata()?.file_type(), Ok(file))),
-        // Sockets cannot be opened, nor pipes for writing that nobody reads.
+        // Sockets cannot be opened, nor pipes for writing without a reader.
         Err(error) => match std::fs::metadata(path) {
             Ok(metadata) => Ok((metadata.file_type(), Err(error))),
             Err(_) => Err(error),
@@ -73,26 +75,26 @@ fn open_any(options: &mut OpenOptions, path: &Path) -> io::Result<(FileType, io:
     }
 }
 
-/// The bytes of the file at `path`; `None` if there are more than `bytes_max`, of which then none
-/// are read.
+/// Returns the bytes of the file at `path`; `None` if there are more than `bytes_max`, in which
+/// case none are read.
 ///
 /// # Errors
-/// As [`open`].
+/// Same as [`open`].
 pub fn read(path: &Path, bytes_max: u64) -> io::Result<Option<Vec<u8>>> {
     read_opened(&open(path)?, bytes_max)
 }
 
-/// As [`read`], of a file that is open.
+/// Same as [`read`], for an open file.
 ///
 /// # Errors
-/// What the operating system says.
+/// The operating system's error.
 pub fn read_opened(file: &File, bytes_max: u64) -> io::Result<Option<Vec<u8>>> {
     let length = file.metadata()?.len();
     if length > bytes_max {
         return Ok(None);
     }
     let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0).saturating_add(1));
-    // It may grow while it is read.
+    // The file may grow while it is read.
     file.take(bytes_max + 1).read_to_end(&mut bytes)?;
     Ok((bytes.len() as u64 <= bytes_max).then_some(bytes))
 }
@@ -148,7 +150,7 @@ mod tests {
         assert_eq!(std::fs::read(path("file")).unwrap(), b"");
     }
 
-    /// A pipe that somebody reads can be opened for writing.
+    /// A pipe with a reader can be opened for writing, but must be refused.
     #[test]
     fn a_pipe_with_a_reader_is_not_written() {
         let directory = tempfile::tempdir().unwrap();
@@ -163,7 +165,7 @@ mod tests {
     fn of_a_file_that_is_too_long_nothing_is_read() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("long");
-        // A terabyte, of which none is on the disk.
+        // A sparse file of a terabyte, which takes no space on the disk.
         File::create(&path).unwrap().set_len(1 << 40).unwrap();
         assert_eq!(read(&path, 1 << 39).unwrap(), None);
     }

@@ -1,8 +1,8 @@
 //! Measured velocities from a CSV file.
 //!
-//! The first line that is neither empty nor a comment (`#`) names the columns; `velocity` (m/s)
-//! is one of them, another one may name the group of each; others are not looked at. Fields may be
-//! quoted, but hold no line break.
+//! The first line that is neither empty nor a comment (`#`) names the columns; `velocity` (m/s) is
+//! one of them, another one may name the group of each velocity; other columns are ignored. Fields
+//! may be quoted, but contain no line break.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -17,9 +17,9 @@ use crate::job::Group;
 use crate::origin::Origin;
 use crate::{limits, user_file, visible};
 
-/// The column that is read.
+/// The column of the velocities.
 const COLUMN: &str = "velocity";
-/// Most bad lines that are reported one by one.
+/// Maximum number of bad lines that are reported individually.
 const REPORTED_MAX: usize = 10;
 
 /// Measured velocities of a file, one set or a set for each group.
@@ -27,11 +27,11 @@ const REPORTED_MAX: usize = 10;
 pub(crate) struct Measured<T> {
     /// The velocities, m/s.
     pub(crate) data: T,
-    /// Where they stand.
+    /// Their positions in the file.
     pub(crate) origin: Origin,
 }
 
-/// One thing wrong with a CSV file of velocities.
+/// One error in a CSV file of velocities.
 #[derive(Debug, Error)]
 #[error("{}{}: {problem}", visible::path(path), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
 pub(crate) struct CsvError {
@@ -91,27 +91,27 @@ enum Problem {
 }
 
 impl CsvError {
-    /// Whether it stands for others that are not listed.
+    /// Returns whether it represents further errors that are not listed.
     pub(crate) fn stands_for_more(&self) -> bool {
         matches!(self.problem, Problem::More)
     }
 }
 
-/// The velocities of the CSV file at `path`, m/s, in its order.
+/// Returns the velocities of the CSV file at `path`, m/s, in the file's order.
 ///
 /// # Errors
-/// Everything that is wrong with it, up to [`REPORTED_MAX`] lines.
+/// All errors in the file, up to [`REPORTED_MAX`] lines.
 pub(crate) fn read(path: &Path) -> Result<Measured<Vec<f64>>, Vec<CsvError>> {
     let Measured { data, origin } = measured(path, None)?;
-    // Without a column of groups they are all in one.
+    // Without a column of groups all velocities are in one group.
     Ok(Measured { data: data.into_iter().flat_map(|group| group.velocities).collect(), origin })
 }
 
-/// The velocities of the CSV file at `path`, m/s, by the names in its column `column`: groups in the
-/// order in which they begin, velocities in that of the file.
+/// Returns the velocities of the CSV file at `path`, m/s, grouped by the names in its column
+/// `column`: groups in the order of their first occurrence, velocities in the order of the file.
 ///
 /// # Errors
-/// As [`read`].
+/// Same as [`read`].
 pub(crate) fn read_groups(
     path: &Path,
     column: &str,
@@ -124,7 +124,8 @@ pub(crate) fn read_groups(
     Ok(measured)
 }
 
-/// The velocities by the names in `column`; all in a group without name if there is no column.
+/// Returns the velocities by the names in `column`; if there is no column, all in one group without
+/// a name.
 fn measured(path: &Path, column: Option<&str>) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
     let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
     let gathered = open(path)
@@ -143,7 +144,7 @@ fn open(path: &Path) -> Result<impl BufRead, Problem> {
     };
     match open().map_err(Problem::Unreadable)? {
         (_, length) if length > limits::FILE_BYTES_MAX => Err(Problem::TooLarge),
-        // What is added while it is read is not read.
+        // Data appended while the file is read are ignored.
         (file, length) => Ok(BufReader::new(file.take(length))),
     }
 }
@@ -168,7 +169,7 @@ fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Locate
                 }
                 Err(problem) => problems.push((Some(number), problem)),
             },
-            // What follows cannot be told.
+            // After this error, the rest of the file cannot be interpreted.
             Err(problem) => {
                 problems.push(problem);
                 return Err(problems);
@@ -186,20 +187,20 @@ fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Locate
     if problems.is_empty() { Ok(gathered) } else { Err(problems) }
 }
 
-/// The lines of a file, one in memory at a time.
+/// The lines of a file, of which one is in memory at a time.
 struct Lines<R> {
     file: R,
-    /// Of the last line, from 1.
+    /// Number of the last line, from 1.
     number: usize,
     bytes: Vec<u8>,
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The next line that is neither empty nor a comment, without its end, and its number.
+    /// Returns the next line that is neither empty nor a comment, without its end, and its number.
     fn next(&mut self) -> Result<Option<(usize, &str)>, Located> {
         loop {
             self.bytes.clear();
-            // With its end, of two bytes at most.
+            // The line end takes at most two bytes.
             let most = limits::LINE_BYTES_MAX as u64 + 2;
             let mut line = self.file.by_ref().take(most);
             let read = line.read_until(b'\n', &mut self.bytes);
@@ -217,7 +218,7 @@ impl<R: BufRead> Lines<R> {
                 return Err((Some(self.number), Problem::LongLine));
             }
             // Checked here and borrowed after the loop: a borrow that is returned would last for
-            // all of its rounds.
+            // all iterations.
             let text = str::from_utf8(&self.bytes);
             let text = text.map_err(|_| (Some(self.number), Problem::NotUtf8))?;
             let begin = without_byte_order_mark(text).trim_start();
@@ -225,7 +226,7 @@ impl<R: BufRead> Lines<R> {
                 break;
             }
         }
-        // It is UTF-8, as was seen.
+        // Was already checked to be UTF-8.
         let text = str::from_utf8(&self.bytes).unwrap_or_default();
         let text = if self.number == 1 { without_byte_order_mark(text) } else { text };
         Ok(Some((self.number, text)))
@@ -238,7 +239,7 @@ struct Gathered {
     groups: Vec<Group>,
     /// Line of each velocity of each group, from 1.
     lines: Vec<Vec<u32>>,
-    /// Of each group, by its name.
+    /// Position of each group, by its name.
     places: BTreeMap<String, usize>,
     count: usize,
 }
@@ -260,17 +261,17 @@ impl Gathered {
             }
         };
         self.groups[place].velocities.push(velocity);
-        // A file has fewer lines than bytes, of which far fewer are allowed.
+        // The limit on a file's bytes keeps the number of lines far below this.
         self.lines[place].push(u32::try_from(line).unwrap_or(u32::MAX));
         Ok(())
     }
 }
 
-/// Where velocity and group stand in each row.
+/// Positions of velocity and group in each row.
 struct Columns {
     count: usize,
     velocity: usize,
-    /// With its name.
+    /// Position and name of the group's column.
     group: Option<(usize, String)>,
 }
 
@@ -289,7 +290,7 @@ impl Columns {
         Ok(Self { count: names.len(), velocity: place_of(COLUMN, &names)?, group })
     }
 
-    /// Name of the group, and the velocity.
+    /// Returns the name of the group, and the velocity.
     fn row(&self, line: &str) -> Result<(String, f64), Problem> {
         let mut fields = fields(line)?;
         if fields.len() != self.count {
@@ -325,7 +326,7 @@ fn velocity(field: &str) -> Result<f64, Problem> {
     }
 }
 
-/// The fields of one line, without surrounding space and quotes.
+/// Returns the fields of one line, without surrounding space and quotes.
 fn fields(line: &str) -> Result<Vec<String>, Problem> {
     let mut fields = Vec::new();
     let mut rest = line;
@@ -348,7 +349,8 @@ fn fields(line: &str) -> Result<Vec<String>, Problem> {
     }
 }
 
-/// A field whose opening quote is behind us, and what follows its closing one: nothing or a comma.
+/// Reads a field after its opening quote; returns it and the text after its closing quote, which is
+/// empty or begins with a comma.
 fn quoted_field(mut rest: &str) -> Result<(String, &str), Problem> {
     let mut field = String::new();
     loop {
@@ -368,7 +370,7 @@ fn quoted_field(mut rest: &str) -> Result<(String, &str), Problem> {
     }
 }
 
-/// Most characters of a file's text that a message repeats.
+/// Maximum number of characters of a file's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
 fn shortened(text: &str) -> String {

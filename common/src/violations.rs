@@ -1,18 +1,18 @@
-//! Everything that is wrong with an input, collected and reported at once.
+//! Violations of an input, collected and reported at once.
 
 use std::fmt;
 
 use crate::visible;
 
-/// One thing wrong with one field.
+/// One violation of one field.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Violation {
     /// Path of the field in the user's file, e.g. `layers.coupling.density` or
     /// `probe.receivers.count`.
     pub field: String,
-    /// What was found and what is allowed, e.g. `is -1.0; it must be above 0 (kg/m³)`.
+    /// The value found and the values allowed, e.g. `is -1.0; it must be above 0 (kg/m³)`.
     pub message: String,
-    /// Whether it stands for others that are not listed.
+    /// Whether it represents further violations that are not listed.
     pub more: bool,
 }
 
@@ -27,30 +27,30 @@ impl fmt::Display for Violation {
     }
 }
 
-/// All violations of one specification, in the order they were found.
+/// All violations of one specification, in the order in which they were found.
 ///
-/// A check that relates several fields asks [`Violations::touches`] first and stays silent when
-/// one of them is already known to be wrong, so that a user reads each mistake once.
+/// A check that relates several fields calls [`Violations::touches`] first and reports nothing if
+/// one of them is already known to be wrong, so that each mistake is reported once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Violations(Vec<Violation>);
 
 impl Violations {
-    /// No violation yet.
+    /// Creates an empty list.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Records that `field` is wrong.
+    /// Records a violation of `field`.
     pub fn add(&mut self, field: impl Into<String>, message: impl Into<String>) {
         self.0.push(Violation { field: field.into(), message: message.into(), more: false });
     }
 
-    /// Records that more is wrong with `field` than is listed.
+    /// Records that `field` has more violations than are listed.
     pub fn add_more(&mut self, field: impl Into<String>, message: impl Into<String>) {
         self.0.push(Violation { field: field.into(), message: message.into(), more: true });
     }
 
-    /// Whether `field`, or a field inside it, is already known to be wrong.
+    /// Returns whether `field`, or a field inside it, is already known to be wrong.
     pub fn touches(&self, field: &str) -> bool {
         self.0.iter().any(|violation| {
             violation.field.strip_prefix(field).is_some_and(|rest| {
@@ -59,17 +59,17 @@ impl Violations {
         })
     }
 
-    /// Whether nothing is wrong.
+    /// Returns whether there are no violations.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The violations in the order they were found.
+    /// Returns the violations in the order in which they were found.
     pub fn iter(&self) -> std::slice::Iter<'_, Violation> {
         self.0.iter()
     }
 
-    /// The same violations with other paths of fields.
+    /// Returns the same violations with other paths of fields.
     #[must_use]
     pub fn with_fields(mut self, rename: impl Fn(&str) -> String) -> Self {
         for violation in &mut self.0 {
@@ -78,10 +78,10 @@ impl Violations {
         self
     }
 
-    /// `value` if nothing is wrong, else the violations.
+    /// Returns `value` if there are no violations.
     ///
     /// # Errors
-    /// `self`, when it is not empty.
+    /// `self`, if it is not empty.
     pub fn into_result<T>(self, value: T) -> Result<T, Self> {
         if self.is_empty() { Ok(value) } else { Err(self) }
     }

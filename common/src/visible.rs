@@ -1,25 +1,26 @@
-//! Text of others on a terminal or in a log: what would not be seen, or would change how the rest is
-//! seen, is written out.
+//! Untrusted text on a terminal or in a log: characters that are invisible, or change how the rest
+//! is displayed, are escaped.
 //!
 //! Names of files, keys and values of a job file, names of groups, hosts and clients, and messages
-//! of a peer may hold escape sequences, marks that turn the direction of writing, and characters
-//! that nobody sees. Shown as they are, they could hide or forge what a user reads.
+//! of a peer may contain escape sequences, marks that change the direction of writing, and
+//! invisible characters. Unescaped, they could hide or forge the displayed text.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// `text` in one line: each character that [`is_hidden`] as an escape such as `\u{202e}`.
+/// Returns `text` as one line, with each character that [`is_hidden`] as an escape such as
+/// `\u{202e}`.
 pub fn line(text: &str) -> Cow<'_, str> {
     escaped(text, is_hidden)
 }
 
-/// As [`line()`], with the line feeds of `text` as they are: for messages that have several lines.
+/// Same as [`line()`], but keeps the line feeds of `text`: for messages that have several lines.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c != '\n' && is_hidden(c))
 }
 
-/// A path as [`line()`]; bytes that are no UTF-8 are shown as U+FFFD.
+/// Returns a path as [`line()`] does; bytes that are not UTF-8 are shown as U+FFFD.
 pub fn path(path: &Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
@@ -40,9 +41,9 @@ fn escaped(text: &str, hidden: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Whether a character is a control character, ends a line, turns the direction of writing, or is
-/// drawn as nothing (Unicode's `Cc`, `Zl`, `Zp`, `Bidi_Control`, `Default_Ignorable_Code_Point`, and
-/// the marks of annotations).
+/// Returns whether a character is a control character, ends a line, changes the direction of
+/// writing, or is displayed as nothing (Unicode's `Cc`, `Zl`, `Zp`, `Bidi_Control`,
+/// `Default_Ignorable_Code_Point`, and the marks of annotations).
 pub fn is_hidden(c: char) -> bool {
     c.is_control()
         || matches!(

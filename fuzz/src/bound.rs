@@ -1,24 +1,24 @@
-//! A bound on work, in the pace of the machine that does it.
+//! A limit on work, relative to the speed of the machine.
 
 use std::hint::black_box;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// Processor time that nobody asks about: what reading anything small takes, on any machine.
+/// Processor time that is always accepted: reading a small input may take this long on any machine.
 const FREE: Duration = Duration::from_millis(50);
-/// Passes over each byte that reading it may be worth; measured in a debug build: below 250. What
-/// takes time in the square of its length exceeds this long before a megabyte, and that is what
-/// it is here to find.
+/// Number of passes over each byte that reading it may be worth; below 250 were measured in a debug
+/// build. A reader whose time grows with the square of the length exceeds this long before a
+/// megabyte, and the purpose of the limit is to find such readers.
 const PASSES: u32 = 2000;
-/// Bytes whose passes stand for the pace.
+/// Number of bytes in the passes by which the speed is measured.
 const PACE_BYTES: usize = 1 << 16;
 
-/// What `work` on so many `bytes` returns.
+/// Returns the result of `work` on an input with this number of `bytes`.
 ///
 /// # Panics
-/// When it took more of the processor's time than such an input may take. How long a simple pass
-/// over a byte takes is measured right after it: a slow or a busy machine slows down both.
+/// If it took more processor time than such an input may take. The duration of a simple pass over a
+/// byte is measured right afterwards, so that a slow or busy machine slows down both.
 pub fn bounded<T>(bytes: usize, work: impl FnOnce() -> T) -> T {
     let (result, spent) = timed(work);
     if spent > FREE {
@@ -31,24 +31,24 @@ pub fn bounded<T>(bytes: usize, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Processor time of one simple pass over [`PACE_BYTES`]: the slowest of three.
+/// Returns the processor time of one simple pass over [`PACE_BYTES`]: the slowest of three.
 fn pace() -> Duration {
     let bytes = vec![1_u8; PACE_BYTES];
     let pass = || bytes.iter().fold(0_u64, |sum, &byte| (sum ^ u64::from(byte)).wrapping_mul(31));
     (0..3).map(|_| timed(|| black_box(pass())).1).max().unwrap_or_default()
 }
 
-/// What `work` returns, and the processor time of this thread that it took.
+/// Returns the result of `work`, and the processor time of this thread that it took.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let before = processor_time();
     let result = work();
     (result, processor_time().saturating_sub(before))
 }
 
-/// Of this thread.
+/// Returns the processor time of this thread.
 fn processor_time() -> Duration {
     let time = clock_gettime(ClockId::ThreadCPUTime);
-    // Neither is ever negative.
+    // Neither part is ever negative.
     Duration::new(time.tv_sec.unsigned_abs(), u32::try_from(time.tv_nsec).unwrap_or(0))
 }
 

@@ -1,12 +1,12 @@
-//! Seeds: valid inputs, refused ones, and those that once failed.
+//! Seed inputs: valid ones, refused ones, and those that once failed.
 
 use std::fs;
 use std::path::Path;
 
-/// The seeds of a kind, which is a folder of `fuzz/corpus`, in the order of their names.
+/// Returns the seeds of a kind, which is a folder of `fuzz/corpus`, in the order of their names.
 ///
 /// # Panics
-/// When there are none, or one cannot be read.
+/// If there are none, or one cannot be read.
 #[expect(clippy::expect_used, reason = "a test without its seeds fails")]
 pub fn bytes(kind: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(kind);
@@ -17,10 +17,10 @@ pub fn bytes(kind: &str) -> Vec<Vec<u8>> {
     paths.iter().map(|path| fs::read(path).expect("a readable seed")).collect()
 }
 
-/// As [`bytes`], of texts.
+/// Same as [`bytes`], for texts.
 ///
 /// # Panics
-/// When there are none, or one is no text.
+/// If there are none, or one is not a text.
 #[expect(clippy::expect_used, reason = "a test without its seeds fails")]
 pub fn texts(kind: &str) -> Vec<String> {
     let text = |bytes| String::from_utf8(bytes).expect("a seed in UTF-8");

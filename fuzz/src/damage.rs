@@ -1,4 +1,4 @@
-//! Structured damage: what disks, networks, editors and enemies do to an input.
+//! Structured damage: changes of an input by disks, networks, editors and attackers.
 
 use std::ops::Range;
 
@@ -6,12 +6,12 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
-/// Most damages to one input.
+/// Maximum number of damages to one input.
 const DAMAGES_MAX: usize = 6;
-/// An input does not grow beyond this, bytes.
+/// Maximum size of a damaged input, bytes.
 const BYTES_MAX: usize = 1 << 18;
 
-/// Words that no field wants, and a few that some do.
+/// Words, most of which no field accepts.
 const WORDS: [&str; 30] = [
     "nan",
     "inf",
@@ -44,12 +44,12 @@ const WORDS: [&str; 30] = [
     "1979-05-27",
     "\"\\u0000\u{fffd}\"",
 ];
-/// What structure is made of.
+/// Punctuation that gives a text its structure.
 const MARKS: [&str; 16] =
     ["[", "]", "{", "}", "=", ",", ".", ":", "\"", "'", "\"\"\"", "#", "\n", "\r\n", "\0", " "];
-/// What opens a level, repeated for depth.
+/// Texts that open a level, repeated for depth.
 const OPENINGS: [&str; 5] = ["[", "{\"a\":", "{a=", "a.", "\""];
-/// Doubles that no physics has.
+/// Doubles without a physical meaning.
 const DOUBLES: [f64; 10] = [
     f64::NAN,
     f64::INFINITY,
@@ -63,37 +63,38 @@ const DOUBLES: [f64; 10] = [
     1e18,
 ];
 
-/// One damage. Places are fractions of the input.
+/// One damage. Positions are fractions of the input.
 #[derive(Debug, Clone)]
 enum Damage {
-    /// A bit is another.
+    /// Changes a bit.
     Flip(Index, u8),
-    /// A byte is another.
+    /// Changes a byte.
     Set(Index, u8),
-    /// A word or number is replaced.
+    /// Replaces a word or number.
     Word(Index, &'static str),
-    /// Something stands in between.
+    /// Inserts a text.
     Insert(Index, &'static str),
-    /// A part is missing.
+    /// Removes a part.
     Remove(Index, Index),
-    /// The rest is missing.
+    /// Removes the rest.
     Truncate(Index),
-    /// A part comes again and again.
+    /// Repeats a part.
     Repeat(Index, Index, usize),
-    /// A depth opens.
+    /// Opens many levels.
     Nest(Index, &'static str, usize),
-    /// The rest is that of another seed.
+    /// Replaces the rest by that of another seed.
     Splice(Index, Index, Index),
-    /// Eight bytes are a double; behind a tag of protocol buffers that announces one, if any.
+    /// Writes a double into eight bytes, if possible after a protocol buffers tag that announces
+    /// one.
     Double(Index, f64),
-    /// A length or a number is larger than can be.
+    /// Makes a length or a number impossibly large.
     Varint(Index),
 }
 
 fn damage() -> impl Strategy<Value = Damage> {
     use Damage::*;
     let at = any::<Index>;
-    // Mostly few, sometimes many.
+    // Usually few, sometimes many.
     let often = || prop_oneof![4 => 1..4_usize, 1 => 100..5000_usize];
     prop_oneof![
         1 => (at(), 0..8_u8).prop_map(|(at, bit)| Flip(at, bit)),
@@ -110,7 +111,7 @@ fn damage() -> impl Strategy<Value = Damage> {
     ]
 }
 
-/// One of the `seeds` with some damage, or none.
+/// Returns one of the `seeds`, with or without damage.
 pub fn damaged(seeds: Vec<Vec<u8>>) -> impl Strategy<Value = Vec<u8>> {
     (any::<Index>(), vec(damage(), 0..=DAMAGES_MAX)).prop_map(move |(seed, damages)| {
         let mut bytes = seed.get(&seeds).clone();
@@ -122,7 +123,7 @@ pub fn damaged(seeds: Vec<Vec<u8>>) -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// As [`damaged`], of texts; what is no UTF-8 any more is replaced.
+/// Same as [`damaged`], for texts; invalid UTF-8 is replaced.
 pub fn damaged_text(seeds: Vec<String>) -> impl Strategy<Value = String> {
     let seeds = seeds.into_iter().map(String::into_bytes).collect();
     damaged(seeds).prop_map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
@@ -130,7 +131,7 @@ pub fn damaged_text(seeds: Vec<String>) -> impl Strategy<Value = String> {
 
 fn apply(damage: &Damage, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
     let length = bytes.len();
-    // Any place, the end among them.
+    // Any position, including the end.
     let place = |at: &Index| at.index(length + 1);
     let part = |a: &Index, b: &Index| place(a).min(place(b))..place(a).max(place(b));
     match damage {
@@ -173,7 +174,7 @@ fn insert(bytes: &mut Vec<u8>, at: usize, inserted: &[u8]) {
     bytes.splice(at..at, inserted.iter().copied());
 }
 
-/// Where words and numbers stand.
+/// Returns the positions of words and numbers.
 fn words(bytes: &[u8]) -> Vec<Range<usize>> {
     let of_word = |byte: u8| byte.is_ascii_alphanumeric() || b"_+-.".contains(&byte);
     let mut words = Vec::new();

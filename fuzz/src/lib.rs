@@ -1,11 +1,11 @@
-//! For tests on random inputs: properties with cases that are the same in every run, and damaged
-//! inputs for whatever is parsed: a corpus of seeds, structured damage to them, and a bound on the
-//! work that reading one may take.
+//! Support for tests on random inputs: properties with cases that are the same in every run, and
+//! damaged inputs for every parser: a corpus of seeds, structured damage to them, and a limit on
+//! the work of reading an input.
 //!
-//! A test of a parser reads every seed as it is, then many damaged ones, and holds that nothing
-//! panics, that no input of a length takes more than its share of processor time, and that what is
-//! accepted is accepted again, and alike, when it is written out. `cargo xtask random` makes more
-//! of it.
+//! A test of a parser reads every seed unchanged, then many damaged ones, and checks that nothing
+//! panics, that no input takes more processor time than its length justifies, and that an accepted
+//! input is accepted again, with the same meaning, after it is written out. `cargo xtask random`
+//! runs more such cases.
 
 mod bound;
 mod corpus;

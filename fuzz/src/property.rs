@@ -1,5 +1,5 @@
-//! Tests of properties on random cases, which are the same in every run and on every machine until
-//! somebody asks for others.
+//! Property tests on random cases that are the same in every run and on every machine, unless
+//! another seed is requested.
 
 use std::any::Any;
 use std::env;
@@ -12,16 +12,16 @@ use proptest::test_runner::{
     TestCaseResult, TestRunner,
 };
 
-/// Cases of a property that does not say how many it wants.
+/// Default number of cases of a property.
 pub const CASES: u32 = 256;
-/// The seed of a run that nobody gives one to.
+/// Default seed.
 const SEED: u64 = 1;
-/// The variable that gives another: a whole number.
+/// The environment variable that sets another seed: a whole number.
 const SEED_VARIABLE: &str = "OSTEON_TEST_SEED";
-/// Ending of the files, beside the sources, with cases that are tried before all others.
+/// Extension of the files, beside the sources, with cases that are tried first.
 const KEPT: &str = "regressions";
 
-/// Declares tests, each of a property that holds for whatever its strategies make.
+/// Declares tests, each of a property that must hold for all values of its strategies.
 ///
 /// ```text
 /// properties! {
@@ -34,9 +34,9 @@ const KEPT: &str = "regressions";
 /// }
 /// ```
 ///
-/// It stands in for `proptest!`, in which variables of the environment have the last word. Without
-/// `cases` there are [`CASES`]. The test is `sums_have_no_order::on_random_cases`: by the last part
-/// `cargo xtask random` finds all of them.
+/// It replaces `proptest!`, where environment variables override the settings. Without `cases`
+/// there are [`CASES`]. The test is called `sums_have_no_order::on_random_cases`; by the last part
+/// of this name `cargo xtask random` finds all of them.
 #[macro_export]
 macro_rules! properties {
     (@run $cases:expr; $(
@@ -64,7 +64,7 @@ macro_rules! properties {
     };
 }
 
-/// The [`Place`] where it stands.
+/// Returns the [`Place`] of the macro call.
 #[macro_export]
 macro_rules! here {
     () => {
@@ -72,23 +72,23 @@ macro_rules! here {
     };
 }
 
-/// Where a test stands.
+/// Location of a test.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
-    /// Its package.
+    /// Package of the test.
     pub package: &'static str,
-    /// Its module, the crate first.
+    /// Module of the test, beginning with the crate.
     pub module: &'static str,
-    /// Its source file.
+    /// Source file of the test.
     pub source: &'static str,
 }
 
-/// Checks a property: on the cases in the `.regressions` file beside the source, if there is one,
-/// then on so many new ones.
+/// Checks a property: first on the cases in the `.regressions` file beside the source, if there is
+/// one, then on the given number of new ones.
 ///
 /// # Panics
-/// When one fails, with the command that repeats it. Nothing is written: what is to be tried first
-/// ever after is printed, as a line for that file. Also when `OSTEON_TEST_SEED` is no whole number.
+/// If one fails, with the command that repeats it. Nothing is written: the line to be added to that
+/// file is printed. Also panics if `OSTEON_TEST_SEED` is not a whole number.
 pub fn check<S: Strategy>(
     place: &Place,
     cases: u32,
@@ -126,7 +126,7 @@ fn seed() -> u64 {
     }
 }
 
-/// Every setting that cases depend on; the default of each would come from the environment.
+/// Sets every option on which cases depend, because the defaults would come from the environment.
 fn config(seed: u64, place: &Place, cases: u32) -> Config {
     Config {
         cases,
@@ -144,8 +144,7 @@ fn config(seed: u64, place: &Place, cases: u32) -> Config {
     }
 }
 
-/// Reads the cases that are kept beside a source, and writes none: a run leaves nothing behind that
-/// would make the next one another.
+/// Reads the cases stored beside a source, and writes none: a run must not change the next one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Kept;
 
@@ -191,7 +190,7 @@ mod tests {
 
     use super::*;
 
-    /// The cases of a seed.
+    /// Returns the cases of a seed.
     fn cases_of(seed: u64, cases: u32) -> Vec<u64> {
         let made = RefCell::new(Vec::new());
         check_with(seed, &here!(), cases, any::<u64>(), |case| {
@@ -210,7 +209,7 @@ mod tests {
         assert_ne!(cases, cases_of(2, 300));
     }
 
-    /// Runs the test above in a process with variables that proptest listens to.
+    /// Runs the test above in a process with the environment variables that proptest reads.
     #[test]
     fn the_environment_does_not_change_them() {
         let test = "property::tests::a_seed_has_its_cases";

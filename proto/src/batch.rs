@@ -16,22 +16,22 @@ use crate::realizations;
 use crate::setup::{self, SetupMessages};
 use crate::v1;
 
-/// Realizations `first`, `first + 1`, … `first + count - 1` of one point.
+/// The work of one batch: realizations `first`, `first + 1`, … `first + count - 1` of one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Work {
     /// Layers, probe, picking, solver.
     pub setup: Setup,
     /// The point (a, δ).
     pub point: Point,
-    /// Where the germs come from.
+    /// Source of the germs.
     pub germs: GermSource,
     /// Index of the first realization.
     pub first: u64,
-    /// How many, 1 to [`BATCH_REALIZATIONS_MAX`].
+    /// Number of realizations, 1 to [`BATCH_REALIZATIONS_MAX`].
     pub count: u32,
 }
 
-/// The message of batch number `batch`.
+/// Returns the message of batch number `batch`.
 pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
     let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&work.setup);
     let (sampling, points) = match work.germs.scheme {
@@ -53,11 +53,11 @@ pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
     }
 }
 
-/// The work of a batch.
+/// Returns the work of a batch.
 ///
 /// # Errors
-/// When the setup is incomplete (a worker must not fill in its own defaults) or invalid, the
-/// point has not seven finite numbers, or a number is beyond its limit.
+/// If the setup is incomplete (a worker must not fill in its own defaults) or invalid, if the point
+/// does not have seven finite numbers, or if a number is beyond its limit.
 pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
     let count = f64::from(message.count);
     if message.count == 0 || message.count > BATCH_REALIZATIONS_MAX {
@@ -81,7 +81,7 @@ pub fn from_message(message: &v1::Batch) -> Result<Work, Malformed> {
     Ok(Work { setup, point, germs, first: message.first, count: message.count })
 }
 
-/// How the germs are made of the seed.
+/// Returns the scheme by which germs are generated from the seed.
 fn scheme(message: &v1::Batch, sampling: Sampling) -> Result<GermScheme, Malformed> {
     let points = message.points_per_scramble;
     let (value, allowed) = match (sampling, points) {
@@ -99,19 +99,19 @@ fn scheme(message: &v1::Batch, sampling: Sampling) -> Result<GermScheme, Malform
     Err(Malformed::OutOfRange { field, value: value as f64, allowed })
 }
 
-/// The answer to batch number `batch`: its realizations in index order, and the wall time, s,
-/// that they took.
+/// Returns the answer to batch number `batch`: its realizations in index order, and the wall time
+/// in seconds that they took.
 pub fn answer_to_message(batch: u64, solved: &[Solved], elapsed_s: f64) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
     v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }
 }
 
-/// The realizations of an answer, in index order.
+/// Returns the realizations of an answer, in index order.
 ///
 /// # Errors
-/// When the lengths differ, a code and a velocity are not those of an outcome, or an estimated
-/// error is not one that the outcome can have.
+/// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
+/// error is not allowed for its outcome.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Malformed> {
     let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
     let (found, expected) = (message.estimated_errors.len(), outcomes.len());
@@ -128,7 +128,8 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Mal
         .collect()
 }
 
-/// The setup, which must be complete: what it reads as must be written back as the same messages.
+/// Reads the setup and checks that it is complete, i.e. that encoding it again gives the same
+/// messages.
 fn read_setup(message: &v1::Batch, violations: &mut Violations) -> Result<Setup, Malformed> {
     let (Some(layers), Some(probe), Some(picking), Some(solver)) =
         (&message.layers, &message.probe, &message.picking, &message.solver)

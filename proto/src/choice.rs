@@ -1,4 +1,4 @@
-//! Enumerations of messages, and what they stand for in `osteon-common`.
+//! Mapping between enumerations of messages and types of `osteon-common`.
 
 use osteon_common::job::{JobKind, Objective, Sampling, SearchMethod};
 use osteon_common::outcome::FailureKind;
@@ -10,7 +10,8 @@ use osteon_common::violations::Violations;
 use crate::malformed::Malformed;
 use crate::v1;
 
-/// A type of `osteon-common` as an enumeration of messages, whose number 0 is unspecified.
+/// Mapping of a type of `osteon-common` to an enumeration of messages, whose number 0 is
+/// unspecified.
 pub struct Choice<T: 'static, M> {
     all: &'static [T],
     message: fn(T) -> M,
@@ -18,28 +19,28 @@ pub struct Choice<T: 'static, M> {
 }
 
 impl<T: Copy, M: Into<i32>> Choice<T, M> {
-    /// The number that stands for a value.
+    /// Returns the number of a value.
     pub fn number(&self, value: T) -> i32 {
         (self.message)(value).into()
     }
 
-    /// What a number stands for; `None` if it is unspecified or not known.
+    /// Returns the value of a number; `None` if it is unspecified or unknown.
     pub fn value(&self, number: i32) -> Option<T> {
         self.all.iter().copied().find(|&value| self.number(value) == number)
     }
 
-    /// What a number stands for.
+    /// Returns the value of a number.
     ///
     /// # Errors
-    /// When it is unspecified, or not known.
+    /// If it is unspecified or unknown.
     pub fn required(&self, number: i32, field: &'static str) -> Result<T, Malformed> {
         self.optional(number, field)?.ok_or(Malformed::Missing { field })
     }
 
-    /// What a number stands for; `None` if it is unspecified.
+    /// Returns the value of a number; `None` if it is unspecified.
     ///
     /// # Errors
-    /// When it is not known.
+    /// If it is unknown.
     pub fn optional(&self, number: i32, field: &'static str) -> Result<Option<T>, Malformed> {
         match (number, self.value(number)) {
             (_, Some(value)) => Ok(Some(value)),
@@ -48,8 +49,8 @@ impl<T: Copy, M: Into<i32>> Choice<T, M> {
         }
     }
 
-    /// What a number of a specification stands for, `default` if it is unspecified; one that is not
-    /// known is added to `violations`.
+    /// Returns the value of a number of a specification, or `default` if it is unspecified. An
+    /// unknown number is added to `violations`.
     pub fn or_default(
         &self,
         number: i32,
@@ -67,7 +68,7 @@ impl<T: Copy, M: Into<i32>> Choice<T, M> {
         }
     }
 
-    /// Why a number is refused.
+    /// Returns the reason why a number is refused.
     pub fn refusal(&self, number: i32) -> String {
         let names = self.all.iter().map(|&value| (self.name)(&(self.message)(value)));
         let names: Vec<&str> = names.collect();
@@ -75,7 +76,7 @@ impl<T: Copy, M: Into<i32>> Choice<T, M> {
     }
 }
 
-/// What a job does.
+/// Kind of a job.
 pub static JOB_KIND: Choice<JobKind, v1::JobKind> = Choice {
     all: &[JobKind::Identification, JobKind::Propagation],
     message: |kind| match kind {
@@ -95,7 +96,7 @@ pub static EXTREMUM: Choice<Extremum, v1::Extremum> = Choice {
     name: v1::Extremum::as_str_name,
 };
 
-/// How waves are computed.
+/// Method of computing waves.
 pub static SOLVER_METHOD: Choice<Method, v1::SolverMethod> = Choice {
     all: &Method::ALL,
     message: |method| match method {
@@ -105,7 +106,7 @@ pub static SOLVER_METHOD: Choice<Method, v1::SolverMethod> = Choice {
     name: v1::SolverMethod::as_str_name,
 };
 
-/// How germs are drawn.
+/// Sampling of the germs.
 pub static SAMPLING: Choice<Sampling, v1::Sampling> = Choice {
     all: &Sampling::ALL,
     message: |sampling| match sampling {
@@ -115,7 +116,7 @@ pub static SAMPLING: Choice<Sampling, v1::Sampling> = Choice {
     name: v1::Sampling::as_str_name,
 };
 
-/// What is minimised.
+/// The function to be minimised.
 pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
     all: &Objective::ALL,
     message: |objective| match objective {
@@ -125,7 +126,7 @@ pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
     name: v1::ObjectiveKind::as_str_name,
 };
 
-/// How the minimum is searched.
+/// Method of the search.
 pub static SEARCH_METHOD: Choice<SearchMethod, v1::SearchMethod> = Choice {
     all: &SearchMethod::ALL,
     message: |method| match method {
@@ -150,7 +151,7 @@ pub static PARAMETER: Choice<Parameter, v1::Parameter> = Choice {
     name: v1::Parameter::as_str_name,
 };
 
-/// Why a realization has no velocity.
+/// Reason why a realization has no velocity.
 pub static FAILURE_KIND: Choice<FailureKind, v1::FailureKind> = Choice {
     all: &FailureKind::ALL,
     message: |kind| match kind {
@@ -163,7 +164,7 @@ pub static FAILURE_KIND: Choice<FailureKind, v1::FailureKind> = Choice {
     name: v1::FailureKind::as_str_name,
 };
 
-/// How a job ended; unspecified while it has not.
+/// Final status of a job; unspecified while it has not ended.
 pub static JOB_STATUS: Choice<Status, v1::JobStatus> = Choice {
     all: &Status::ALL,
     message: |status| match status {
@@ -175,7 +176,7 @@ pub static JOB_STATUS: Choice<Status, v1::JobStatus> = Choice {
     name: v1::JobStatus::as_str_name,
 };
 
-/// Why a job failed; unspecified of one that has not.
+/// Reason why a job failed; unspecified if it has not.
 pub static JOB_FAILURE: Choice<JobFailure, v1::JobFailureKind> = Choice {
     all: &JobFailure::ALL,
     message: |failure| match failure {
@@ -187,7 +188,7 @@ pub static JOB_FAILURE: Choice<JobFailure, v1::JobFailureKind> = Choice {
     name: v1::JobFailureKind::as_str_name,
 };
 
-/// What the best point of a search is.
+/// Meaning of the best point of a search.
 pub static POINT_MEANING: Choice<PointMeaning, v1::PointMeaning> = Choice {
     all: &PointMeaning::ALL,
     message: |meaning| match meaning {

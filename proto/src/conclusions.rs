@@ -1,4 +1,4 @@
-//! What the data say, as messages.
+//! Conclusions from the data as messages.
 
 use osteon_common::inference::{
     Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
@@ -25,7 +25,7 @@ pub(crate) struct Fields {
     pub(crate) solutions: Option<v1::Solutions>,
 }
 
-/// The same of a message.
+/// The same fields, borrowed from a message.
 pub(crate) struct FieldsOf<'a> {
     pub(crate) sensitivities: &'a [v1::Sensitivity],
     pub(crate) identified: Option<&'a v1::Identified>,
@@ -45,7 +45,7 @@ pub(crate) fn to_message(conclusions: &Conclusions) -> Fields {
 }
 
 /// # Errors
-/// When a required field is absent, or what belongs together does not fit.
+/// If a required field is absent, or if fields contradict each other.
 pub(crate) fn from_message(fields: &FieldsOf<'_>) -> Result<Conclusions, Malformed> {
     let sensitivities =
         fields.sensitivities.iter().map(sensitivity_from_message).collect::<Result<Vec<_>, _>>()?;
@@ -150,7 +150,7 @@ fn quantity_to_message(quantity: &Quantity) -> v1::Quantity {
     }
 }
 
-/// A quantity is known with all that there is of it, or not at all.
+/// The uncertainty of a quantity must be given completely or not at all.
 fn quantity_from_message(
     message: Option<&v1::Quantity>,
     field: &'static str,
@@ -167,7 +167,7 @@ fn quantity_from_message(
     Ok(Quantity { value: present(message.value, "value")?, known })
 }
 
-/// Both ends of an interval.
+/// Reads an interval, of which both ends are required.
 pub(crate) fn interval_from_message(message: Option<&v1::Interval>) -> Result<[f64; 2], Malformed> {
     let message = present(message, "interval")?;
     Ok([present(message.lower, "lower")?, present(message.upper, "upper")?])
@@ -261,7 +261,7 @@ fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
     Ok(Spreads { parameters, entries })
 }
 
-/// A row or column from 0, of a number from `least` to 6.
+/// Converts a row or column number from `least` to 6 into an index that starts at 0.
 fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
     let place = (least..=ROWS).contains(&number).then(|| number as usize - 1);
     let allowed = "it must be 1 to 6, and a column at least its row";

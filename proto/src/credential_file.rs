@@ -1,5 +1,6 @@
-//! Files of certificates, keys and tokens: read with bounds, refused when others can read what is
-//! secret or change what is trusted. Errors name the file and what to do, never what it holds.
+//! Files of certificates, keys and tokens: read within limits, and refused if others can read a
+//! secret or change trusted data. Errors name the file and the remedy, but never the file's
+//! content.
 
 use std::io;
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
@@ -19,27 +20,27 @@ use webpki::{EndEntityCert, KeyUsage};
 use crate::pipe;
 use crate::token::{NoToken, Token};
 
-/// What others may do with a file.
+/// Access that other users may have to a file.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
-    /// Nothing; the group may read, as services that get their secrets mounted need.
+    /// No access for others. The group may read, as needed by services whose secrets are mounted.
     Secret,
-    /// Read, but not change.
+    /// Others may read, but not write.
     Trusted,
 }
 
-/// Why a file of certificates, keys or tokens cannot be used.
+/// Reason why a file of certificates, keys or tokens cannot be used.
 #[derive(Debug, Error)]
 pub enum CredentialError {
-    /// The operating system does not give it.
+    /// The operating system cannot read it.
     #[error("cannot read {}: {source}", visible::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// It is no such file at all.
+    /// It is too long to be such a file.
     #[error(
         "{} has more than {max} bytes, so it is not a file of certificates, keys or tokens",
         visible::path(path)
@@ -47,10 +48,10 @@ pub enum CredentialError {
     TooLong {
         /// The file.
         path: PathBuf,
-        /// Most bytes.
+        /// Maximum number of bytes.
         max: u64,
     },
-    /// It is a pipe through which nothing came.
+    /// It is a pipe that delivered no bytes.
     #[error(
         "nothing came through the pipe {}; what came through a pipe once does not come again: name a \
          file where it is to be read again",
@@ -75,7 +76,7 @@ pub enum CredentialError {
     Exposed {
         /// The file.
         path: PathBuf,
-        /// Its permissions.
+        /// Its permission bits.
         mode: u32,
     },
     /// Others can change what is trusted.
@@ -86,18 +87,18 @@ pub enum CredentialError {
     Changeable {
         /// The file.
         path: PathBuf,
-        /// Its permissions.
+        /// Its permission bits.
         mode: u32,
     },
-    /// It is damaged.
+    /// It is a damaged PEM file.
     #[error("{} is not a valid PEM file: {fault}", visible::path(path))]
     Pem {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The defect.
         fault: PemFault,
     },
-    /// It holds no certificate.
+    /// It contains no certificate.
     #[error(
         "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` makes \
          them",
@@ -107,7 +108,7 @@ pub enum CredentialError {
         /// The file.
         path: PathBuf,
     },
-    /// It holds no private key.
+    /// It contains no private key.
     #[error(
         "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` makes \
          them",
@@ -117,15 +118,15 @@ pub enum CredentialError {
         /// The file.
         path: PathBuf,
     },
-    /// It holds a key that cannot be used.
+    /// It contains a key that cannot be used.
     #[error("the key in {} cannot be used: {source}", visible::path(path))]
     Key {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: rustls::Error,
     },
-    /// Certificate and key do not belong together.
+    /// Certificate and key do not match.
     #[error(
         "the key in {} is not the one of the certificate in {}; give the two that were made together",
         visible::path(key),
@@ -137,13 +138,13 @@ pub enum CredentialError {
         /// The file of the key.
         key: PathBuf,
     },
-    /// The certificate's time is over.
+    /// The certificate has expired.
     #[error("the certificate in {} has expired; make a new one", visible::path(path))]
     Expired {
         /// The file.
         path: PathBuf,
     },
-    /// The certificate's time has not come.
+    /// The certificate is not valid yet.
     #[error(
         "the certificate in {} is not valid yet; is this machine's clock right?",
         visible::path(path)
@@ -152,15 +153,15 @@ pub enum CredentialError {
         /// The file.
         path: PathBuf,
     },
-    /// The certificate cannot be understood.
+    /// The certificate cannot be parsed.
     #[error("the certificate in {} cannot be used: {source}", visible::path(path))]
     Certificate {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: webpki::Error,
     },
-    /// The certificate cannot be an authority's.
+    /// The certificate is not one of a certificate authority.
     #[error(
         "the certificate in {} is not a certificate authority's: {source}",
         visible::path(path)
@@ -168,29 +169,29 @@ pub enum CredentialError {
     Root {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: rustls::Error,
     },
-    /// It holds no token.
+    /// It does not contain a token.
     #[error("what {} holds {source}", visible::path(path))]
     Token {
         /// The file.
         path: PathBuf,
-        /// What a token is.
+        /// The expected form of a token.
         source: NoToken,
     },
 }
 
-/// What is wrong with a PEM file. Not the parser's own error: that repeats what the file holds.
+/// Defect of a PEM file. It replaces the parser's own error, which quotes the file's content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum PemFault {
-    /// `-----BEGIN` without the rest.
+    /// The `-----BEGIN` line is incomplete.
     #[error("a line `-----BEGIN …-----` is damaged")]
     Begin,
-    /// No `-----END`.
+    /// The `-----END` line is missing.
     #[error("a line `-----END …-----` is missing or damaged")]
     End,
-    /// Anything else between the two.
+    /// The content between the two lines is invalid.
     #[error("what stands between `-----BEGIN …-----` and `-----END …-----` is damaged")]
     Content,
 }
@@ -205,19 +206,20 @@ impl From<&pem::Error> for PemFault {
     }
 }
 
-/// A certificate with the chain above it, and its key.
+/// A certificate with its chain, and its key.
 #[derive(Debug)]
 pub struct Identity {
-    /// The certificate first.
+    /// The chain, which starts with the certificate itself.
     pub chain: Vec<CertificateDer<'static>>,
-    /// The key of the first.
+    /// The private key of the first certificate.
     pub key: PrivateKeyDer<'static>,
 }
 
-/// Reads a certificate and its key, and checks that they belong together and are in their time.
+/// Reads a certificate and its key, and checks that they match and that the certificate is
+/// currently valid.
 ///
 /// # Errors
-/// When a file cannot be used.
+/// If a file cannot be used.
 pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialError> {
     let chain = certificates(certificate)?;
     in_its_time(certificate, &chain)?;
@@ -235,10 +237,10 @@ pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialEr
     Ok(Identity { chain, key: private })
 }
 
-/// Reads a file of certificates; there is at least one.
+/// Reads a file of certificates, which contains at least one.
 ///
 /// # Errors
-/// When the file cannot be used.
+/// If the file cannot be used.
 pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, CredentialError> {
     let bytes = read(path, Kind::Trusted)?;
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&bytes).collect();
@@ -252,24 +254,24 @@ pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, Credent
 /// Reads a client's token.
 ///
 /// # Errors
-/// When the file cannot be used.
+/// If the file cannot be used.
 pub fn token(path: &Path) -> Result<Token, CredentialError> {
     let text = secret_text(path)?;
     Token::parse(&text).map_err(|source| CredentialError::Token { path: path.to_owned(), source })
 }
 
-/// Reads a text that others must not see.
+/// Reads a text file that others must not be able to read.
 ///
 /// # Errors
-/// When the file cannot be used.
+/// If the file cannot be used.
 pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
     text(path, Kind::Secret)
 }
 
-/// Reads a text that others may see, and must not change.
+/// Reads a text file that others may read but must not be able to change.
 ///
 /// # Errors
-/// When the file cannot be used.
+/// If the file cannot be used.
 pub fn trusted_text(path: &Path) -> Result<String, CredentialError> {
     text(path, Kind::Trusted)
 }
@@ -291,9 +293,10 @@ fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
     CredentialError::Pem { path: path.to_owned(), fault: error.into() }
 }
 
-/// The permissions looked at are those of the file that is read, whatever its name means later. A pipe
-/// will do, so that a secret need not be on a disk; it has permissions, too, and a named one that others
-/// can read would let them have what is meant for us.
+/// Reads a file after checking its permissions. They are those of the opened file, even if its name
+/// is later given to another one. A pipe is accepted, so that a secret need not be on a disk. Its
+/// permissions are checked, too, since a named pipe that others can read would let them take the
+/// secret.
 fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
     let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
     let file = user_file::open_or_pipe(path).map_err(unreadable)?;
@@ -323,8 +326,8 @@ fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
     }
 }
 
-/// Refuses a certificate that its peer would refuse for its dates. Who trusts it is the peer's
-/// matter: here there is no trust anchor, and the search for one ends behind the check of dates.
+/// Refuses a certificate whose dates the peer would refuse. Whether it is trusted is for the peer
+/// to decide: no trust anchor is given here, and the search for one comes after the check of dates.
 fn in_its_time(path: &Path, chain: &[CertificateDer<'static>]) -> Result<(), CredentialError> {
     let path = || path.to_owned();
     let unusable = |source| CredentialError::Certificate { path: path(), source };

@@ -1,4 +1,4 @@
-//! What a client or a worker shows to a coordinator, and whom it believes: read from files and
+//! Credentials of a client or a worker, and the authorities that it trusts: read from files and
 //! checked before anything is sent.
 
 use std::path::PathBuf;
@@ -17,36 +17,36 @@ use crate::credential_file::{self, CredentialError};
 use crate::endpoint::Endpoint;
 use crate::token::Token;
 
-/// The one protocol that is spoken inside TLS.
+/// The only protocol inside TLS.
 pub const ALPN: &[u8] = b"h2";
 
-/// Files that a command line names.
+/// Credential files named on the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CredentialFiles {
-    /// Certificates of the authorities that the coordinator's certificate may be signed by.
+    /// Certificates of the authorities that may have signed the coordinator's certificate.
     pub ca: Option<PathBuf>,
-    /// An own certificate.
+    /// The client's own certificate.
     pub certificate: Option<PathBuf>,
-    /// The key of the own certificate.
+    /// The key of that certificate.
     pub key: Option<PathBuf>,
     /// A bearer token.
     pub token: Option<PathBuf>,
 }
 
-/// What is needed to speak to one coordinator.
+/// The credentials for one coordinator.
 #[derive(Debug, Clone, Default)]
 pub struct Credentials {
     pub(crate) tls: Option<Connector>,
     pub(crate) bearer: Bearer,
 }
 
-/// Why what the command line names does not fit together or cannot be used.
+/// Reason why the credential options contradict each other or cannot be used.
 #[derive(Debug, Error)]
 pub enum CredentialsError {
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] CredentialError),
-    /// Nobody says whom to believe.
+    /// No authority is given that could be trusted.
     #[error(
         "{endpoint} needs --tls-ca FILE: the certificate of the authority that signed the coordinator's"
     )]
@@ -54,13 +54,13 @@ pub enum CredentialsError {
         /// The address.
         endpoint: Endpoint,
     },
-    /// One of two files that belong together.
+    /// One of two files that belong together is missing.
     #[error("--tls-cert and --tls-key belong together; {missing} is missing")]
     Half {
-        /// The option that is not there.
+        /// The missing option.
         missing: &'static str,
     },
-    /// TLS where there is none.
+    /// A TLS option is given for an address without TLS.
     #[error("{option} is for TLS, and {endpoint} has none; write https://HOST:PORT")]
     NoTls {
         /// The option.
@@ -68,7 +68,7 @@ pub enum CredentialsError {
         /// The address.
         endpoint: Endpoint,
     },
-    /// A token would be readable on its way.
+    /// The token would be sent unencrypted.
     #[error(
         "a token is not sent to {endpoint} in the clear, where others could read it; write \
          https://HOST:PORT, or leave --token-file out"
@@ -77,15 +77,15 @@ pub enum CredentialsError {
         /// The address.
         endpoint: Endpoint,
     },
-    /// TLS refuses what the files hold.
+    /// TLS refuses the content of the files.
     #[error("TLS cannot be set up: {source}")]
     Tls {
-        /// Why.
+        /// The reason.
         source: rustls::Error,
     },
 }
 
-/// Makes connections into TLS connections.
+/// Turns connections into TLS connections.
 #[derive(Clone)]
 pub(crate) struct Connector(pub(crate) TlsConnector);
 
@@ -94,10 +94,10 @@ pub(crate) struct Connector(pub(crate) TlsConnector);
 pub struct Bearer(Option<MetadataValue<Ascii>>);
 
 impl Credentials {
-    /// Reads the files for the coordinator at `endpoint`.
+    /// Reads the credentials for the coordinator at `endpoint`.
     ///
     /// # Errors
-    /// When a file cannot be used, or does not fit the address.
+    /// If a file cannot be used, or does not fit the address.
     pub fn load(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Self, CredentialsError> {
         let encrypted = matches!(endpoint, Endpoint::Https(_));
         let endpoint_of = || endpoint.clone();
@@ -116,12 +116,12 @@ impl Credentials {
 }
 
 impl CredentialFiles {
-    /// The options of TLS by name, and their files.
+    /// Returns the names of the TLS options, with their files.
     pub fn of_tls(&self) -> [(&'static str, &Option<PathBuf>); 3] {
         [("--tls-ca", &self.ca), ("--tls-cert", &self.certificate), ("--tls-key", &self.key)]
     }
 
-    /// The first option that was given, if any.
+    /// Returns the first option that was given, if any.
     pub fn first_given(&self) -> Option<&'static str> {
         let token = [("--token-file", &self.token)];
         let mut all = self.of_tls().into_iter().chain(token);
@@ -133,7 +133,7 @@ impl Bearer {
     fn new(token: Option<&Token>) -> Self {
         let header = token.and_then(|token| format!("Bearer {}", token.reveal()).parse().ok());
         Self(header.map(|mut header: MetadataValue<Ascii>| {
-            // Neither printed nor kept in a table of headers.
+            // Sensitive headers are not printed and not kept in the table of header compression.
             header.set_sensitive(true);
             header
         }))
@@ -155,10 +155,10 @@ impl std::fmt::Debug for Connector {
     }
 }
 
-/// Certificates as roots of trust.
+/// Reads certificates as trusted roots.
 ///
 /// # Errors
-/// When one of them cannot be one.
+/// If one of them cannot be a trusted root.
 pub fn roots(path: &std::path::Path) -> Result<RootCertStore, CredentialError> {
     let mut roots = RootCertStore::empty();
     for certificate in credential_file::certificates(path)? {

@@ -1,4 +1,4 @@
-//! Where a coordinator is, and a channel to it.
+//! Address of a coordinator, and channels to it.
 
 use std::fmt;
 use std::io;
@@ -26,81 +26,81 @@ use crate::tls_failure::TlsFailure;
 use crate::v1::jobs_client::JobsClient;
 use crate::v1::workers_client::WorkersClient;
 
-/// Longest path of a Unix socket, bytes: the kernel's limit without the closing zero.
+/// Longest path of a Unix socket in bytes: the kernel's limit without the terminating zero.
 const SOCKET_PATH_BYTES_MAX: usize = 107;
-/// A silent connection is probed this often, s.
+/// Interval of keepalive probes on a silent connection, s.
 const KEEPALIVE_INTERVAL_S: u64 = 5;
-/// A connection is given up when a probe stays unanswered for this long, s.
+/// Time after which a connection with an unanswered probe is closed, s.
 const KEEPALIVE_TIMEOUT_S: u64 = 10;
 
-/// What addresses look like, for messages.
+/// The forms of addresses, for error messages.
 const FORMS: &str = "https://HOST:PORT, http://HOST:PORT or unix:PATH";
 
 /// Address of a coordinator: `https://HOST:PORT`, `http://HOST:PORT` or `unix:PATH`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Endpoint {
-    /// HTTP/2 in TLS over TCP; the host and port.
+    /// HTTP/2 in TLS over TCP; holds host and port.
     Https(String),
-    /// Plain HTTP/2 over TCP; the host and port.
+    /// Plain HTTP/2 over TCP; holds host and port.
     Http(String),
-    /// A Unix socket.
+    /// A Unix socket; holds its path.
     Unix(PathBuf),
 }
 
-/// Why a text is no address of a coordinator.
+/// Reason why a text is not an address of a coordinator.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EndpointError {
-    /// None of the known schemes.
+    /// The scheme is unknown.
     #[error("`{text}` is not a valid coordinator URL; write {FORMS}")]
     Scheme {
-        /// What was given.
+        /// The text given.
         text: String,
     },
-    /// The host or port cannot be read.
+    /// The host or port is invalid.
     #[error(
         "`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing behind it"
     )]
     Authority {
         /// `http` or `https`.
         scheme: &'static str,
-        /// What was given.
+        /// The text given.
         text: String,
     },
     /// The path of the socket is empty or too long for the kernel.
     #[error("`{text}` needs a path of 1 to {SOCKET_PATH_BYTES_MAX} bytes, it has {bytes}")]
     SocketPath {
-        /// What was given.
+        /// The text given.
         text: String,
         /// Length of the path.
         bytes: usize,
     },
 }
 
-/// Why there is no channel to a coordinator.
+/// Reason why there is no channel to a coordinator.
 #[derive(Debug, Error)]
 pub enum ConnectError {
-    /// Nothing answers there.
+    /// No answer at the address.
     #[error("cannot reach the coordinator at {endpoint}: {reason}")]
     Unreachable {
         /// The address.
         endpoint: Endpoint,
-        /// What the operating system says.
+        /// The operating system's error.
         reason: String,
     },
-    /// Something answers there, but there is no trust.
+    /// TLS could not be established.
     #[error("cannot trust the coordinator at {endpoint}: {failure}")]
     Tls {
         /// The address.
         endpoint: Endpoint,
-        /// Why.
+        /// The TLS failure.
         failure: TlsFailure,
     },
-    /// No connection in time.
+    /// The connection was not established in time.
     #[error("the coordinator at {endpoint} did not answer within {seconds} s")]
     Timeout {
         /// The address.
         endpoint: Endpoint,
-        /// How long was waited, s.
+        /// Time waited, s.
         seconds: f64,
     },
 }
@@ -127,7 +127,7 @@ impl FromStr for Endpoint {
     }
 }
 
-/// The host and port of a URL that has nothing else.
+/// Returns the host and port of a URL, and refuses a URL that has more than these.
 fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, EndpointError> {
     let authority = authority.strip_suffix('/').unwrap_or(authority);
     let uri: Option<Uri> = format!("{scheme}://{authority}").parse().ok();
@@ -143,8 +143,9 @@ fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, En
 }
 
 impl Endpoint {
-    /// Why a call ended with the status. Where it broke before this peer had ever answered, and nothing
-    /// says that nobody listens, TLS may be the cause; a peer that has answered speaks what we do.
+    /// Returns an explanation of a failed call. If the connection broke before this peer had ever
+    /// answered, and the error is not a refused connection, TLS may be the cause; a peer that has
+    /// answered before uses the same protocol.
     pub fn explained(&self, status: &Status, ever_answered: bool) -> String {
         let Some(cause) = std::error::Error::source(status) else {
             return status.message().to_owned();
@@ -158,7 +159,7 @@ impl Endpoint {
         }
     }
 
-    /// Whether what is sent there stays on this machine: a Unix socket or a loopback address.
+    /// Returns whether the traffic stays on this machine: a Unix socket or a loopback address.
     pub fn is_local(&self) -> bool {
         let authority = match self {
             Self::Unix(_) => return true,
@@ -169,12 +170,12 @@ impl Endpoint {
     }
 }
 
-/// Whether `text` is a host name or an IP address, as a certificate can be for.
+/// Returns whether `text` is a host name or an IP address for which a certificate can be issued.
 pub fn is_host(text: &str) -> bool {
     ServerName::try_from(text).is_ok()
 }
 
-/// The host of `HOST:PORT`, without the brackets of an IPv6 address.
+/// Returns the host of `HOST:PORT`, without the brackets of an IPv6 address.
 fn host(authority: &str) -> &str {
     let host = authority.rsplit_once(':').map_or(authority, |(host, _)| host);
     host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host)
@@ -190,21 +191,21 @@ impl fmt::Display for Endpoint {
     }
 }
 
-/// A channel that shows a token with every call, if there is one.
+/// A channel that sends a token with every call, if there is one.
 pub type Connection = InterceptedService<Channel, Bearer>;
 
-/// As [`connect_with`], without any credentials.
+/// Same as [`connect_with`], without credentials.
 ///
 /// # Errors
-/// When nothing answers there, or not within `timeout`.
+/// If there is no answer, or none within `timeout`.
 pub async fn connect(endpoint: &Endpoint, timeout: Duration) -> Result<Channel, ConnectError> {
     channel(endpoint, None, timeout).await
 }
 
-/// A connection to the coordinator at `endpoint`; dead ones are noticed by keepalive probes.
+/// Connects to the coordinator at `endpoint`. Keepalive probes detect dead connections.
 ///
 /// # Errors
-/// When nothing answers there, or not within `timeout`, or there is no trust.
+/// If there is no answer, or none within `timeout`, or TLS cannot be established.
 pub async fn connect_with(
     endpoint: &Endpoint,
     credentials: &Credentials,
@@ -236,7 +237,7 @@ async fn channel(
             }
             Endpoint::Unix(path) => {
                 let path = path.clone();
-                // The URI only fills the requests' `:authority`.
+                // The URI only sets the requests' `:authority`.
                 let connector = service_fn(move |_: Uri| {
                     let path = path.clone();
                     async move {
@@ -259,7 +260,7 @@ async fn channel(
     }
 }
 
-/// A TLS connection to HOST:PORT. Without credentials there is nobody to believe.
+/// Opens a TLS connection to HOST:PORT. Without credentials no certificate is trusted.
 async fn dial_tls(
     authority: String,
     tls: Option<Connector>,
@@ -281,7 +282,7 @@ fn unconnected(endpoint: &Endpoint, error: &(dyn std::error::Error + 'static)) -
     }
 }
 
-/// A client of the service of jobs, with this project's limit of message sizes.
+/// Returns a client of the jobs service, with this project's limit of message sizes.
 pub fn jobs_client<T>(channel: T) -> JobsClient<T>
 where
     T: GrpcService<Body>,
@@ -294,7 +295,7 @@ where
         .max_encoding_message_size(MESSAGE_BYTES_MAX)
 }
 
-/// A client of the service of workers, with this project's limit of message sizes.
+/// Returns a client of the workers service, with this project's limit of message sizes.
 pub fn workers_client<T>(channel: T) -> WorkersClient<T>
 where
     T: GrpcService<Body>,
@@ -316,7 +317,7 @@ fn transport(uri: String, timeout: Duration) -> Result<Transport, tonic::transpo
         .keep_alive_while_idle(true))
 }
 
-/// Whether the operating system says that nobody listens there.
+/// Returns whether the operating system refused the connection, i.e. nothing listens there.
 fn is_refused(error: &(dyn std::error::Error + 'static)) -> bool {
     let mut cause = Some(error);
     while let Some(error) = cause {
@@ -324,7 +325,7 @@ fn is_refused(error: &(dyn std::error::Error + 'static)) -> bool {
         if io.is_some_and(|io| io.kind() == io::ErrorKind::ConnectionRefused) {
             return true;
         }
-        // An I/O error hides the error that it was made of from the chain of causes.
+        // An I/O error omits its inner error from the chain of sources.
         cause = match io.and_then(io::Error::get_ref) {
             Some(hidden) => Some(hidden),
             None => error.source(),
@@ -333,7 +334,7 @@ fn is_refused(error: &(dyn std::error::Error + 'static)) -> bool {
     false
 }
 
-/// The last cause of an error: for a transport error it is the operating system's.
+/// Returns the innermost cause of an error; for a transport error it is the operating system's.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut cause = error;
     while let Some(next) = cause.source() {

@@ -1,39 +1,39 @@
-//! How a process names itself to others: the name of its host, and numbers that no other has.
+//! Identification of a process: its host name, and unique random numbers.
 
 use thiserror::Error;
 
-/// The operating system gives no random numbers.
+/// The operating system provides no random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("the operating system gives no random numbers")]
 pub struct NoRandomness;
 
-/// Random bytes of the operating system, fit for secrets.
+/// Returns random bytes from the operating system, fit for secrets.
 ///
 /// # Errors
-/// When it gives none.
+/// If the operating system provides none.
 pub fn random_bytes<const N: usize>() -> Result<[u8; N], NoRandomness> {
     let mut bytes = [0; N];
     getrandom::fill(&mut bytes).map_err(|_| NoRandomness)?;
     Ok(bytes)
 }
 
-/// A random number other than 0.
+/// Returns a random number other than 0.
 ///
 /// # Errors
-/// As [`random_bytes`].
+/// Same as [`random_bytes`].
 pub fn random_number() -> Result<u64, NoRandomness> {
     Ok(u64::from_le_bytes(random_bytes()?).max(1))
 }
 
-/// Random bytes as hexadecimal digits, two for each.
+/// Returns random bytes as hexadecimal digits, two for each byte.
 ///
 /// # Errors
-/// As [`random_bytes`].
+/// Same as [`random_bytes`].
 pub fn random_digits<const N: usize>() -> Result<String, NoRandomness> {
     Ok(random_bytes::<N>()?.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// The name of this host, if it has one.
+/// Returns the name of this host, if it has one.
 pub fn host_name() -> Option<String> {
     let names = rustix::system::uname();
     let name = names.nodename().to_string_lossy().trim().to_owned();

@@ -1,9 +1,9 @@
-//! Protocol buffers of `osteon.v1`, and the one place where messages become `osteon-common`
-//! types and back.
+//! Protocol buffers of `osteon.v1`, and the one place where messages are converted to and from
+//! `osteon-common` types.
 //!
-//! Messages from a peer are never trusted: what a client sends is checked field by field and
-//! every [`osteon_common::violations::Violations`] is reported at once, what a coordinator or a
-//! worker sends is either well formed or a typed [`malformed::Malformed`].
+//! Messages from a peer are never trusted. A client's message is checked field by field and every
+//! [`osteon_common::violations::Violations`] is reported at once. A message from a coordinator or a
+//! worker is either well formed or a typed [`malformed::Malformed`].
 
 pub mod batch;
 pub mod choice;

@@ -1,9 +1,9 @@
-//! Why a message between the programs of osteon cannot be read.
+//! Defects of messages between the programs of osteon.
 
 use osteon_common::violations::Violations;
 use thiserror::Error;
 
-/// A message that no osteon of this version writes.
+/// A defect that no message of this version of osteon has.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Malformed {
     /// A required field is absent.
@@ -17,30 +17,30 @@ pub enum Malformed {
     WrongLength {
         /// Name of the field in the `.proto` file.
         field: &'static str,
-        /// How many it has.
+        /// Number of elements found.
         found: usize,
-        /// How many it must have.
+        /// Number of elements required.
         expected: usize,
     },
-    /// A number of an enumeration, or a code, that is not known.
+    /// A number of an enumeration, or a code, is unknown.
     #[error("field `{field}` has the unknown value {value}")]
     UnknownValue {
         /// Name of the field in the `.proto` file.
         field: &'static str,
-        /// What was found.
+        /// The number found.
         value: i64,
     },
-    /// A number that is not allowed.
+    /// A number is out of range.
     #[error("field `{field}` is {value}; {allowed}")]
     OutOfRange {
         /// Name of the field in the `.proto` file.
         field: &'static str,
-        /// What was found.
+        /// The number found.
         value: f64,
-        /// What is allowed.
+        /// The allowed values.
         allowed: &'static str,
     },
-    /// A pair of code and velocity that no outcome encodes to.
+    /// A pair of code and velocity does not encode an outcome.
     #[error("realization {index} has code {code} with velocity {velocity}, which no outcome has")]
     Outcome {
         /// Index within the block.
@@ -50,7 +50,7 @@ pub enum Malformed {
         /// Velocity, m/s.
         velocity: f64,
     },
-    /// An estimated error that no outcome has.
+    /// An estimated error is not one that an outcome can have.
     #[error(
         "realization {index} has the estimated error {value}; it must be finite and at least 0, and \
          0 on failure"
@@ -58,16 +58,16 @@ pub enum Malformed {
     EstimatedError {
         /// Index within the block.
         index: usize,
-        /// What was found.
+        /// The number found.
         value: f64,
     },
-    /// The setup of a batch lacks a field: its result would depend on the worker's defaults.
+    /// The setup of a batch lacks a field, so its result would depend on the worker's defaults.
     #[error("the setup of a batch is incomplete")]
     IncompleteSetup,
-    /// The setup of a batch breaks a rule.
+    /// The setup of a batch violates a rule.
     #[error("the setup of a batch is not valid: {0}")]
     InvalidSetup(Violations),
-    /// A stored specification breaks a rule.
+    /// A stored specification violates a rule.
     #[error("the specification is not valid: {0}")]
     InvalidSpecification(Violations),
 }

@@ -1,11 +1,11 @@
-//! A number for each parameter, as a message.
+//! A number for each parameter as a message.
 
 use osteon_common::parameters::{Parameter, Point};
 
 use crate::malformed::Malformed;
 use crate::v1;
 
-/// The message of a point.
+/// Returns the message of a point.
 pub fn point_to_message(point: &Point) -> v1::ParameterValues {
     let [
         density,
@@ -27,10 +27,10 @@ pub fn point_to_message(point: &Point) -> v1::ParameterValues {
     }
 }
 
-/// The point of a message.
+/// Returns the point of a message.
 ///
 /// # Errors
-/// When the message or one of the seven is absent, or one is not finite.
+/// If the message or one of the seven numbers is absent, or if one is not finite.
 pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point, Malformed> {
     let message = message.ok_or(Malformed::Missing { field: "point" })?;
     let mut point = Point([0.0; 7]);
@@ -45,7 +45,7 @@ pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point
     Ok(point)
 }
 
-/// The message of a number for each of these parameters.
+/// Returns the message of one number for each of these parameters.
 pub(crate) fn some_to_message(parameters: &[Parameter], values: &[f64]) -> v1::ParameterValues {
     let mut message = v1::ParameterValues::default();
     for (&parameter, &value) in parameters.iter().zip(values) {
@@ -54,10 +54,10 @@ pub(crate) fn some_to_message(parameters: &[Parameter], values: &[f64]) -> v1::P
     message
 }
 
-/// The numbers of these parameters.
+/// Returns the numbers of these parameters.
 ///
 /// # Errors
-/// When one is absent.
+/// If one is absent.
 pub(crate) fn some_from_message(
     parameters: &[Parameter],
     message: &v1::ParameterValues,

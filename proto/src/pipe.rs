@@ -1,4 +1,4 @@
-//! What comes through a pipe that a user names, such as `--token-file <(pass show osteon)`.
+//! Reading from a pipe that a user names, such as `--token-file <(pass show osteon)`.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -7,19 +7,19 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
 
-/// A pipe was not written to its end in time; the payload of an [`io::Error`].
+/// A pipe was not closed by its writers in time; used as the payload of an [`io::Error`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("it is a pipe, and nobody wrote it to its end within {seconds} s")]
 pub(crate) struct Unfinished {
-    /// How long was waited, s.
+    /// Time waited, s.
     seconds: u64,
 }
 
-/// The bytes that come through a pipe until its writers have gone; `None` if there are more than
-/// `bytes_max`. Blocks for at most `limit`.
+/// Reads a pipe until its writers have closed it; returns `None` if there are more than `bytes_max`
+/// bytes. Blocks for at most `limit`.
 ///
 /// # Errors
-/// What the operating system says, or [`Unfinished`].
+/// The operating system's error, or [`Unfinished`].
 pub(crate) fn read(
     mut pipe: &File,
     bytes_max: u64,
@@ -29,7 +29,8 @@ pub(crate) fn read(
     let (mut bytes, mut piece) = (Vec::new(), [0; 4096]);
     loop {
         let left = limit.saturating_sub(begun.elapsed());
-        // Without it a pipe that nobody has opened for writing yet would seem to be at its end.
+        // Without polling, a pipe that has not been opened for writing yet would appear to be at
+        // its end.
         let ready = match Timespec::try_from(left) {
             Ok(left) => poll(&mut [PollFd::new(&pipe, PollFlags::IN)], Some(&left)),
             Err(_) => return Err(io::ErrorKind::InvalidInput.into()),
@@ -74,7 +75,7 @@ mod tests {
         let written = |text: &'static [u8], bytes_max| {
             let pipe = open_or_pipe(&path).unwrap();
             let path = path.clone();
-            // Nobody writes when it is opened, and not all comes at once.
+            // The reader opens the pipe before the writer, and the bytes arrive in parts.
             let writer = std::thread::spawn(move || {
                 let mut pipe = OpenOptions::new().write(true).open(path).unwrap();
                 for part in text.chunks(3) {
@@ -89,7 +90,8 @@ mod tests {
         assert_eq!(written(b"a secret", 8).as_deref(), Some(&b"a secret"[..]));
         assert_eq!(written(b"a secret", 7), None);
         assert_eq!(written(b"", 7).as_deref(), Some(&b""[..]));
-        // Neither who never comes nor who never ends is waited for longer.
+        // The wait is limited for a writer that never comes, and for one that never closes the
+        // pipe.
         let pipe = open_or_pipe(&path).unwrap();
         let limit = Duration::from_millis(20);
         let check = || {

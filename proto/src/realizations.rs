@@ -1,34 +1,34 @@
-//! Outcomes of consecutive indices, packed: a code byte and a double each.
+//! Outcomes of consecutive indices in packed form: a code byte and a double each.
 
 use osteon_common::outcome::{self, Outcome};
 
 use crate::malformed::Malformed;
 use crate::v1;
 
-/// The block of `outcomes` at the best point of a group, if there are groups, whose first has index
-/// `first`.
+/// Packs `outcomes`, the first of which has index `first`, into a block. `group` is the group whose
+/// best point they belong to, if there are groups.
 pub fn to_message(group: Option<u32>, first: u64, outcomes: &[Outcome]) -> v1::RealizationBlock {
     let (codes, velocities) = pack(outcomes);
     v1::RealizationBlock { group, first, codes, velocities }
 }
 
-/// Index of the first realization of a block, and its outcomes.
+/// Returns the index of the first realization of a block, and the block's outcomes.
 ///
 /// # Errors
-/// As [`unpack`].
+/// Same as [`unpack`].
 pub fn from_message(block: &v1::RealizationBlock) -> Result<(u64, Vec<Outcome>), Malformed> {
     Ok((block.first, unpack(&block.codes, &block.velocities)?))
 }
 
-/// Code bytes and velocities (m/s, 0 on failure) of `outcomes`, in their order.
+/// Returns the code bytes and velocities (m/s, 0 on failure) of `outcomes`, in their order.
 pub fn pack(outcomes: &[Outcome]) -> (Vec<u8>, Vec<f64>) {
     outcomes.iter().map(|&outcome| outcome::encode(outcome)).unzip()
 }
 
-/// The outcomes that [`pack`] wrote.
+/// Returns the outcomes packed by [`pack`].
 ///
 /// # Errors
-/// When the lengths differ, or a pair is not one that an outcome encodes to.
+/// If the lengths differ, or if a pair does not encode an outcome.
 pub fn unpack(codes: &[u8], velocities: &[f64]) -> Result<Vec<Outcome>, Malformed> {
     if codes.len() != velocities.len() {
         return Err(Malformed::WrongLength {

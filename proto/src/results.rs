@@ -24,8 +24,8 @@ use crate::setup;
 use crate::specification::{search_from_message, search_to_message};
 use crate::v1;
 
-/// The message of a result. Its groups have messages of their own, and the outcomes of best points
-/// travel in realization blocks.
+/// Returns the message of a result. Its groups have messages of their own, and the outcomes of best
+/// points are sent in realization blocks.
 pub fn to_message(result: &JobResult) -> v1::JobResult {
     let conclusions = conclusions::to_message(&result.conclusions);
     v1::JobResult {
@@ -56,10 +56,10 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
     }
 }
 
-/// The result of a message, with the `outcomes` of its best point, and its `groups`.
+/// Returns the result of a message, with the `outcomes` of its best point, and its `groups`.
 ///
 /// # Errors
-/// When a required field is absent, or a value is not one that a coordinator writes.
+/// If a required field is absent, or a value is not one that a coordinator writes.
 pub fn from_message(
     message: &v1::JobResult,
     outcomes: Vec<Outcome>,
@@ -91,7 +91,7 @@ pub fn from_message(
     })
 }
 
-/// The message of what was found for group number `group`.
+/// Returns the message of the result of group number `group`.
 pub fn group_to_message(group: u32, found: &GroupResult) -> v1::GroupResult {
     let conclusions = conclusions::to_message(&found.conclusions);
     v1::GroupResult {
@@ -108,10 +108,10 @@ pub fn group_to_message(group: u32, found: &GroupResult) -> v1::GroupResult {
     }
 }
 
-/// What was found for a group, with the `outcomes` of its best point.
+/// Returns the result of a group, with the `outcomes` of its best point.
 ///
 /// # Errors
-/// As [`from_message`].
+/// Same as [`from_message`].
 pub fn group_from_message(
     message: &v1::GroupResult,
     outcomes: Vec<Outcome>,
@@ -133,7 +133,7 @@ pub fn group_from_message(
     })
 }
 
-/// The message of how the search for a group ended.
+/// Returns the message of the ending of a group's search.
 pub fn group_ending_to_message(ending: &GroupEnding) -> v1::GroupEnding {
     v1::GroupEnding {
         status: JOB_STATUS.number(ending.status),
@@ -142,10 +142,10 @@ pub fn group_ending_to_message(ending: &GroupEnding) -> v1::GroupEnding {
     }
 }
 
-/// How the search for a group ended.
+/// Returns the ending of a group's search.
 ///
 /// # Errors
-/// When the status is absent or unknown.
+/// If the status is absent or unknown.
 pub fn group_ending_from_message(message: &v1::GroupEnding) -> Result<GroupEnding, Malformed> {
     Ok(GroupEnding {
         status: JOB_STATUS.required(message.status, "status")?,
@@ -154,7 +154,7 @@ pub fn group_ending_from_message(message: &v1::GroupEnding) -> Result<GroupEndin
     })
 }
 
-/// The message of one row of the history.
+/// Returns the message of one row of the history.
 pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
     v1::EvaluationRow {
         number: evaluation.number,
@@ -169,11 +169,11 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
     }
 }
 
-/// One row of the history.
+/// Returns one row of the history.
 ///
 /// # Errors
-/// When the point has not seven finite numbers, or the kind of a failure or the varied parameter is not
-/// known.
+/// If the point does not have seven finite numbers, or if a failure kind or the varied parameter is
+/// unknown.
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     Ok(Evaluation {
@@ -244,7 +244,7 @@ fn conclusions_from_message(message: &v1::JobResult) -> Result<Conclusions, Malf
     })
 }
 
-/// What of a specification a result repeats as its messages.
+/// The parts of a specification that a result repeats, as messages.
 struct Settings {
     objective: Objective,
     search: Search,

@@ -1,7 +1,7 @@
 //! Layers, probe, picking and solver settings as messages.
 //!
 //! Absent fields take the `Default` of the `osteon-common` types, so that a client needs to send
-//! only what differs from them.
+//! only the fields that differ from it.
 
 use osteon_common::case::Setup;
 use osteon_common::check;
@@ -13,7 +13,7 @@ use osteon_common::violations::Violations;
 use crate::choice::{EXTREMUM, SOLVER_METHOD};
 use crate::v1;
 
-/// The four messages that stand for a [`Setup`].
+/// The four messages of a [`Setup`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetupMessages {
     /// Field `layers`.
@@ -26,7 +26,7 @@ pub struct SetupMessages {
     pub solver: v1::SolverSettings,
 }
 
-/// The complete messages of a setup: every field is present.
+/// Returns the complete messages of a setup: every field is present.
 pub fn to_messages(setup: &Setup) -> SetupMessages {
     SetupMessages {
         layers: layers_to_message(&setup.layers),
@@ -36,8 +36,8 @@ pub fn to_messages(setup: &Setup) -> SetupMessages {
     }
 }
 
-/// The setup of four optional messages. Choices that are not known are added to `violations`;
-/// numbers are not looked at.
+/// Returns the setup of four optional messages. Unknown enumeration values are added to
+/// `violations`; numbers are not checked here.
 pub fn from_messages(
     layers: Option<&v1::Layers>,
     probe: Option<&v1::Probe>,
@@ -55,12 +55,12 @@ pub fn from_messages(
     }
 }
 
-/// Picking as a complete message.
+/// Returns picking settings as a complete message.
 pub fn picking_to_message(picking: &Picking) -> v1::Picking {
     v1::Picking { extremum: EXTREMUM.number(picking.extremum), threshold: Some(picking.threshold) }
 }
 
-/// Solver settings as a complete message.
+/// Returns solver settings as a complete message.
 pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
     let hybrid = solver.method == Method::Hybrid;
     v1::SolverSettings {
@@ -72,7 +72,7 @@ pub fn solver_to_message(solver: &SolverSettings) -> v1::SolverSettings {
     }
 }
 
-/// Picking of a message; an extremum that is not known is added to `violations`.
+/// Returns the picking settings of a message; an unknown extremum is added to `violations`.
 pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) -> Picking {
     let default = Picking::default();
     Picking {
@@ -86,8 +86,8 @@ pub fn picking_from_message(message: &v1::Picking, violations: &mut Violations) 
     }
 }
 
-/// Solver settings of a message; a method that is not known, and a field that the method does not
-/// have, are added to `violations`.
+/// Returns the solver settings of a message; an unknown method, and a field that the method does
+/// not have, are added to `violations`.
 pub fn solver_from_message(
     message: &v1::SolverSettings,
     violations: &mut Violations,
@@ -102,7 +102,7 @@ pub fn solver_from_message(
     ];
     let refinement = message.refinement.unwrap_or(default.refinement);
     if method != Method::Hybrid {
-        // Of a method that could not be read, nobody knows what belongs to it.
+        // If the method is unknown, it cannot be decided which fields belong to it.
         let known = !violations.touches("solver.method");
         for (key, _) in
             check::HYBRID_KEYS.into_iter().zip(given).filter(|&(_, given)| given && known)

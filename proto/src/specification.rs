@@ -12,7 +12,7 @@ use crate::choice::{JOB_KIND, OBJECTIVE, PARAMETER, SAMPLING, SEARCH_METHOD};
 use crate::setup;
 use crate::v1;
 
-/// The complete message of a specification: every field is present.
+/// Returns the complete message of a specification: every field is present.
 pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
     let messages = setup::to_messages(&specification.setup);
     v1::JobSpecification {
@@ -29,10 +29,10 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
     }
 }
 
-/// The specification of a message, defaults filled in and every rule checked.
+/// Returns the specification of a message, with defaults filled in and every rule checked.
 ///
 /// # Errors
-/// Every violation, by the field's path in the message.
+/// All violations, each with the field's path in the message.
 pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, Violations> {
     let mut violations = Violations::new();
     let specification = read(message, &mut violations);
@@ -40,7 +40,8 @@ pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, 
     violations.with_fields(field_of_message).into_result(specification)
 }
 
-/// The path in the message of a field of a job file: they differ for the ranges of parameters.
+/// Returns the path in the message of a field of a job file. They differ for the ranges of
+/// parameters.
 fn field_of_message(field: &str) -> String {
     let of_range = field.strip_prefix("parameters.").and_then(|rest| rest.split_once('.'));
     match of_range {
@@ -50,7 +51,8 @@ fn field_of_message(field: &str) -> String {
     }
 }
 
-/// Reads all fields; one that cannot be read is recorded and replaced by a default.
+/// Reads all fields; a field that cannot be read is recorded as a violation and replaced by a
+/// default.
 fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpecification {
     let kind = JOB_KIND.value(message.kind).unwrap_or_else(|| {
         violations.add("kind", JOB_KIND.refusal(message.kind));
@@ -223,7 +225,7 @@ fn monte_carlo_from_message(
     }
 }
 
-/// The complete message of a search.
+/// Returns the complete message of a search.
 pub(crate) fn search_to_message(search: &Search) -> v1::Search {
     v1::Search {
         method: SEARCH_METHOD.number(search.method),
@@ -237,7 +239,7 @@ pub(crate) fn search_to_message(search: &Search) -> v1::Search {
     }
 }
 
-/// The search of a message, defaults filled in.
+/// Returns the search of a message, with defaults filled in.
 pub(crate) fn search_from_message(
     message: Option<&v1::Search>,
     violations: &mut Violations,
@@ -277,7 +279,7 @@ fn priors_from_message(messages: &[v1::Prior], violations: &mut Violations) -> [
         let Some(known) = PARAMETER.value(parameter) else {
             violations
                 .add("search.priors", format!("`parameter` {}", PARAMETER.refusal(parameter)));
-            // One is enough to read.
+            // Report only the first unknown parameter.
             return priors;
         };
         match &mut priors[known as usize] {

@@ -1,4 +1,4 @@
-//! Refusals as a gRPC status with the details of `google.rpc`, and violations back from one.
+//! Refusals as gRPC statuses with the details of `google.rpc`, and violations back from a status.
 
 use std::time::Duration;
 
@@ -6,11 +6,11 @@ use osteon_common::violations::Violations;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-/// Most bytes of fields and messages that a status carries; what is beyond is counted in a last
-/// entry. HTTP/2 peers refuse trailers of more than 16 KiB, and base64 adds a third.
+/// Maximum size of the fields and messages that a status carries, bytes; the rest is counted in a
+/// last entry. HTTP/2 peers refuse trailers of more than 16 KiB, and base64 adds a third.
 const DETAIL_BYTES_MAX: usize = 8 << 10;
 
-/// `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names every field at fault.
+/// Returns `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names every field at fault.
 pub fn invalid_argument(violations: &Violations) -> Status {
     let mut details = ErrorDetails::new();
     let mut bytes = 0;
@@ -30,18 +30,19 @@ pub fn invalid_argument(violations: &Violations) -> Status {
     Status::with_error_details(Code::InvalidArgument, message, details)
 }
 
-/// `RESOURCE_EXHAUSTED` with a `google.rpc.RetryInfo`: the same request may succeed after `retry`.
+/// Returns `RESOURCE_EXHAUSTED` with a `google.rpc.RetryInfo`: the same request may succeed after
+/// `retry`.
 pub fn resource_exhausted(message: impl Into<String>, retry: Duration) -> Status {
     let details = ErrorDetails::with_retry_info(Some(retry));
     Status::with_error_details(Code::ResourceExhausted, message, details)
 }
 
-/// How long to wait before a refused request is tried again, if its status says so.
+/// Returns the time to wait before a refused request is tried again, if its status carries one.
 pub fn retry_after(status: &Status) -> Option<Duration> {
     status.get_details_retry_info()?.retry_delay
 }
 
-/// The violations that a status carries, if it is one of [`invalid_argument`].
+/// Returns the violations that a status carries, if [`invalid_argument`] made it.
 pub fn violations(status: &Status) -> Option<Violations> {
     if status.code() != Code::InvalidArgument {
         return None;
@@ -53,14 +54,14 @@ pub fn violations(status: &Status) -> Option<Violations> {
     (!violations.is_empty()).then_some(violations)
 }
 
-/// `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names the one `field` of a request that is
-/// at fault; `message` goes on after its name.
+/// Returns `INVALID_ARGUMENT` with a `google.rpc.BadRequest` that names the one `field` of a
+/// request that is at fault; `message` continues the sentence after its name.
 pub fn bad_field(field: &str, message: &str) -> Status {
     let details = ErrorDetails::with_bad_request_violation(field, message);
     Status::with_error_details(Code::InvalidArgument, format!("{field} {message}"), details)
 }
 
-/// Something that a request may name.
+/// A kind of resource that a request may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resource {
     /// A job.
@@ -72,7 +73,7 @@ pub enum Resource {
 impl Resource {
     const ALL: [Self; 2] = [Self::Job, Self::Worker];
 
-    /// The type of the resource in a `google.rpc.ResourceInfo`.
+    /// Returns the resource type for a `google.rpc.ResourceInfo`.
     fn name(self) -> &'static str {
         match self {
             Self::Job => "job",
@@ -81,14 +82,14 @@ impl Resource {
     }
 }
 
-/// `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the resource by its `id`.
+/// Returns `NOT_FOUND` with a `google.rpc.ResourceInfo` that names the resource by its `id`.
 pub fn not_found(resource: Resource, id: impl Into<String>, message: impl Into<String>) -> Status {
     let message = message.into();
     let details = ErrorDetails::with_resource_info(resource.name(), id, "", &message);
     Status::with_error_details(Code::NotFound, message, details)
 }
 
-/// The resource that there is not, if that is what `status` says.
+/// Returns the kind of the missing resource, if `status` reports one.
 pub fn missing(status: &Status) -> Option<Resource> {
     let name = status.get_details_resource_info()?.resource_type;
     Resource::ALL.into_iter().find(|resource| resource.name() == name)

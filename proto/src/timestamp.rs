@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use prost_types::Timestamp;
 
-/// A time since the Unix epoch.
+/// Returns a time since the Unix epoch as a message.
 pub fn to_message(since_epoch: Duration) -> Timestamp {
-    // A time beyond the range of a timestamp is none of this machine's clock.
+    // A machine's clock never shows a time beyond the range of a timestamp.
     let seconds = i64::try_from(since_epoch.as_secs()).unwrap_or(i64::MAX);
     Timestamp { seconds, nanos: since_epoch.subsec_nanos().cast_signed() }
 }
 
-/// Time since the Unix epoch; `None` of one before it, and of one that is not well formed.
+/// Returns the time since the Unix epoch; `None` if it is before the epoch or the message is
+/// malformed.
 pub fn from_message(message: &Timestamp) -> Option<Duration> {
     let nanos = u32::try_from(message.nanos).ok().filter(|nanos| *nanos < 1_000_000_000)?;
     Some(Duration::new(u64::try_from(message.seconds).ok()?, nanos))

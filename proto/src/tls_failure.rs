@@ -1,4 +1,4 @@
-//! Why TLS did not come about, in words that tell what to do.
+//! TLS failures, with messages that say what to do.
 
 use std::error::Error;
 use std::io;
@@ -6,44 +6,44 @@ use std::io;
 use thiserror::Error;
 use tokio_rustls::rustls::{self, CertificateError};
 
-/// Why there is no trust between two peers.
+/// Reason why TLS could not be established with a peer.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TlsFailure {
-    /// Another authority signed the peer's certificate.
+    /// The peer's certificate was signed by an unknown authority.
     #[error("its certificate is not signed by the authority in --tls-ca; is that the right file?")]
     UnknownAuthority,
-    /// The peer's certificate is too old.
+    /// The peer's certificate has expired.
     #[error("its certificate has expired; it needs a new one")]
     Expired,
-    /// The peer's certificate is too young.
+    /// The peer's certificate is not valid yet.
     #[error("its certificate is not valid yet; are the clocks right?")]
     NotYetValid,
-    /// The peer is somebody else, or has another name.
+    /// The peer's certificate is for another host name.
     #[error("its certificate is not for this host name; it is for {names}")]
     OtherName {
-        /// Whom the certificate is for.
+        /// The names in the certificate.
         names: String,
     },
-    /// The peer's certificate is for something else.
+    /// The peer's certificate is not for this purpose.
     #[error("its certificate is not one for coordinators")]
     OtherPurpose,
-    /// The peer speaks no TLS.
+    /// The peer does not speak TLS.
     #[error("it does not speak TLS; write http://HOST:PORT if that is meant")]
     NoTls,
-    /// Something else.
+    /// Any other TLS error.
     #[error("TLS failed: {0}")]
     Other(rustls::Error),
 }
 
 impl TlsFailure {
-    /// What an error says of TLS, if it does.
+    /// Returns the TLS failure that caused an error, if there is one.
     pub fn of(error: &(dyn Error + 'static)) -> Option<Self> {
         let mut cause = Some(error);
         while let Some(error) = cause {
             if let Some(tls) = error.downcast_ref::<rustls::Error>() {
                 return Some(Self::from_rustls(tls));
             }
-            // An I/O error hides the error that it was made of from the chain of causes.
+            // An I/O error omits its inner error from the chain of sources.
             let hidden = error.downcast_ref::<io::Error>().and_then(io::Error::get_ref);
             cause = match hidden {
                 Some(hidden) => Some(hidden),

@@ -1,5 +1,5 @@
-//! Bearer tokens of clients: 256 random bits in a text, and the hash by which a coordinator knows
-//! them. Nothing here prints a token.
+//! Bearer tokens of clients (256 random bits as text), and the hashes by which a coordinator
+//! recognizes them. Nothing here prints a token.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use thiserror::Error;
 
 use crate::identity::{self, NoRandomness};
 
-/// Every token begins so; scanners for leaked secrets can look for it.
+/// Prefix of every token, by which scanners for leaked secrets can find it.
 pub const PREFIX: &str = "osteon_";
-/// Random bytes of a token.
+/// Number of random bytes of a token.
 const RANDOM_BYTES: usize = 32;
-/// Characters of a token: the prefix and two hexadecimal digits for each byte.
+/// Length of a token in characters: the prefix and two hexadecimal digits for each byte.
 const TOKEN_CHARACTERS: usize = PREFIX.len() + 2 * RANDOM_BYTES;
-/// What a line of hashes calls the hash.
+/// Prefix of the hash in a line of the token list.
 const HASH_PREFIX: &str = "blake3:";
 
-/// A token. It has so many random bits that a fast hash hides it; therefore only tokens of
-/// [`Token::generate`]'s form are taken, never a password that a person thought of.
+/// A token. It has so many random bits that a fast hash is safe; therefore only tokens of the form
+/// of [`Token::generate`] are accepted, never a password chosen by a person.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// A text that is no token. It says nothing of the text, which may be another secret.
+/// The text is not a token. The error does not contain the text, which may be another secret.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error(
     "is not a valid osteon token (`{PREFIX}` and {} hexadecimal digits, as `osteon token` makes them)",
@@ -34,19 +34,19 @@ pub struct NoToken;
 pub struct TokenHash(blake3::Hash);
 
 impl Token {
-    /// A new token.
+    /// Creates a random token.
     ///
     /// # Errors
-    /// When the operating system gives no random numbers.
+    /// If the operating system provides no random numbers.
     pub fn generate() -> Result<Self, NoRandomness> {
         let digits = identity::random_digits::<RANDOM_BYTES>()?;
         Ok(Self(format!("{PREFIX}{digits}")))
     }
 
-    /// Reads a token, without the white space around it.
+    /// Parses a token, without surrounding white space.
     ///
     /// # Errors
-    /// When it is none.
+    /// If the text is not a token.
     pub fn parse(text: &str) -> Result<Self, NoToken> {
         let text = text.trim();
         let digits = text.strip_prefix(PREFIX).ok_or(NoToken)?;
@@ -57,12 +57,12 @@ impl Token {
         Ok(Self(text.to_owned()))
     }
 
-    /// Its hash.
+    /// Returns the token's hash.
     pub fn hash(&self) -> TokenHash {
         TokenHash(blake3::hash(self.0.as_bytes()))
     }
 
-    /// The token itself, for the one file or the one header that holds it.
+    /// Returns the token itself, for the one file or the one header that contains it.
     pub fn reveal(&self) -> &str {
         &self.0
     }
@@ -75,7 +75,7 @@ impl fmt::Debug for Token {
 }
 
 impl TokenHash {
-    /// Reads a hash as [`Display`](fmt::Display) writes it.
+    /// Parses a hash in the form that [`Display`](fmt::Display) writes.
     pub fn parse(text: &str) -> Option<Self> {
         let digits = text.strip_prefix(HASH_PREFIX)?;
         blake3::Hash::from_hex(digits).ok().map(Self)

@@ -1,25 +1,25 @@
-//! What a method of search wants, and why it is over.
+//! The answers of a search method: the next point, or the reason why it stopped.
 
-/// What a search wants.
+/// Answer of a search method when it is asked for its next point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ask<'a> {
-    /// What is at this point, coordinates in `[0, 1]`.
+    /// Evaluate this point; its coordinates are in `[0, 1]`.
     At(&'a [f64]),
-    /// Nothing more.
+    /// The search has ended.
     Stopped(Stop),
 }
 
-/// Why a search is over.
+/// Reason why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
     /// The best cost is at most the tolerance.
     CostReached,
-    /// The method has done all it can and finds nothing better; also: nothing is free.
+    /// The method can do no more and finds nothing better. Also used when no parameter is free.
     Settled,
-    /// As many points were evaluated as allowed.
+    /// The maximum number of evaluations was reached.
     EvaluationsUsedUp,
-    /// Every restart found something better, and there were as many as allowed.
+    /// Every restart found something better, and the maximum number of restarts was reached.
     RestartsUsedUp,
-    /// No point from which to go on has a finite cost.
+    /// No point from which the search could continue has a finite cost.
     Infeasible,
 }

@@ -1,4 +1,4 @@
-//! A whole job in one call, for programs that compute the realizations themselves.
+//! Runs a whole job in one call, for programs that compute the realizations themselves.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,34 +15,34 @@ use thiserror::Error;
 
 use crate::search::{Ending, Search, Step};
 
-/// The realizations of one point, which are to be computed: those with the indices from 0 to `count` - 1.
+/// The realizations of one point that the caller must compute, with the indices 0 to `count` - 1.
 ///
 /// A bone's bits depend on the specification, the point and its index alone, so realizations may be
 /// computed in any order and on any number of threads.
 #[derive(Debug, Clone)]
 pub struct Realizations {
-    /// The point.
+    /// The point to evaluate.
     pub point: Point,
-    /// The random bones of the point. One that cannot be drawn is the failure
-    /// [`FailureKind::NotFinite`] of its index.
+    /// The random bones of the point. If the bone of an index cannot be drawn, the outcome of that
+    /// index is the failure [`FailureKind::NotFinite`].
     pub ensemble: Ensemble,
-    /// How many realizations there are.
+    /// Number of realizations.
     pub count: u64,
 }
 
-/// What a job found.
+/// Result and history of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
-    /// Status, digest, best point or what was found for each group, and what the data determine.
+    /// Status, digest, best point (or the result of each group), and what the data determine.
     pub result: JobResult,
-    /// Rows of all evaluations, in order.
+    /// Returns the rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
 }
 
-/// Why a job has no result.
+/// Reason why a job has no result.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum IdentifyError<E> {
-    /// The specification breaks rules.
+    /// The specification violates its rules.
     #[error("the specification is not acceptable:\n{0}")]
     Specification(Violations),
     /// The caller could not compute the realizations of a point.
@@ -50,24 +50,24 @@ pub enum IdentifyError<E> {
     Evaluation {
         /// Number of the evaluation.
         number: u64,
-        /// The point.
+        /// The point that was to be evaluated.
         point: Box<Point>,
-        /// What the caller said.
+        /// The caller's error.
         cause: E,
     },
-    /// The caller computed another number of realizations than was asked for.
+    /// The caller returned a wrong number of outcomes.
     #[error(
         "evaluation {number} has {found} outcomes; it must have {expected}, one of each realization"
     )]
     Count {
         /// Number of the evaluation.
         number: u64,
-        /// How many outcomes came.
+        /// Number of outcomes returned.
         found: usize,
-        /// How many realizations there are.
+        /// Number of realizations requested.
         expected: u64,
     },
-    /// An outcome is none that a realization can have.
+    /// The caller returned an outcome that no realization can have.
     #[error(
         "realization {index} of evaluation {number} is {solved:?}; a velocity must be finite and above 0, \
          its estimated error finite and at least 0, and 0 where there is no velocity"
@@ -77,18 +77,18 @@ pub enum IdentifyError<E> {
         number: u64,
         /// Index of the realization.
         index: usize,
-        /// What came.
+        /// The outcome returned.
         solved: Solved,
     },
 }
 
-/// Does the job of `specification` in this process: asks `evaluate` for the outcomes, in index order, of
-/// one point after the other, until the search ends.
+/// Runs the job of `specification` in this process: passes one point after another to `evaluate`,
+/// which returns the outcomes in index order, until the search ends.
 ///
-/// The result is that of the same job submitted to a coordinator, to the bit, where `evaluate` computes
-/// what a worker computes: for that solve each bone with `osteon_solver::Solver::realization`. Only the
-/// commit of the program is not known here. An identification goes the path of its search, and a
-/// propagation is one evaluation at the start.
+/// The result equals that of the same job submitted to a coordinator, to the bit, if `evaluate`
+/// computes what a worker computes; to do so, solve each bone with
+/// `osteon_solver::Solver::realization`. Only the commit of the program is unknown here. An
+/// identification follows the path of its search; a propagation is one evaluation at the start.
 ///
 /// ```
 /// use std::convert::Infallible;
@@ -153,8 +153,8 @@ pub fn identify<E>(
     }
 }
 
-/// The realizations of a point, as `evaluate` computes them. Where no bone can be drawn, all of them
-/// are failures, as they are for a worker.
+/// Computes the realizations of a point by `evaluate`. If no bone can be drawn at the point, all of
+/// them are failures, as they are on a worker.
 fn solve<E>(
     specification: &JobSpecification,
     number: u64,
@@ -181,12 +181,14 @@ fn is_sound(solved: &Solved) -> bool {
     decode(code, velocity).is_some() && solved.is_sound()
 }
 
-/// The outcomes of the best point of each group so far. A search keeps those of one set of data only.
+/// The outcomes of the best point of each group so far. A search keeps only those of its current
+/// set of data.
 #[derive(Debug, Default)]
 struct BestOfGroups(BTreeMap<usize, Arc<[Outcome]>>);
 
 impl BestOfGroups {
-    /// Keeps the outcomes of the evaluation that `search` was told last, if it is the best of its group.
+    /// Keeps the outcomes of the last evaluation passed to `search`, if it is the best of its
+    /// group.
     fn keep(&mut self, search: &Search, outcomes: Arc<[Outcome]>) {
         let last = search.history().last().filter(|_| search.is_grouped());
         if let Some(row) = last {

@@ -1,10 +1,11 @@
-//! Searches as ask/tell state machines: which point to evaluate next, what its outcomes mean, and when
-//! to stop.
+//! Searches as ask/tell state machines: which point to evaluate next, what its outcomes mean, and
+//! when to stop.
 //!
-//! [`Search`] decides the path of a job. It asks a method for points, [`simplex`] or [`newton`], in the
-//! box of the free parameters ([`search_box`]). [`identify()`] does a whole job in one call, for programs
-//! that compute the realizations themselves. Nothing here knows a solver, a worker, a clock or a
-//! file: a search is a function of its specification and of the outcomes told.
+//! [`Search`] decides the path of a job. It asks a method ([`simplex`] or [`newton`]) for points in
+//! the box of the free parameters ([`search_box`]). [`identify()`] runs a whole job in one call,
+//! for programs that compute the realizations themselves. Nothing here depends on a solver, a
+//! worker, a clock or a file: a search is a function of its specification and of the outcomes
+//! passed to it.
 
 pub mod ask;
 mod identify;

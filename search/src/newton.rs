@@ -1,37 +1,40 @@
 //! Minimum-norm Gauss-Newton steps with Broyden's updates, as an ask/tell state machine in the unit
 //! box.
 //!
-//! It knows no realization, no job and no clock: [`Newton::ask`] names the next point,
-//! [`Newton::tell`] takes its cost and moments. The path is a function of the settings and of what
-//! was told, so that telling the same again rebuilds the same state.
+//! It depends on no realization, job or clock: [`Newton::ask`] returns the next point,
+//! [`Newton::tell`] takes its cost and moments. The path is a function of the settings and of the
+//! values passed in, so replaying the same values rebuilds the same state.
 //!
-//! Looked for is, of the points whose moments are the data's, the one nearest to the start in units
-//! of the box. What is believed of the moments (`model.rs`) is the closed form ln √(c1111/ρ), ln δ
-//! with a correction that every evaluation improves; the next point is the believed answer
-//! (`nearest.rs`): the nearest one that a fixed number of descents over the whole box find, since the
-//! points that match are curved and one descent may end at a point that is nearer only than those
-//! around it. It is looked for from the start and not from where the search is, so that steps
-//! add no detours; once a whole step has ended at a cost below [`NEAR`], from there, and by one
-//! descent: what is left to do is then so little that it does not matter, and corrections that also
-//! slid along the points that match would be longer than what they correct. The start itself is
-//! evaluated first.
+//! The search looks for the point nearest to the start, in units of the box, among the points whose
+//! moments equal those of the data. Its model of the moments (`model.rs`) is the closed form ln
+//! √(c1111/ρ), ln δ with a correction that every evaluation improves. The next point is the model's
+//! solution (`nearest.rs`): the nearest one found by a fixed number of descents from all over the
+//! box. One descent is not enough because the matching points form a curved surface, on which it
+//! may end at a point that is nearest only locally. Distances are measured from the start and not
+//! from the current point, so that steps add no detours. Once a whole step has ended at a cost
+//! below [`NEAR`], they are measured from there, and one descent is used: the remaining distance is
+//! then too small to matter, and corrections that also slid along the matching points would be
+//! longer than the errors that they correct. The start itself is evaluated first.
 //!
 //! # Safeguards
 //!
 //! A step is at most [`RADIUS_MAX`] long. After a point that is infeasible, or has a higher cost
-//! than the best, steps are at most half as long as the one that led there; after a better one,
-//! twice as long again. A point refused by the caller counts as infeasible without being evaluated.
+//! than the best, steps are at most half as long as the one that led there; after a better one, the
+//! limit is doubled again. A point refused by the caller counts as infeasible without being
+//! evaluated.
 //!
 //! # When it stops
 //!
 //! - The cost is at most `cost_tolerance`: [`Stop::CostReached`].
-//! - It stalls: a step of at most `size_tolerance` does not halve the cost, [`SLOW_MAX`] evaluations
-//!   do not, or the believed answer is where the search is. Then the correction's slopes are
-//!   forgotten; when it stalls again, they are measured by differences, one evaluation for each
-//!   parameter; when it stalls again and has not halved the cost since, it ends: [`Stop::Settled`].
-//!   So ends a search whose data no point in the box matches, at the least cost.
+//! - It stalls: a step of at most `size_tolerance` does not halve the cost, [`SLOW_MAX`]
+//!   evaluations do not, or the model's solution is the current point. At the first stall the
+//!   slopes of the correction are reset; at the second they are measured by finite differences, one
+//!   evaluation for each parameter; if the search stalls again without having halved the cost
+//!   since, it ends: [`Stop::Settled`]. This is also how a search ends, at the lowest cost, if no
+//!   point in the box matches the data.
 //! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
-//! - The start and the points between it and the believed answer are infeasible: [`Stop::Infeasible`].
+//! - The start and the points between it and the model's solution are infeasible:
+//!   [`Stop::Infeasible`].
 
 mod model;
 mod nearest;
@@ -51,30 +54,32 @@ mod tests;
 
 /// Longest step, in edges of the box.
 pub const RADIUS_MAX: f64 = 1.0;
-/// Evaluations in a row that do not halve the cost, before the Jacobian is made anew.
+/// Number of consecutive evaluations without halving the cost after which the Jacobian is
+/// refreshed.
 pub const SLOW_MAX: u32 = 4;
-/// Cost below which the nearest point is found but for corrections: both moments to 1 %.
+/// Cost below which only small corrections are left to the nearest point: both moments match to 1
+/// %.
 pub const NEAR: f64 = 1e-4;
-/// A cost below this fraction of another is progress.
+/// A cost below this fraction of the earlier one counts as progress.
 const PROGRESS: f64 = 0.5;
-/// Step of the differences that measure slopes, in edges of the box.
+/// Step of the finite differences that measure slopes, in edges of the box.
 const DIFFERENCE: f64 = 1e-4;
-/// A shorter step is none: rounding of coordinates.
+/// Shorter steps count as zero: they are rounding errors of the coordinates.
 const STEP_MIN: f64 = 1e-12;
-/// Where nothing was feasible yet, steps shorter than this are not tried.
+/// Shortest step tried while no feasible point has been found.
 const RADIUS_BLIND: f64 = 1.0 / 64.0;
-/// The mean velocity over √(c1111/ρ), and the coefficient of variation over δ/√14, near enough to
-/// go on from a start that is infeasible.
+/// Ratio of the mean velocity to √(c1111/ρ), and of the coefficient of variation to δ/√14: accurate
+/// enough to continue from an infeasible start.
 const RULE_OF_THUMB: f64 = 0.99;
 
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Most points to evaluate.
+    /// Maximum number of points to evaluate.
     pub max_evaluations: u64,
     /// Stop when the cost is at most this.
     pub cost_tolerance: f64,
-    /// Steps of at most this length must gain something.
+    /// Steps of at most this length must halve the cost.
     pub size_tolerance: f64,
 }
 
@@ -86,16 +91,16 @@ struct Evaluated {
     found: Logarithms,
 }
 
-/// What the pending point is for.
+/// The purpose of the pending point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Purpose {
-    /// The start, or a step towards the believed answer.
+    /// The start, or a step towards the model's solution.
     Step,
-    /// The slopes along this axis.
+    /// Measures the slopes along this axis.
     Difference { axis: usize, step: f64 },
 }
 
-/// How the slopes were last made anew, if the cost was not halved since.
+/// The last refresh of the slopes, if the cost has not been halved since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Renewed {
     No,
@@ -108,20 +113,20 @@ enum Renewed {
 pub struct Newton {
     settings: Settings,
     target: Logarithms,
-    /// From where the nearest point is looked for: the start, later where it nearly is.
+    /// Point from which distances are measured: the start, later a point near the solution.
     centre: Vec<f64>,
-    /// Whether it nearly is there.
+    /// Whether `centre` is near the solution.
     near: bool,
     model: Model,
-    /// The lowest cost of all steps, once one was feasible.
+    /// The step of lowest cost so far, if one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
     purpose: Purpose,
-    /// Whether the pending step goes all the way.
+    /// Whether the pending step reaches the model's solution.
     whole: bool,
-    /// Longest step for now.
+    /// Current limit of the step length.
     radius: f64,
-    /// The cost to halve, and evaluations since it was halved.
+    /// The cost to be halved, and the number of evaluations since it was.
     mark: f64,
     slow: u32,
     renewed: Renewed,
@@ -131,8 +136,8 @@ pub struct Newton {
 }
 
 impl Newton {
-    /// A search for the point of `space` nearest to its start whose moments are those of `data`
-    /// (both above 0).
+    /// Creates a search for the point of `space` nearest to its start whose moments are those of
+    /// `data` (both above 0).
     pub fn new(space: SearchBox, data: Moments, settings: Settings) -> Self {
         let start = space.start();
         let rule = [RULE_OF_THUMB, RULE_OF_THUMB / 14.0_f64.sqrt()].map(libm::log);
@@ -158,7 +163,7 @@ impl Newton {
         newton
     }
 
-    /// The next point, or why there is none. Asking changes nothing.
+    /// Returns the next point, or the reason why there is none. Does not change the state.
     pub fn ask(&self) -> Ask<'_> {
         match self.stop {
             Some(stop) => Ask::Stopped(stop),
@@ -166,8 +171,8 @@ impl Newton {
         }
     }
 
-    /// Takes the cost of the point asked for, and its moments; a cost or a logarithm of a moment
-    /// that is not finite makes it infeasible. Ignored once stopped.
+    /// Takes the cost and the moments of the pending point; if the cost or the logarithm of a
+    /// moment is not finite, the point is infeasible. Ignored once stopped.
     pub fn tell(&mut self, cost: f64, moments: Option<Moments>) {
         if self.stop.is_some() {
             return;
@@ -180,21 +185,22 @@ impl Newton {
         self.stop_when_used_up();
     }
 
-    /// The point asked for is inadmissible: it was not evaluated. Refusing every point ends the
-    /// search: each refusal halves the step.
+    /// Reports that the pending point is inadmissible and was not evaluated. If every point is
+    /// refused, the search ends, since each refusal halves the step.
     pub fn refuse(&mut self) {
         if self.stop.is_none() {
             self.take(None);
         }
     }
 
-    /// Points evaluated so far.
+    /// Returns the number of points evaluated so far.
     pub fn evaluations(&self) -> u64 {
         self.evaluations
     }
 
-    /// Points that may be asked for after the pending one, at most `most`: the others at which
-    /// slopes are measured. Where a step goes depends on all that is told before.
+    /// Returns at most `most` points that the search may ask for after the pending one: the
+    /// remaining points at which slopes are measured. A step cannot be predicted, as it depends on
+    /// all earlier results.
     pub fn likely(&self, most: usize) -> Vec<Vec<f64>> {
         let Purpose::Difference { axis, .. } = self.purpose else {
             return Vec::new();
@@ -211,7 +217,7 @@ impl Newton {
         }
     }
 
-    /// What is at the pending point; `None` if it is infeasible.
+    /// Takes the result at the pending point; `None` if it is infeasible.
     fn take(&mut self, trial: Option<Evaluated>) {
         if trial.as_ref().is_some_and(|trial| trial.cost <= self.settings.cost_tolerance) {
             self.stop = Some(Stop::CostReached);
@@ -227,7 +233,7 @@ impl Newton {
         let length = norm(&subtract(&self.pending, self.anchor()));
         let lowest = self.base.as_ref().map(|base| base.cost);
         let Some(trial) = trial else {
-            // The start is no step.
+            // The start is not a step and has no length.
             self.radius = if length > 0.0 { 0.5 * length } else { self.radius };
             self.go_on(false);
             return;
@@ -256,8 +262,8 @@ impl Newton {
         self.go_on(!halved && length <= self.settings.size_tolerance);
     }
 
-    /// Makes the next step pending, or what is to be done when there is none that leads on. Ends:
-    /// each turn makes the slopes anew in the next of the ways that there are.
+    /// Makes the next step pending, or refreshes the slopes if no step leads further. Ends, because
+    /// each turn uses the next of the finitely many ways of refreshing.
     fn go_on(&mut self, mut stalled: bool) {
         loop {
             let shortest = match self.base {
@@ -285,7 +291,8 @@ impl Newton {
         }
     }
 
-    /// Where the search would go if steps could be as long as they like.
+    /// Returns the model's solution, to which the search would go if the step length were
+    /// unlimited.
     fn believed_answer(&self) -> Vec<f64> {
         if self.near {
             self.model.nearest_from_here(&self.centre, self.target)
@@ -294,8 +301,9 @@ impl Newton {
         }
     }
 
-    /// Makes the slopes anew without an evaluation. If that was done, or changes nothing, they are
-    /// measured; if that was done too, the search is over. Then false: there is no step to look for.
+    /// Refreshes the slopes without an evaluation by resetting them. If that was already done, or
+    /// changes nothing, starts to measure them; if that was done too, ends the search. In these two
+    /// cases returns false: there is no step to choose now.
     fn forget_slopes(&mut self) -> bool {
         let Some(base) = &self.base else {
             self.stop = Some(Stop::Infeasible);
@@ -320,7 +328,7 @@ impl Newton {
         false
     }
 
-    /// Asks for the difference along `axis`, or goes on when all are there.
+    /// Makes the difference along `axis` pending, or continues with a step after the last axis.
     fn measure_from(&mut self, axis: usize) {
         if axis < self.anchor().len() {
             self.measure(axis, self.difference(axis));
@@ -329,12 +337,12 @@ impl Newton {
         }
     }
 
-    /// Step of the difference along `axis` that is tried first.
+    /// Returns the step of the difference along `axis` that is tried first.
     fn difference(&self, axis: usize) -> f64 {
         if self.anchor()[axis] + DIFFERENCE <= 1.0 { DIFFERENCE } else { -DIFFERENCE }
     }
 
-    /// Where steps begin, moved along `axis`.
+    /// Returns the current base point, moved along `axis`.
     fn beside(&self, axis: usize, step: f64) -> Vec<f64> {
         let mut at = self.anchor().to_vec();
         at[axis] += step;
@@ -349,7 +357,8 @@ impl Newton {
     fn differed(&mut self, axis: usize, step: f64, trial: Option<Evaluated>) {
         match trial {
             Some(trial) => self.model.learn_along(axis, &trial.at, trial.found),
-            // Once the other way; the slopes along an axis between walls stay as they are.
+            // Try the other direction once. If both are infeasible, the slopes along this axis are
+            // kept.
             None if step > 0.0 && self.anchor()[axis] - step >= 0.0 => {
                 self.measure(axis, -step);
                 return;
@@ -359,7 +368,7 @@ impl Newton {
         self.measure_from(axis + 1);
     }
 
-    /// Where steps begin.
+    /// Returns the point at which steps begin.
     fn anchor(&self) -> &[f64] {
         self.base.as_ref().map_or(&self.centre, |base| &base.at)
     }

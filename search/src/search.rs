@@ -1,8 +1,8 @@
-//! A job as an ask/tell state machine: which point next, and what its outcomes mean.
+//! A job as an ask/tell state machine: which point to evaluate next, and what its outcomes mean.
 //!
-//! An identification searches for one set of data after the other, a propagation evaluates one point.
-//! Everything here is a function of the specification and of the outcomes told: telling the stored
-//! evaluations again rebuilds the same state, to the bit.
+//! An identification searches for one set of data after another; a propagation evaluates one point.
+//! Everything here is a function of the specification and of the outcomes passed in: replaying the
+//! stored evaluations rebuilds the same state, to the bit.
 
 use std::sync::Arc;
 
@@ -34,49 +34,49 @@ mod reasons;
 #[cfg(test)]
 mod tests;
 
-/// What a search wants.
+/// Answer of a search when it is asked for its next step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// The outcomes of this point.
+    /// Evaluate this point and pass its outcomes to [`Search::tell`].
     Evaluate(Point),
-    /// Nothing more.
+    /// The search has ended.
     Done(Ending),
 }
 
-/// How a job ended.
+/// Ending of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
-    /// The status.
+    /// Final status of the job.
     pub status: Status,
-    /// Of which kind the failure is; `None` with any other status than failed.
+    /// Kind of the failure; `None` unless the status is failed.
     pub failure: Option<JobFailure>,
-    /// Why, in a sentence, where the status needs one.
+    /// Reason as a sentence, where the status needs one.
     pub reason: Option<String>,
 }
 
 impl Ending {
-    /// As a search ends, which fails only where no point is feasible.
+    /// Creates the ending of a search, which fails only if no point is feasible.
     pub fn of_search(status: Status, reason: Option<String>) -> Self {
         let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
         Self { status, failure, reason }
     }
 }
 
-/// What the path of a search comes to, its outcomes aside.
+/// Summary of a search path, without the outcomes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
     /// BLAKE3 digest of the evaluations of the path, 64 hexadecimal digits.
     pub digest: String,
-    /// Number of the best evaluation, if a point was feasible; `None` where the data are groups.
+    /// Number of the best evaluation, if a point was feasible; `None` if the data are groups.
     pub best: Option<u64>,
-    /// Rows of all evaluations, in order.
+    /// Returns the rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
-    /// How the search for each group of the data ended, as far as it went; empty where there are
-    /// none.
+    /// Endings of the searches for the groups of the data that have ended; empty if there are no
+    /// groups.
     pub groups: Vec<GroupEnding>,
 }
 
-/// A stored evaluation of another search than this one.
+/// A stored evaluation belongs to a different search.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
     "stored evaluation {number} is at {found:?}, but the search goes to {expected:?}: \
@@ -87,7 +87,7 @@ pub struct ReplayError {
     pub number: u64,
     /// The stored point.
     pub found: Box<[f64; 7]>,
-    /// Where this search would go, unless it is done.
+    /// The point that this search asks for; `None` if it has ended.
     pub expected: Option<Box<[f64; 7]>>,
 }
 
@@ -97,20 +97,21 @@ enum Plan {
     Propagation { told: Option<Verdict> },
 }
 
-/// A search under way.
+/// The state of a job's search.
 #[derive(Debug, Clone)]
 pub struct Search {
     specification: Arc<JobSpecification>,
     plan: Plan,
     digest: PathDigest,
     history: Vec<Evaluation>,
-    /// Of the evaluation that a result needs the outcomes of.
+    /// Outcomes of the evaluation that a propagation's result needs.
     outcomes: Option<Arc<[Outcome]>>,
-    /// Of the point asked for, if it was looked at before it is told.
+    /// Assessment of the pending point, if it was made before its outcomes were passed to
+    /// [`Search::tell`].
     judged: Option<Judged>,
 }
 
-/// What the outcomes of a point say.
+/// Assessment of a point, computed from its outcomes.
 #[derive(Debug, Clone)]
 struct Judged {
     outcomes: Arc<[Outcome]>,
@@ -120,13 +121,13 @@ struct Judged {
 }
 
 impl Search {
-    /// A search of which nothing is known. The specification has passed its check.
+    /// Creates a search without evaluations. The specification must have passed its check.
     pub fn new(specification: Arc<JobSpecification>) -> Self {
         let plan = match (specification.kind, &specification.data) {
             (JobKind::Identification, Some(_)) => {
                 Plan::Identification(Box::new(Identification::new(&specification)))
             }
-            // An identification without data has not passed the check.
+            // An identification without data does not pass the check.
             (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
         };
         Self {
@@ -139,10 +140,11 @@ impl Search {
         }
     }
 
-    /// Takes the outcomes of a stored evaluation.
+    /// Replays a stored evaluation.
     ///
     /// # Errors
-    /// When it is at another point than the search asks for; nothing is changed then.
+    /// If it is at a different point from the one that the search asks for; nothing is changed
+    /// then.
     pub fn replay(
         &mut self,
         point: Point,
@@ -154,10 +156,10 @@ impl Search {
         Ok(())
     }
 
-    /// Whether the search asks for the outcomes of `point`.
+    /// Checks that `point` is the one that the search asks for.
     ///
     /// # Errors
-    /// When it asks for others, or none.
+    /// If the search asks for a different point, or for none.
     pub fn expects(&self, point: Point) -> Result<(), ReplayError> {
         let found = point.0;
         let expected = match self.ask() {
@@ -174,7 +176,7 @@ impl Search {
         })
     }
 
-    /// The next point, or how the job ends. Asking changes nothing.
+    /// Returns the next point, or how the job ended. Does not change the state.
     pub fn ask(&self) -> Step {
         match &self.plan {
             Plan::Identification(identification) => match identification.point() {
@@ -186,8 +188,8 @@ impl Search {
         }
     }
 
-    /// Takes the outcomes, in index order, of the point asked for, and the estimated errors of the
-    /// successes, which decide nothing. Ignored once done.
+    /// Takes the outcomes, in index order, of the pending point, and the estimated errors of the
+    /// successes, which do not influence the search. Ignored once done.
     pub fn tell(&mut self, outcomes: Arc<[Outcome]>, estimated_error: Option<EstimatedError>) {
         let Step::Evaluate(point) = self.ask() else {
             return;
@@ -207,14 +209,14 @@ impl Search {
                 self.outcomes = Some(outcomes);
             }
         }
-        // What measures a derivative is beside the path.
+        // Points that only measure a derivative are not part of the path.
         if row.role.varied.is_none() {
             self.digest.add_evaluation(&point, &told);
         }
         self.history.push(row);
     }
 
-    /// What the outcomes of the point asked for say.
+    /// Computes moments and cost of the pending point from its outcomes.
     fn judge(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Judged {
         let verdict = Verdict::of(&self.specification.monte_carlo, point, outcomes);
         let cost = match &self.plan {
@@ -226,7 +228,8 @@ impl Search {
         Judged { outcomes: Arc::clone(outcomes), verdict, cost }
     }
 
-    /// What is known of the point asked for before its role is.
+    /// Returns the history row of the pending point with everything but its role and estimated
+    /// error.
     fn row(&self, point: Point, judged: &Judged) -> Evaluation {
         Evaluation {
             number: self.evaluations(),
@@ -239,18 +242,18 @@ impl Search {
         }
     }
 
-    /// Points whose outcomes were told.
+    /// Returns the number of points evaluated so far.
     pub fn evaluations(&self) -> u64 {
         self.history.len() as u64
     }
 
-    /// Rows of all evaluations, in order.
+    /// Returns the rows of all evaluations, in order.
     pub fn history(&self) -> &[Evaluation] {
         &self.history
     }
 
-    /// The best feasible evaluation, if there is one: that of the set of data that the search is at.
-    /// Of a propagation the only one.
+    /// Returns the best feasible evaluation for the current set of data, if there is one; of a
+    /// propagation, its only evaluation.
     pub fn best(&self) -> Option<&Evaluation> {
         match &self.plan {
             Plan::Identification(identification) => identification.best(),
@@ -258,8 +261,8 @@ impl Search {
         }
     }
 
-    /// Number of the best evaluation of set number `set` of the data, if the search has come to it and a
-    /// point was feasible.
+    /// Returns the number of the best evaluation for set number `set` of the data, if the search
+    /// has reached that set and a point was feasible.
     pub fn best_of(&self, set: usize) -> Option<u64> {
         match &self.plan {
             Plan::Identification(identification) => identification.best_of(set),
@@ -267,7 +270,7 @@ impl Search {
         }
     }
 
-    /// What the path comes to so far.
+    /// Summarizes the path so far.
     pub fn summary(&self) -> Summary {
         let groups = match &self.plan {
             Plan::Identification(identification) if self.is_grouped() => identification.endings(),
@@ -282,8 +285,8 @@ impl Search {
         }
     }
 
-    /// What the job leaves, given how it ended, computed by `program`. Of groups,
-    /// whose outcomes are in the store only, nothing is known here.
+    /// Returns the result of the job, given how it ended, computed by `program`. Results of groups
+    /// are left out: their outcomes are only in the store.
     pub fn result(&self, ending: &Ending, program: &Program) -> JobResult {
         let summary = self.summary();
         let outcomes = match &self.plan {
@@ -296,7 +299,7 @@ impl Search {
         summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
-    /// Whether the data are groups.
+    /// Returns whether the data are groups.
     pub fn is_grouped(&self) -> bool {
         matches!(self.specification.data, Some(Data::Groups(_)))
     }
@@ -312,7 +315,7 @@ impl Search {
 }
 
 impl Summary {
-    /// The summary of a path without an evaluation.
+    /// Returns the summary of a path without evaluations.
     pub fn empty() -> Self {
         Self {
             digest: PathDigest::new().finish(),
@@ -322,7 +325,7 @@ impl Summary {
         }
     }
 
-    /// Evaluation `number` as a best point, given its outcomes.
+    /// Returns evaluation `number` as a best point, given its outcomes.
     pub fn best_point(
         &self,
         specification: &JobSpecification,
@@ -355,8 +358,8 @@ impl Summary {
         Some(best)
     }
 
-    /// What a job with this path leaves, given how it ended, the program that computed it, its best
-    /// point, or what was found for its groups.
+    /// Returns the result of a job with this path, given how it ended, the program that computed
+    /// it, and its best point or the results of its groups.
     pub fn result(
         &self,
         specification: &JobSpecification,
@@ -394,8 +397,8 @@ impl Summary {
         }
     }
 
-    /// What was found for group number `set` of the data, given its best point; `None` if its search
-    /// has not ended.
+    /// Returns the result for group number `set` of the data, given its best point; `None` if its
+    /// search has not ended.
     pub fn group(
         &self,
         specification: &JobSpecification,

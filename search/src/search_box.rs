@@ -1,40 +1,41 @@
-//! The box of the free parameters, in units of its edges: each coordinate goes from 0 at the lower
+//! The box of the free parameters, in units of its edges: each coordinate runs from 0 at the lower
 //! bound to 1 at the upper.
 
 use osteon_common::ensemble::DISPERSION_MAX;
 use osteon_common::job::Range;
 use osteon_common::parameters::{Parameter, Point};
 
-/// The ranges that a search moves in.
+/// The ranges within which a search moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
     ranges: [Range; 7],
 }
 
-/// A bound that a point lies on.
+/// The bound of a parameter on which a point lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// The lower.
+    /// The lower bound.
     Lower,
-    /// The upper.
+    /// The upper bound.
     Upper,
 }
 
-/// A point this near to a bound, in units of the box, lies on it.
+/// A point at most this far from a bound, in units of the box, counts as lying on it.
 const ON_BOUND: f64 = 1e-9;
 
 impl SearchBox {
-    /// The box of these ranges of [`Parameter::ALL`]; they have passed their check.
+    /// Creates the box of these ranges, which are in the order of [`Parameter::ALL`] and have been
+    /// checked.
     pub fn new(ranges: [Range; 7]) -> Self {
         Self { ranges }
     }
 
-    /// Coordinates of the start.
+    /// Returns the coordinates of the start.
     pub fn start(&self) -> Vec<f64> {
         self.ranges.iter().filter_map(unit_start).collect()
     }
 
-    /// The box with its start at these coordinates, of which there may be more than are needed.
+    /// Returns the box with its start at these coordinates; surplus coordinates are ignored.
     pub fn started_at(&self, coordinates: &[f64]) -> Self {
         let mut coordinates = coordinates.iter();
         Self {
@@ -51,8 +52,8 @@ impl SearchBox {
         }
     }
 
-    /// The point with these coordinates. A coordinate that never moved keeps the bits of its
-    /// start.
+    /// Returns the point with these coordinates. A coordinate that never moved keeps the bits of
+    /// its start.
     pub fn point(&self, at: &[f64]) -> Point {
         let mut at = at.iter();
         Point(self.ranges.map(|range| match range {
@@ -66,8 +67,8 @@ impl SearchBox {
         }))
     }
 
-    /// Derivatives with respect to the coordinates, of derivatives with respect to
-    /// [`Parameter::ALL`].
+    /// Converts derivatives with respect to [`Parameter::ALL`] to derivatives with respect to the
+    /// coordinates.
     pub fn per_edge(&self, gradient: &[f64; 7]) -> Vec<f64> {
         let of = |(range, slope): (&Range, &f64)| match range {
             Range::Fixed(_) => None,
@@ -76,7 +77,7 @@ impl SearchBox {
         self.ranges.iter().zip(gradient).filter_map(of).collect()
     }
 
-    /// The free parameters that lie on a bound at `point`.
+    /// Returns the free parameters that lie on a bound at `point`, with the bound.
     pub fn on_bounds(&self, point: &Point) -> Vec<(Parameter, Side)> {
         let side = |parameter: Parameter| {
             let at = self.ranges[parameter as usize].coordinate(point.get(parameter))?;
@@ -90,7 +91,7 @@ impl SearchBox {
     }
 }
 
-/// Whether realizations can be drawn at `point`.
+/// Returns whether realizations can be drawn at `point`.
 pub fn admissible(point: &Point) -> bool {
     let dispersion = point.dispersion();
     point.density() > 0.0

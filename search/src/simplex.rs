@@ -1,8 +1,8 @@
 //! The Nelder-Mead simplex as an ask/tell state machine in the unit box.
 //!
-//! It knows no realization, no job and no clock: [`Simplex::ask`] names the next point,
-//! [`Simplex::tell`] takes its cost. The path is a function of the settings and of the costs
-//! told, so that telling the same costs again rebuilds the same state.
+//! It depends on no realization, job or clock: [`Simplex::ask`] returns the next point,
+//! [`Simplex::tell`] takes its cost. The path is a function of the settings and of the costs passed
+//! in, so replaying the same costs rebuilds the same state.
 //!
 //! The algorithm is that of Lagarias, Reeds, Wright and Wright (SIAM J. Optim. 9, 1998) with the
 //! standard coefficients (reflection 1, expansion 2, contraction ½, shrinkage ½). A point outside
@@ -11,13 +11,13 @@
 //! # When it stops
 //!
 //! - The best cost is at most the tolerance, where there is one: [`Stop::CostReached`].
-//! - The simplex has collapsed: its largest extent is at most `size_tolerance` and its costs
-//!   differ by at most the tolerance plus a thousandth of the best cost (logarithms: by at most what
-//!   counts as equal), or, whatever the costs, the extent is at most a thousandth of
-//!   `size_tolerance`. A collapse is no proof of a minimum: a simplex can flatten against a bound. So
-//!   the search begins again at the best point with a fresh simplex, and only a restart that lowers
-//!   the best cost by less than a thousandth (logarithms: as above) ends it: [`Stop::Settled`].
-//!   Restarts are bounded: [`Stop::RestartsUsedUp`].
+//! - The simplex has collapsed. This is so when its largest extent is at most `size_tolerance` and
+//!   its costs differ by at most the tolerance plus a thousandth of the best cost (logarithms: by
+//!   at most the difference that counts as equal), or, whatever the costs, when the extent is at
+//!   most a thousandth of `size_tolerance`. A collapse does not prove a minimum: a simplex can
+//!   flatten against a bound. Therefore the search restarts at the best point with a fresh simplex,
+//!   and only a restart that lowers the best cost by less than a thousandth (logarithms: as above)
+//!   ends it: [`Stop::Settled`]. The number of restarts is limited: [`Stop::RestartsUsedUp`].
 //! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
 //! - No vertex of the first simplex is feasible: [`Stop::Infeasible`].
 
@@ -27,23 +27,23 @@ mod likely;
 #[cfg(test)]
 mod tests;
 
-/// Restarts after a collapse, at most.
+/// Maximum number of restarts after a collapse.
 pub const RESTARTS_MAX: u32 = 10;
-/// A restart must lower a cost of squares by this fraction to count as progress; such costs of a
-/// simplex that differ by less than this fraction of the best are equal.
+/// A restart counts as progress if it lowers a cost of squares by at least this fraction. Such
+/// costs of a simplex count as equal if they differ by less than this fraction of the best.
 const PROGRESS: f64 = 1e-3;
-/// The smallest extent that rounding lets a simplex in the unit box have.
+/// Smallest extent of a simplex in the unit box that rounding errors permit.
 const EXTENT_MIN: f64 = 1e-14;
 
-/// What costs are, and how they compare.
+/// The kind of costs, which decides how they compare.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Costs {
-    /// Sums of squares, at least 0, that compare by their ratio.
+    /// Sums of squares (at least 0), compared by their ratio.
     Squares {
         /// Stop when the best cost is at most this.
         tolerance: f64,
     },
-    /// Of any sign, without a value to be reached, that compare by their difference.
+    /// Costs of any sign without a target value, compared by their difference.
     Logarithms {
         /// Costs that differ by at most this are equal.
         equal: f64,
@@ -51,12 +51,12 @@ pub enum Costs {
 }
 
 impl Costs {
-    /// Whether a cost is as low as can be asked for.
+    /// Returns whether a cost is low enough to stop.
     fn reached(self, cost: f64) -> bool {
         matches!(self, Self::Squares { tolerance } if cost <= tolerance)
     }
 
-    /// The difference from `cost`, finite, that is progress.
+    /// Returns the finite decrease from `cost` that counts as progress.
     fn progress(self, cost: f64) -> f64 {
         match self {
             Self::Squares { .. } => PROGRESS * cost.abs(),
@@ -64,7 +64,7 @@ impl Costs {
         }
     }
 
-    /// The largest difference of costs of a flat simplex around `cost`.
+    /// Returns the largest cost difference within a simplex around `cost` that counts as flat.
     fn flat(self, cost: f64) -> f64 {
         match self {
             Self::Squares { tolerance } => tolerance + PROGRESS * cost.abs(),
@@ -76,13 +76,13 @@ impl Costs {
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Most points to evaluate.
+    /// Maximum number of points to evaluate.
     pub max_evaluations: u64,
-    /// What costs are.
+    /// The kind of costs.
     pub costs: Costs,
     /// The simplex has collapsed when its largest extent is at most this.
     pub size_tolerance: f64,
-    /// Edge of a fresh simplex.
+    /// Edge length of a fresh simplex.
     pub initial_step: f64,
 }
 
@@ -93,23 +93,23 @@ struct Vertex {
     cost: f64,
 }
 
-/// What the pending point is for.
+/// The purpose of the pending point.
 #[derive(Debug, Clone, PartialEq)]
 enum Move {
     /// A vertex of a fresh simplex.
     Build,
     Reflect,
-    /// Beyond the reflected point.
+    /// A point beyond the reflected point.
     Expand {
         reflected: Vertex,
     },
-    /// Between the centroid and the reflected point.
+    /// A point between the centroid and the reflected point.
     ContractOutside {
         reflected: Vertex,
     },
-    /// Between the centroid and the worst vertex.
+    /// A point between the centroid and the worst vertex.
     ContractInside,
-    /// Vertex `index` drawn half way to the best.
+    /// Vertex `index` moved half way to the best.
     Shrink {
         index: usize,
     },
@@ -119,21 +119,21 @@ enum Move {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simplex {
     settings: Settings,
-    /// In order of cost once complete; ties in the order of their making.
+    /// Sorted by cost once complete; ties keep the order of their creation.
     vertices: Vec<Vertex>,
     pending: Vec<f64>,
     purpose: Move,
     stop: Option<Stop>,
     evaluations: u64,
     restarts: u32,
-    /// Best cost when the present simplex was begun.
+    /// Best cost when the current simplex was started.
     cost_at_restart: f64,
-    /// Where the present simplex was begun.
+    /// The point at which the current simplex was started.
     origin: Vec<f64>,
 }
 
 impl Simplex {
-    /// A search that begins at `start`, one coordinate in `[0, 1]` for each free parameter.
+    /// Starts a search at `start`, which has one coordinate in `[0, 1]` for each free parameter.
     pub fn new(start: &[f64], settings: Settings) -> Self {
         let mut simplex = Self {
             settings,
@@ -150,7 +150,7 @@ impl Simplex {
         simplex
     }
 
-    /// The next point, or why there is none. Asking changes nothing.
+    /// Returns the next point, or the reason why there is none. Does not change the state.
     pub fn ask(&self) -> Ask<'_> {
         match self.stop {
             Some(stop) => Ask::Stopped(stop),
@@ -158,7 +158,7 @@ impl Simplex {
         }
     }
 
-    /// Takes the cost of the point asked for; NaN counts as infinite. Ignored once stopped.
+    /// Takes the cost of the pending point; NaN counts as infinite. Ignored once stopped.
     pub fn tell(&mut self, cost: f64) {
         if self.stop.is_none() {
             self.evaluations += 1;
@@ -167,8 +167,9 @@ impl Simplex {
         }
     }
 
-    /// The point asked for is inadmissible: its cost is infinite, and it was not evaluated.
-    /// Refusing every point ends the search: each round of refusals halves the simplex.
+    /// Reports that the pending point is inadmissible: its cost is infinite, and it was not
+    /// evaluated. If every point is refused, the search ends, since each round of refusals halves
+    /// the simplex.
     pub fn refuse(&mut self) {
         if self.stop.is_none() {
             self.take(f64::INFINITY);
@@ -176,18 +177,18 @@ impl Simplex {
         }
     }
 
-    /// Points evaluated so far.
+    /// Returns the number of points evaluated so far.
     pub fn evaluations(&self) -> u64 {
         self.evaluations
     }
 
-    /// Fresh simplexes begun after a collapse.
+    /// Returns the number of restarts with a fresh simplex after a collapse.
     pub fn restarts(&self) -> u32 {
         self.restarts
     }
 
-    /// Takes infinite costs for pending points outside the box. Ends after two: every other
-    /// point lies in the convex hull of the vertices.
+    /// Assigns infinite costs to pending points outside the box. Ends after two of them: every
+    /// other point lies in the convex hull of the vertices.
     fn skip_what_needs_no_evaluation(&mut self) {
         while self.stop.is_none() && self.pending.iter().any(|u| !(0.0..=1.0).contains(u)) {
             self.take(f64::INFINITY);
@@ -197,7 +198,7 @@ impl Simplex {
         }
     }
 
-    /// The pending point has this cost.
+    /// Takes the cost of the pending point.
     fn take(&mut self, cost: f64) {
         if self.settings.costs.reached(cost) {
             self.stop = Some(Stop::CostReached);
@@ -206,7 +207,7 @@ impl Simplex {
         }
     }
 
-    /// The step that a cost above the tolerance leads to.
+    /// Makes the step that follows from a cost above the tolerance.
     fn step(&mut self, cost: f64) {
         let trial = Vertex { at: std::mem::take(&mut self.pending), cost };
         match std::mem::replace(&mut self.purpose, Move::Build) {
@@ -253,8 +254,8 @@ impl Simplex {
         }
     }
 
-    /// The origin moved along one axis: by the initial step, upwards in even and downwards in
-    /// odd simplexes, the other way if that leaves the box, and to the farther face if both do.
+    /// Returns the origin moved along one axis by the initial step: upwards in even and downwards
+    /// in odd simplexes, the other way if that leaves the box, and to the farther face if both do.
     fn fresh_vertex(&self, axis: usize) -> Vec<f64> {
         let mut at = self.origin.clone();
         let sign = if self.restarts.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -298,7 +299,7 @@ impl Simplex {
                 let sum: f64 = self.vertices[..last].iter().map(|vertex| vertex.at[axis]).sum();
                 let centroid = sum / count;
                 let at = centroid + factor * (centroid - self.vertices[last].at[axis]);
-                // In the box but for rounding.
+                // A contraction lies in the box except for rounding errors.
                 if contraction { at.clamp(0.0, 1.0) } else { at }
             })
             .collect();
@@ -311,7 +312,8 @@ impl Simplex {
         self.iterate();
     }
 
-    /// Asks for vertex `index` half way to the best, or goes on when all are there.
+    /// Makes vertex `index`, moved half way to the best, the pending point; continues the iteration
+    /// after the last vertex.
     fn shrink(&mut self, index: usize) {
         let Some(vertex) = self.vertices.get(index) else {
             self.iterate();
@@ -326,12 +328,12 @@ impl Simplex {
         let extent = self.extent();
         let Settings { costs, size_tolerance, .. } = self.settings;
         let best = self.vertices[0].cost;
-        // The worst cost may be infinite, the best is not: no NaN.
+        // The worst cost may be infinite, but the best is finite, so this is never NaN.
         let flat = self.worst().cost - best <= costs.flat(best);
         (extent <= size_tolerance && flat) || extent <= (PROGRESS * size_tolerance).max(EXTENT_MIN)
     }
 
-    /// Largest extent of the simplex along any axis.
+    /// Returns the largest extent of the simplex along any axis.
     fn extent(&self) -> f64 {
         (0..self.origin.len())
             .map(|axis| {
@@ -342,7 +344,7 @@ impl Simplex {
             .fold(0.0, f64::max)
     }
 
-    /// Begins again at the best vertex, if the simplex that collapsed had made progress.
+    /// Restarts at the best vertex, if the simplex that collapsed had made progress.
     fn restart(&mut self) {
         let best = self.vertices[0].clone();
         let before = self.cost_at_restart;

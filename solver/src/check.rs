@@ -1,4 +1,4 @@
-//! One case, solved by both methods and by a refined exact one.
+//! Comparison of both methods with a refined exact solution of one case.
 
 mod difference;
 
@@ -10,17 +10,17 @@ pub use self::difference::{Difference, difference, error_max};
 use crate::isa::Isa;
 use crate::solver::{Arrival, Failure, Solver, Workspace};
 
-/// Refinement of the reference over the case's.
+/// Factor of the reference's refinement to the case's.
 const REFERENCE: f64 = 5.0;
 
 /// One solution of the case.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// The setup, with the settings that were used.
+    /// The setup, with the settings used.
     pub setup: Setup,
-    /// What was picked.
+    /// The picked arrival, or the failure.
     pub arrival: Result<Arrival, Failure>,
-    /// How it differs from the refined solution.
+    /// Difference from the refined solution.
     pub difference: Difference,
 }
 
@@ -29,7 +29,7 @@ pub struct Solution {
 pub struct Check {
     /// The exact method at the case's refinement.
     pub exact: Solution,
-    /// The hybrid method, as the case discretises it.
+    /// The hybrid method with the case's discretisation.
     pub hybrid: Solution,
     /// The exact method at five times the case's refinement, at most 16.
     pub refined: Solution,
@@ -53,27 +53,27 @@ impl Check {
         Self { exact: solution(exact), hybrid: solution(hybrid), refined: solution(refined) }
     }
 
-    /// All solutions, the reference last.
+    /// Returns all solutions, the reference last.
     pub fn solutions(&self) -> [&Solution; 3] {
         [&self.exact, &self.hybrid, &self.refined]
     }
 
-    /// Largest accepted relative difference of a velocity from the refined one.
+    /// Returns the largest accepted relative difference of a velocity from the refined one.
     pub fn error_max(&self) -> f64 {
         error_max(&self.exact.setup)
     }
 
-    /// Whether all picked the same extremum, and both velocities are within the bound.
+    /// Returns whether all picked the same extremum, and both velocities are within the limit.
     pub fn passed(&self) -> bool {
         self.same_picks() && self.off().next().is_none()
     }
 
-    /// Whether all picked the same extremum.
+    /// Returns whether all picked the same extremum.
     pub fn same_picks(&self) -> bool {
         self.solutions().iter().all(|one| one.difference != Difference::Picks)
     }
 
-    /// The solutions whose velocity is outside the bound.
+    /// Returns the solutions whose velocity is outside the limit.
     pub fn off(&self) -> impl Iterator<Item = &Solution> {
         let off = |one: &&Solution| {
             one.difference.velocity().is_some_and(|error| error > self.error_max())
@@ -82,7 +82,7 @@ impl Check {
     }
 }
 
-/// Exact, hybrid and refined settings for a case with `given` ones.
+/// Returns exact, hybrid and refined settings for a case with `given` ones.
 fn settings(given: &SolverSettings) -> [SolverSettings; 3] {
     let default = SolverSettings::default();
     let exact = SolverSettings { refinement: given.refinement, ..default };
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// The paper's optimum.
+    /// The optimum of the paper.
     const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     #[test]

@@ -1,12 +1,13 @@
-//! Exact layers in (frequency, wavenumber).
+//! Exact layers in the (frequency, wavenumber) domain.
 //!
-//! A bone is looked at several times. The first look is quick and enough for most. Where its
-//! estimated error is large, the band is widened. Where the first arrival is small against later waves,
-//! the same is done with nothing thinned out. Where a doubt remains (a late or weak pick, picks
-//! off their line, no pick at all) the bone is computed again with a thorough sampling, and where
-//! even that one finds nothing or its estimated error is large, with a refined one. Between doubt and
-//! none two looks are blended, and so are those of neighbouring rungs of the speed ladder, so that the
-//! velocity stays a continuous function of the bone. All of this depends on the bone alone.
+//! A bone is computed in several passes, called looks. The first look is quick and sufficient for
+//! most bones. If its estimated error is large, the band is widened. If the first arrival is small
+//! compared to later waves, the same is done without thinning. If a doubt remains (a late or weak
+//! pick, picks off their line, no pick at all), the bone is computed again with a thorough
+//! sampling, and if even that finds nothing or its estimated error is large, with a refined one.
+//! The doubt is a number from 0 to 1, with which the results of two looks are blended; those of
+//! neighbouring rungs of the speed ladder (a geometric grid of speeds) are blended, too. So the
+//! velocity remains a continuous function of the bone. All of this depends on the bone alone.
 
 pub(crate) mod direct;
 pub(crate) mod growth;
@@ -37,26 +38,26 @@ use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::Vector;
 
-/// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough grows
-/// from none to full.
+/// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough rises
+/// from 0 to 1.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
-/// The same of any other doubt.
+/// The same for every other doubt.
 const LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
 /// Refinement of the last look.
 const LAST_REFINEMENT: f64 = 4.0;
-/// Delays of a pick after the earliest possible arrival, in periods of the centre frequency, between
-/// which a doubt grows: a quick period has little room for a late packet.
+/// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
+/// between which the doubt rises: a quick period has little room for a late packet.
 const LATE: (f64, f64) = (0.62, 0.72);
-/// Times from a pick to the direct wave, in periods, between which a doubt shrinks.
+/// Times from a pick to the direct wave, in periods, between which the doubt falls.
 const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
-/// Ratios over the threshold between which a doubt shrinks.
+/// Ratios to the threshold between which the doubt falls.
 const WEAK: (f64, f64) = (1.2, 1.6);
-/// Distances from the line, in periods, between which a doubt grows.
+/// Distances from the line, in periods, between which the doubt rises.
 const OFF_LINE: (f64, f64) = (0.02, 0.03);
-/// Sizes of a pick over the largest wave in its window between which a doubt shrinks: thinning and what is
-/// left out of slow waves reach some 1e-5 of those.
+/// Ratios of a pick to the largest wave in its window between which the doubt falls: the errors of
+/// thinning and of leaving out slow waves reach some 1e-5 of that wave.
 const SMALL: (f64, f64) = (0.02, 0.03);
-/// Picks of two looks that differ by more than this, in periods, are different extrema.
+/// Picks of two looks that differ by more than this, in periods, belong to different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
 /// The exact method for one setup, with the tables that all its realizations share.
@@ -107,7 +108,7 @@ impl Exact {
         found.map(|found| found.arrival(count, pairs))
     }
 
-    /// The solid of a bone, and the bound of every wave's speed, m/s.
+    /// Returns the solid of a bone, and the upper bound of every wave's speed, m/s.
     fn solid(&self, bone: &Bone) -> Result<(Medium, f64), Failure> {
         let medium = self.isa.run(Solid(bone));
         let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
@@ -118,25 +119,25 @@ impl Exact {
         Ok((medium, speed))
     }
 
-    /// Makes `plate` the one of `medium`.
+    /// Fills `plate` for `medium`.
     fn fill_plate<const TERMS: usize>(&self, medium: &Medium, plate: &mut Plate<TERMS>) {
         let thickness = self.setup.layers.bone_thickness;
         self.isa.run(FillPlate { medium, thickness, plate });
     }
 
-    /// One rung of a ladder, which a bone with waves of up to `speed` (m/s) needs.
+    /// Returns the rung of a ladder that a bone with waves of up to `speed` (m/s) needs.
     fn rung<'a>(&self, ladder: &'a Ladder, index: usize, speed: f64) -> Result<Held<'a>, Failure> {
         ladder.rung(index, &self.kept).ok_or_else(|| too_large(speed))
     }
 
-    /// An estimated error as it counts against bounds that are meant for refinement 1: who asks for
-    /// less accepts more.
+    /// Returns an estimated error as it compares with the constants above, which are meant for
+    /// refinement 1: a user who sets a lower refinement accepts larger errors.
     fn counted(&self, error: f64) -> f64 {
         let refinement = self.setup.solver.refinement.min(1.0);
         error * refinement * refinement * refinement
     }
 
-    /// How much a pick is doubted, 0 to 1, continuously.
+    /// Returns the doubt in a pick, from 0 to 1, as a continuous function.
     fn doubt(&self, found: &Estimated, speed: f64) -> f64 {
         let fc = self.setup.probe.center_frequency;
         let (mut delay, mut margin) = (0.0_f64, f64::INFINITY);
@@ -152,8 +153,8 @@ impl Exact {
             .max(1.0 - rise(ratio, WEAK))
     }
 
-    /// What two looks at one bone say together, the second with the weight of the doubt in the
-    /// first.
+    /// Blends the results of two looks at one bone, where the second has the doubt in the first as
+    /// its weight.
     fn merged(
         &self,
         first: Result<Estimated, Failure>,
@@ -168,8 +169,8 @@ impl Exact {
         }
     }
 
-    /// The same, unless the second look would be more than may be computed: then what was found
-    /// stands, with its error.
+    /// Same as [`merged`], unless the second look exceeds the limit of the computation: then the
+    /// first result is kept, with its error.
     fn merged_if_possible(
         &self,
         first: Result<Estimated, Failure>,
@@ -217,28 +218,28 @@ fn too_large(speed: f64) -> Failure {
     }
 }
 
-/// 0 up to `from`, 1 from `to` on, linear between.
+/// Returns 0 up to `from`, 1 from `to` on, and linear values between.
 fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// One bone, about to be looked at.
+/// State of the computation of one bone.
 struct Sight<'a> {
     exact: &'a Exact,
     medium: &'a Medium,
-    /// Bound of every wave's speed, m/s.
+    /// Upper bound of every wave's speed, m/s.
     speed: f64,
-    /// The rung that is taken of every ladder.
+    /// The rung that is used of every ladder.
     rung: usize,
     workspace: &'a mut ExactWorkspace,
-    /// Looks so far.
+    /// Number of looks so far.
     count: u32,
-    /// (Frequency, wavenumber) pairs that were computed so far.
+    /// Number of (frequency, wavenumber) pairs computed so far.
     pairs: u64,
 }
 
 impl Sight<'_> {
-    /// As many looks as the bone needs.
+    /// Makes as many looks as the bone needs.
     fn looks(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         if sampling::first_grade(&exact.setup) == Grade::Thorough {
@@ -258,7 +259,7 @@ impl Sight<'_> {
         found
     }
 
-    /// A look in the first band, and one in the whole band if that is needed.
+    /// Makes a look in the first band, and one in the whole band if that is needed.
     fn quick(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
         let exact = self.exact;
         let rung = &*exact.rung(ladder, self.rung, self.speed)?;
@@ -276,13 +277,13 @@ impl Sight<'_> {
         found
     }
 
-    /// A thorough look, and a refined one if that is needed.
+    /// Makes a thorough look, and a refined one if that is needed.
     fn careful(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         let thorough = self.thorough(&exact.thorough);
         let doubt = match &thorough {
             Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
-            // Whether there is an arrival is for the best look to say.
+            // Whether there is an arrival is decided by the best look.
             Err(Failure {
                 kind: FailureKind::NoArrival | FailureKind::InconsistentArrival,
                 ..
@@ -296,7 +297,7 @@ impl Sight<'_> {
         exact.merged_if_possible(thorough, refined, doubt)
     }
 
-    /// One look, and a good one.
+    /// Makes one thorough look.
     fn thorough(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
         let rung = &*self.exact.rung(ladder, self.rung, self.speed)?;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
@@ -321,7 +322,7 @@ impl Sight<'_> {
     }
 }
 
-/// Turns a tensor into the system's coefficients.
+/// Kernel that converts a tensor into the system's coefficients.
 pub(crate) struct Solid<'a>(pub(crate) &'a Bone);
 
 impl Kernel for Solid<'_> {
@@ -333,7 +334,7 @@ impl Kernel for Solid<'_> {
     }
 }
 
-/// Computes what a plate's admittances have in common.
+/// Kernel that computes the part common to all of a plate's admittances.
 pub(crate) struct FillPlate<'a, const TERMS: usize> {
     pub(crate) medium: &'a Medium,
     pub(crate) thickness: f64,

@@ -2,31 +2,33 @@
 //!
 //! One wavenumber at a time, the weak form of fluid, solid and fluid (`operator.rs`) is stepped
 //! through time (`stepping.rs`) under the pressure of the source on the bone's face
-//! (`incident.rs`), with all three components of the displacement; a cosine transform makes the
-//! pressures at the receivers (`march.rs`), whose extrema (`samples.rs`) are picked by the same rule
-//! as those of the exact method.
+//! (`incident.rs`), with all three components of the displacement; a cosine transform gives the
+//! pressures at the receivers (`march.rs`), whose extrema (`samples.rs`) are picked by the same
+//! rule as those of the exact method.
 //!
-//! The paper's pulse has a kink at t = 0. Where an extremum lies close to a wave of that kink its time
-//! converges slowly, and how close is different from bone to bone; so every bone is computed in
-//! passes, each finer than the one before, until two of them tell the same (`passes.rs`). The first
-//! pass looks at all that comes before the direct wave; the others, knowing what is picked, at the
-//! first packet only, for which far less of time and fluids, and a coarser grid of wavenumbers, is
-//! needed.
+//! The paper's pulse has a kink at t = 0. If an extremum lies close to a wave of that kink its time
+//! converges slowly, and the distance varies from bone to bone. Therefore every bone is computed in
+//! passes, each finer than the one before, until two of them agree (`passes.rs`). The first pass
+//! computes the whole window before the direct wave. The others, for which the picked extremum is
+//! known, compute only the first packet, which requires far less time and depth of the fluids, and
+//! a coarser grid of wavenumbers.
 //!
-//! What an element size, order and time step mean:
+//! The meaning of element size, order and time step:
 //!
 //! - in all passes but the first, elements are at most `element_size`, and smaller where waves at
-//!   the centre frequency are shorter than 1.5 mm: in a fluid in proportion to its wavelength, in the
-//!   bone to the mean, on a scale of ratios, of its slowest wavelength across and the coupling's;
+//!   the centre frequency are shorter than 1.5 mm: in a fluid in proportion to its wavelength, in
+//!   the bone to the geometric mean of its slowest wavelength across and the coupling's;
 //! - a time step above the bone's stability limit in the first pass is a failure that names the
-//!   limit; without one the step is the limit. Other passes take the same share of their own limits;
-//! - `refinement` r divides element size and time step, and multiplies the limit of wavenumbers,
-//!   by √r. For smooth pulses the error of elements of order n falls at least as r^(-(n+1)/2),
-//!   that of time steps as r^(-2) ([`element_convergence`], [`time_step_convergence`]).
+//!   limit; without a given time step the step is the limit. The other passes use the same fraction
+//!   of their own limits;
+//! - `refinement` r divides element size and time step, and multiplies the limit of wavenumbers, by
+//!   √r. For smooth pulses the error of elements of order n falls at least as r^(-(n+1)/2), that of
+//!   time steps as r^(-2) ([`element_convergence`], [`time_step_convergence`]).
 //!
-//! The estimated error is half of the change of the velocity by the last pass, and of what the scatter
-//! of the changes of its times could make of it, and no less than the error of the waves' speed
-//! on a last mesh of fewer than five nodes per wavelength. It is an estimate of size, not a bound.
+//! The estimated error is half the change of the velocity by the last pass, combined with half the
+//! effect that the scatter of the changes of its times could have on it. It is not smaller than the
+//! error of the waves' speed if the last mesh has fewer than five nodes per wavelength. It is an
+//! estimate of the size, not a bound.
 
 #[cfg(feature = "measure")]
 mod convergence;
@@ -73,26 +75,26 @@ pub struct HybridWorkspace {
 }
 
 impl Hybrid {
-    /// A solver for cases of `setup`, which has passed validation.
+    /// Creates a solver for cases of `setup`, which has passed validation.
     pub fn new(setup: &Setup) -> Self {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// The same, computing on one instruction set. The bits do not depend on it.
+    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         Self { setup: *setup, distances: sampling::distances(setup).collect(), isa }
     }
 
-    /// The setup.
+    /// Returns the setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// The first arrival of one bone.
+    /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure when the case has no velocity; `NoConvergence` also when the time step is
-    /// above the stability limit, or the computation above its bounds.
+    /// A typed failure if the case has no velocity; `NoConvergence` also if the time step is above
+    /// the stability limit, or the computation exceeds its limits.
     pub fn arrival(
         &self,
         bone: &Bone,
@@ -118,7 +120,7 @@ impl Hybrid {
         .arrival()
     }
 
-    /// The same, reduced to what a job keeps.
+    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
     pub fn outcome(&self, bone: &Bone, workspace: &mut HybridWorkspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)

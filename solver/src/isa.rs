@@ -1,9 +1,9 @@
-//! The instruction set that computes: chosen at run time, with the same bits from each.
+//! The instruction set for computations: chosen at run time, with the same bits from each.
 //!
-//! A kernel is one piece of code in eight lanes; it is compiled once for every instruction set.
-//! Its operations are IEEE additions, multiplications, divisions and explicit fused
-//! multiply-adds, whose results do not depend on how many lanes fit into a register. Without
-//! hardware support a fused multiply-add is a slow but exact function call.
+//! A kernel is one piece of code in eight lanes; it is compiled once for every instruction set. Its
+//! operations are IEEE additions, multiplications, divisions and explicit fused multiply-adds,
+//! whose results do not depend on how many lanes fit into a register. Without hardware support a
+//! fused multiply-add is a slow but exact function call.
 
 use std::ffi::OsString;
 
@@ -32,7 +32,7 @@ enum Kind {
     Neon,
 }
 
-/// A name that is not one of this machine's instruction sets.
+/// The name does not denote one of this machine's instruction sets.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
     "in {}: {value:?} is not an instruction set of this machine; it offers {} (unset, the fastest is used)",
@@ -40,19 +40,19 @@ enum Kind {
     Isa::available().into_iter().map(Isa::name).collect::<Vec<_>>().join(", ")
 )]
 pub struct UnknownIsa {
-    /// What was named.
+    /// The name given.
     pub value: OsString,
 }
 
 impl Isa {
-    /// The environment variable by which users name an instruction set.
+    /// The environment variable by which users choose an instruction set.
     pub const VARIABLE: &'static str = "OSTEON_INSTRUCTION_SET";
 
-    /// The instruction set that `value` of [`Isa::VARIABLE`] names; without one, or with an empty one, the
-    /// fastest.
+    /// Returns the instruction set that `value` of [`Isa::VARIABLE`] names, or the fastest if it is
+    /// absent or empty.
     ///
     /// # Errors
-    /// When it is not one of this machine's.
+    /// If it is not one of this machine's.
     pub fn chosen(value: Option<OsString>) -> Result<Self, UnknownIsa> {
         let Some(value) = value.filter(|value| !value.is_empty()) else {
             return Ok(Self::fastest());
@@ -60,7 +60,7 @@ impl Isa {
         value.to_str().and_then(Self::named).ok_or(UnknownIsa { value })
     }
 
-    /// The instruction sets that this machine offers, slowest first.
+    /// Returns the instruction sets of this machine, slowest first.
     pub fn available() -> Vec<Self> {
         #[cfg_attr(
             not(any(target_arch = "x86_64", target_arch = "aarch64")),
@@ -86,17 +86,17 @@ impl Isa {
         sets
     }
 
-    /// The fastest instruction set that this machine offers.
+    /// Returns the fastest instruction set of this machine.
     pub fn fastest() -> Self {
         Self::available().last().copied().unwrap_or(Self(Kind::Baseline))
     }
 
-    /// The instruction set of that name, if this machine offers it.
+    /// Returns the instruction set of that name, if this machine has it.
     pub fn named(name: &str) -> Option<Self> {
         Self::available().into_iter().find(|isa| isa.name() == name)
     }
 
-    /// Name for users.
+    /// Returns the name for users.
     pub fn name(self) -> &'static str {
         match self.0 {
             Kind::Baseline => "baseline",
@@ -133,9 +133,9 @@ impl Isa {
 
 /// A computation that is compiled once for every instruction set.
 ///
-/// `run`, and whatever it calls in its hot part, must be `#[inline(always)]`: only what is inlined
-/// into the functions below is compiled for their instruction set. What is not inlined is still
-/// right, but pays a function call for every fused multiply-add.
+/// `run`, and the functions that it calls in its hot part, must be `#[inline(always)]`: only code
+/// that is inlined into the functions below is compiled for their instruction set. Code that is not
+/// inlined is still correct, but pays a function call for every fused multiply-add.
 pub(crate) trait Kernel {
     type Output;
     fn run<V: Vector>(self) -> Self::Output;
@@ -169,8 +169,8 @@ fn neon<K: Kernel>(kernel: K) -> K::Output {
 mod tests {
     use super::*;
 
-    /// Every register of `vector.rs` computes on some machine, and no machine goes without the best
-    /// that it certainly has.
+    /// Every register type of `vector.rs` is used on some machine, and every machine uses the best
+    /// one that it is certain to have.
     #[test]
     fn every_kind_of_register_is_offered() {
         let names: Vec<&str> = Isa::available().into_iter().map(Isa::name).collect();

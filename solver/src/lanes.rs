@@ -1,13 +1,13 @@
 //! Eight independent systems side by side.
 //!
-//! A lane never talks to another lane: the bits of each are those of a scalar computation,
-//! whatever the width of the processor's registers. All operations are single IEEE operations
-//! (or explicit fused multiply-adds), so every instruction set gives the same bits.
+//! Lanes never interact: the bits of each are those of a scalar computation, whatever the width of
+//! the processor's registers. All operations are single IEEE operations (or explicit fused
+//! multiply-adds), so every instruction set gives the same bits.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// Number of lanes, the same on every processor: blocks, and the rules that look at a block,
-/// must not depend on the machine.
+/// Number of lanes, the same on every processor: blocks, and decisions about a block, must not
+/// depend on the machine.
 pub(crate) const LANES: usize = 8;
 
 /// Eight real numbers.

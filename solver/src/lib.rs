@@ -1,13 +1,13 @@
 //! Velocity of the first arriving signal of a fluid / anisotropic solid / fluid plate: the map
 //! g_velo of the paper's Eq. (10).
 //!
-//! Exact layers in (frequency, wavenumber): the plate's admittance by doubling (`plate.rs`, no roots, no
-//! branches, no degenerate solids), the fluids in closed form, a cosine transform over wavenumbers and a
-//! damped Fourier series over frequencies, extrema of the resulting trigonometric polynomial, and one
-//! picked extremum for the whole array.
+//! Exact layers in the (frequency, wavenumber) domain: the plate's admittance by doubling
+//! (`plate.rs`, no roots, no branches, no degenerate solids), the fluids in closed form, a cosine
+//! transform over wavenumbers and a damped Fourier series over frequencies, extrema of the
+//! resulting trigonometric polynomial, and one picked extremum for the whole array.
 //!
-//! Pure: no I/O, no clock, no thread. A velocity's bits are a function of its [`Case`] alone; tables
-//! shared between realizations depend on layers, probe and solver settings only.
+//! Pure: no I/O, no clock, no thread. A velocity's bits are a function of its [`Case`] alone;
+//! tables shared between realizations depend only on layers, probe and solver settings.
 //!
 //! [`Case`]: osteon_common::case::Case
 

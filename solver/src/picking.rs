@@ -8,7 +8,7 @@ use crate::Failure;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
 pub(crate) const FLOOR: f64 = 1e-3;
-/// A packet's peak is looked for up to this many periods of the centre frequency after an extremum.
+/// A packet's peak is searched up to this many periods of the centre frequency after an extremum.
 const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.
 const RESIDUAL_PERIODS_MAX: f64 = 0.05;
@@ -22,7 +22,7 @@ pub(crate) struct Extremum {
     pub(crate) pressure: f64,
 }
 
-/// What is seen at one receiver before the direct wave can arrive.
+/// The signal at one receiver before the direct wave can arrive.
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     /// Local extrema in order of time.
@@ -32,10 +32,11 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Drops what is below the numerical floor.
+    /// Removes extrema below the numerical floor.
     ///
     /// A wave that still rises when the direct wave arrives has no extremum in the window; then
-    /// all that is left is noise, small against the window's last value, and none of it is kept.
+    /// only noise remains, which is small compared to the window's last value, and none of it is
+    /// kept.
     pub(crate) fn drop_noise(&mut self) {
         let largest = self.extrema.iter().fold(0.0, |max: f64, e| max.max(e.pressure.abs()));
         if largest < FLOOR * self.last {
@@ -44,12 +45,12 @@ impl Window {
         self.extrema.retain(|e| e.pressure.abs() >= FLOOR * largest);
     }
 
-    /// Largest |p| of an extremum, or at the end.
+    /// Returns the largest |p| of an extremum, or at the end.
     fn largest(&self) -> f64 {
         self.extrema.iter().fold(self.last, |max, e| max.max(e.pressure.abs()))
     }
 
-    /// |p| of extremum `rank` over its packet's peak.
+    /// Returns the ratio of |p| of extremum `rank` to its packet's peak.
     fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
         let first = self.extrema.get(rank)?;
         let peak = self.extrema[rank..]
@@ -71,7 +72,8 @@ pub(crate) struct Pick {
     pub(crate) ratio: f64,
     /// Largest distance of a time from the line, s.
     pub(crate) residual: f64,
-    /// |p| of the extremum over the largest in the window, at the receiver where this is smallest.
+    /// Ratio of |p| of the extremum to the largest in the window, at the receiver where it is
+    /// smallest.
     pub(crate) prominence: f64,
 }
 
@@ -80,8 +82,8 @@ pub(crate) struct Pick {
 /// `windows` and `distances` (m, from the source) have one entry per receiver.
 ///
 /// # Errors
-/// `DirectWaveFirst` when a receiver has no extremum before the direct wave, `NoArrival` when one
-/// has too few, `InconsistentArrival` when the picks differ in sign or do not lie on one line.
+/// `DirectWaveFirst` if a receiver has no extremum before the direct wave, `NoArrival` if one has
+/// too few, `InconsistentArrival` if the picks differ in sign or do not lie on one line.
 pub(crate) fn pick(
     picking: &Picking,
     center_frequency: f64,
@@ -124,10 +126,11 @@ pub(crate) fn pick(
     Ok(Pick { velocity, times, ratio, residual, prominence })
 }
 
-/// Velocity, m/s, of the line through picked times (s), and the largest distance of a time from it.
+/// Returns the velocity, m/s, of the line through picked times (s), and the largest distance of a
+/// time from it.
 ///
 /// # Errors
-/// `InconsistentArrival` when the times do not lie on one line that leaves the source.
+/// `InconsistentArrival` if the times do not lie on one line that leads away from the source.
 pub(crate) fn line(
     distances: &[f64],
     times: &[f64],
@@ -136,10 +139,10 @@ pub(crate) fn line(
     fit(distances, times, RESIDUAL_PERIODS_MAX / center_frequency)
 }
 
-/// The lowest rank whose ratio, in the median over the receivers, exceeds the threshold, and that
-/// ratio.
+/// Returns the lowest rank whose ratio, in the median over the receivers, exceeds the threshold,
+/// and that ratio.
 fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<(usize, f64), Failure> {
-    // The loop ends at the latest when a receiver runs out of extrema.
+    // The loop ends at the latest when a receiver has no further extrema.
     let mut rank = 0;
     loop {
         let mut ratios = Vec::with_capacity(windows.len());
@@ -165,14 +168,14 @@ fn no_arrival(receiver: usize, rank: usize) -> Failure {
     }
 }
 
-/// Median; of an even count the mean of the middle two.
+/// Returns the median; for an even count the mean of the middle two.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-/// Least-squares slope of distance (m) against time (s), m/s.
+/// Returns the least-squares slope of distance (m) against time (s), m/s.
 pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
     let (mean_distance, mean_time) = (mean(distances), mean(times));
     let (mut cross, mut square) = (0.0, 0.0);
@@ -188,7 +191,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }
 
-/// The slope, and the largest residual, s.
+/// Returns the slope, and the largest residual, s.
 fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<(f64, f64), Failure> {
     let slope = slope(distances, times);
     let (mean_distance, mean_time) = (mean(distances), mean(times));

@@ -1,7 +1,7 @@
 //! Gauss-Legendre quadrature on panels.
 
-/// Nodes of one panel; exact for polynomials of degree 31, and good to rounding for an
-/// oscillation of up to about 10 rad over the panel.
+/// Number of nodes of one panel; exact for polynomials of degree 31, and accurate to rounding for
+/// an oscillation of up to about 10 rad over the panel.
 const NODES: usize = 16;
 
 /// Phase of an oscillating integrand that one panel resolves to rounding, rad.

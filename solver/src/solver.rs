@@ -1,4 +1,4 @@
-//! One realization from bone to velocity, by the method that the setup asks for.
+//! Computes the velocity of one realization by the method that the setup requests.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::{FailureKind, Outcome, Solved};
@@ -36,18 +36,19 @@ pub struct Arrival {
     pub times: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
-    /// What was sampled; `None` under the hybrid method, whose discretisation is the setup's.
+    /// Sampling of the exact method; `None` for the hybrid method, whose discretisation is in the
+    /// setup.
     pub looks: Option<Looks>,
 }
 
-/// What the exact method sampled for one bone.
+/// Sampling of the exact method for one bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
-    /// How often the bone was looked at.
+    /// Number of looks (refinement passes) at the bone.
     pub count: u32,
-    /// (Frequency, wavenumber) pairs that were computed in all.
+    /// Total number of (frequency, wavenumber) pairs computed.
     pub pairs_computed: u64,
-    /// Sampling of the last look that counted.
+    /// Sampling of the last look that contributed.
     pub last: Sampled,
 }
 
@@ -62,22 +63,22 @@ pub struct Sampled {
     pub pairs: u64,
 }
 
-/// Why a case has no velocity.
+/// Reason why a case has no velocity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failure {
     /// Its kind.
     pub kind: FailureKind,
-    /// In a sentence, with the receiver named where there is one.
+    /// Description as a sentence, which names the receiver where there is one.
     pub detail: String,
 }
 
 impl Solver {
-    /// A solver for cases of `setup`, which has passed validation.
+    /// Creates a solver for cases of `setup`, which has passed validation.
     pub fn new(setup: &Setup) -> Self {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// The same, computing on one instruction set. The bits do not depend on it.
+    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         Self {
             setup: *setup,
@@ -87,7 +88,7 @@ impl Solver {
         }
     }
 
-    /// The setup.
+    /// Returns the setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -96,10 +97,10 @@ impl Solver {
         self.isa
     }
 
-    /// The first arrival of one bone.
+    /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure when the case has no velocity.
+    /// A typed failure if the case has no velocity.
     pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
         match self.setup.solver.method {
             Method::Exact => self.exact.arrival(bone, &mut workspace.exact),
@@ -107,15 +108,15 @@ impl Solver {
         }
     }
 
-    /// The same, reduced to what a job keeps.
+    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
     pub fn outcome(&self, bone: &Bone, workspace: &mut Workspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)
             .map_err(|failure| failure.kind)
     }
 
-    /// The realization at `index` of `ensemble`, as a worker answers it. A bone that cannot be drawn is
-    /// the failure `not_finite`.
+    /// Computes the realization at `index` of `ensemble`, as a worker returns it. A bone that
+    /// cannot be drawn is the failure `not_finite`.
     pub fn realization(
         &self,
         ensemble: &Ensemble,
@@ -134,8 +135,8 @@ impl Solver {
     }
 }
 
-/// Refuses, before anything is computed, bones through which nothing can come first: `speed` (m/s)
-/// bounds that of every wave.
+/// Refuses, before anything is computed, bones through which no wave can arrive first; `speed`
+/// (m/s) is an upper bound of the speed of every wave.
 pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure> {
     for (r, x) in sampling::distances(setup).enumerate() {
         let earliest = sampling::earliest_arrival(setup, x, speed);
@@ -156,16 +157,16 @@ pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure
     Ok(())
 }
 
-/// A number in a sentence: three decimals, or an exponent where that would be a row of zeros.
+/// Formats a number for a sentence: three decimals, or an exponent if these would all be zero.
 pub(crate) fn readable(value: f64) -> String {
     if (1e-2..1e6).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.3e}") }
 }
 
-/// What to look at when a pressure is not finite.
+/// Advice if a pressure is not finite.
 pub(crate) const OUT_OF_SCALE: &str =
     "a number of layers, probe, density or elasticity is out of scale";
 
-/// The failure of a bone whose waves have no finite speed.
+/// Returns the failure of a bone whose waves have no finite speed.
 pub(crate) fn speed_not_finite() -> Failure {
     Failure {
         kind: FailureKind::NotFinite,
@@ -174,7 +175,7 @@ pub(crate) fn speed_not_finite() -> Failure {
     }
 }
 
-/// The failure of a case whose pressure is not finite.
+/// Returns the failure of a case whose pressure is not finite.
 pub(crate) fn pressure_not_finite() -> Failure {
     Failure {
         kind: FailureKind::NotFinite,

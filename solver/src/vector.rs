@@ -1,8 +1,8 @@
-//! Registers: several independent real numbers that are computed on side by side.
+//! Registers: several independent real numbers that are processed side by side.
 //!
 //! A kernel is written once, generic over [`Vector`], and compiled for each width. Lanes never
-//! talk to each other and every operation is one IEEE operation or one explicit fused multiply-add,
-//! so the bits of each lane are those of a scalar computation, whatever the width.
+//! interact and every operation is one IEEE operation or one explicit fused multiply-add, so the
+//! bits of each lane are those of a scalar computation, whatever the width.
 
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 
@@ -17,7 +17,7 @@ pub(crate) trait Vector: Copy {
     /// Part `part` of eight numbers: those from `part` · `WIDTH` on.
     fn load(lanes: &Lanes, part: usize) -> Self;
 
-    /// Writes what [`Vector::load`] reads.
+    /// Writes the numbers that [`Vector::load`] reads.
     fn store(self, lanes: &mut Lanes, part: usize);
 
     fn add(self, other: Self) -> Self;
@@ -43,7 +43,7 @@ pub(crate) trait Vector: Copy {
     const PARTS: usize = LANES / Self::WIDTH;
 }
 
-/// One number: for processors of which nothing else is known.
+/// One number, for processors without a known vector extension.
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar(f64);
 
@@ -119,9 +119,9 @@ macro_rules! vector {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($register);
 
-        // SAFETY, for every intrinsic below: values of this type are only made and used inside
-        // kernels that `Isa::run` compiles for, and starts on, a processor that was seen to have
-        // the instruction set. Loads and stores stay inside the eight numbers: `part` is below
+        // SAFETY, for every intrinsic below: values of this type are only created and used inside
+        // kernels that `Isa::run` compiles for, and starts on, a processor that was detected to
+        // have the instruction set. Loads and stores stay inside the eight numbers: `part` is below
         // `PARTS`, which is asserted.
         impl Vector for $name {
             const WIDTH: usize = $width;
@@ -166,7 +166,7 @@ macro_rules! vector {
 
             #[inline(always)]
             fn neg(self) -> Self {
-                // SAFETY: see above. A difference from -0 only turns the sign.
+                // SAFETY: see above. Subtraction from -0 only changes the sign.
                 Self(unsafe { $sub($splat(-0.0), self.0) })
             }
 
@@ -286,7 +286,7 @@ impl<V: Vector> ComplexVector<V> {
         Self { re: V::load(&lanes.re, part), im: V::load(&lanes.im, part) }
     }
 
-    /// Writes what [`ComplexVector::load`] reads.
+    /// Writes the numbers that [`ComplexVector::load`] reads.
     #[inline(always)]
     pub(crate) fn store(self, lanes: &mut ComplexLanes, part: usize) {
         self.re.store(&mut lanes.re, part);

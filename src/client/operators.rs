@@ -1,4 +1,4 @@
-//! What those ask who run a coordinator: its workers, its health, a copy of its store.
+//! Requests of operators: workers, health, and a copy of the store.
 
 use std::time::Duration;
 
@@ -16,21 +16,21 @@ use super::peer::Peer;
 use super::{Client, ClientError, Remote, answer_limit, loaded};
 
 impl Client {
-    /// The attached workers, and those that went last.
+    /// Returns the attached workers, and those that left last.
     pub(crate) async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
         let call = self.jobs.list_workers(v1::ListWorkersRequest {});
         self.peer.answered(call).await
     }
 
-    /// Sends a worker away; how it is then.
+    /// Drains a worker; returns its state afterwards.
     pub(crate) async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
         let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });
         let worker = self.peer.answered(call).await?.worker;
         self.present(worker, "worker")
     }
 
-    /// Shows `take` a copy of the store, part by part; what it must be in all. The outer error is
-    /// that of `take`.
+    /// Passes a copy of the store to `take`, part by part; returns the size and digest that the
+    /// whole copy must have. The outer error is that of `take`.
     pub(crate) async fn backup<E>(
         &mut self,
         mut take: impl FnMut(&[u8]) -> Result<(), E>,
@@ -57,8 +57,8 @@ impl Client {
     }
 }
 
-/// Asks a coordinator once whether it serves, for no longer than `limit`. It needs no token, and
-/// none is sent.
+/// Asks a coordinator once whether it serves, and waits at most `limit`. This requires no token,
+/// and none is sent.
 pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
     let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };

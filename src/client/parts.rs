@@ -1,4 +1,4 @@
-//! The parts of a fetch, as they come, into what a job left.
+//! Assembles the parts of a fetch into the specification, result and history of a job.
 
 use osteon_common::limits::{GROUPS_MAX, REALIZATIONS_MAX};
 use osteon_common::outcome::Outcome;
@@ -10,30 +10,30 @@ use osteon_proto::{realizations, results, specification};
 
 use super::Fetched;
 
-/// The parts that have come.
+/// The parts received so far.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
     specification: Option<v1::JobSpecification>,
     result: Option<v1::JobResult>,
     history: Vec<Evaluation>,
-    /// At the best point of the job.
+    /// The outcomes at the best point of the job.
     realizations: Realizations,
     groups: Vec<(v1::GroupResult, Realizations)>,
-    /// Outcomes of groups that are kept.
+    /// Number of outcomes of groups that were kept.
     kept: u64,
 }
 
-/// Outcomes of one point.
+/// The outcomes of one point.
 #[derive(Debug, Default)]
 struct Realizations {
-    /// How many have come.
+    /// Number of outcomes received.
     count: u64,
-    /// All of them, or none, if there are too many.
+    /// All outcomes received, or none if there are too many.
     outcomes: Vec<Outcome>,
 }
 
 impl Parts {
-    /// Takes the next part.
+    /// Adds the next part.
     pub(super) fn add(&mut self, part: Part) -> Result<(), Malformed> {
         match part {
             Part::Specification(specification) => self.specification = Some(specification),
@@ -83,7 +83,7 @@ impl Parts {
         Ok(())
     }
 
-    /// What they make, when all have come.
+    /// Assembles the parts once all have arrived.
     pub(super) fn whole(self) -> Result<Fetched, Malformed> {
         let specification =
             self.specification.ok_or(Malformed::Missing { field: "specification" })?;
@@ -104,7 +104,7 @@ impl Parts {
 }
 
 impl Realizations {
-    /// The outcomes, of which there must be `all` where there is a best point, and none elsewhere.
+    /// Returns the outcomes, whose number must be `all` if there is a best point, and 0 otherwise.
     fn whole(self, has_best: bool, all: u64) -> Result<Vec<Outcome>, Malformed> {
         let expected = if has_best { all } else { 0 };
         if self.count == expected {

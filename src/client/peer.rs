@@ -1,5 +1,5 @@
-//! The coordinator at the other end of a connection: its answers, waited for within bounds, and what it
-//! means when none comes.
+//! The coordinator at the other end of a connection: waits for its answers within a time limit, and
+//! interprets missing answers and errors.
 
 use std::pin::pin;
 use std::time::Duration;
@@ -15,25 +15,25 @@ use crate::progress::say;
 
 use super::{ClientError, Remote, SILENCE_S_MAX, answer_limit};
 
-/// A coordinator that a client speaks to.
+/// The coordinator that a client is connected to.
 #[derive(Debug, Clone)]
 pub(super) struct Peer {
     /// Its address.
     pub(super) endpoint: Endpoint,
-    /// Whether it has ever answered: then it speaks what the client speaks.
+    /// Whether it has ever answered, which shows that client and coordinator use the same protocol.
     ever_answered: bool,
-    /// Variables of the environment that were not used for it.
+    /// Environment variables that were not used for it.
     unused: Unused,
 }
 
 impl Peer {
-    /// The coordinator at `remote`, of which nothing was heard yet.
+    /// Creates the peer for `remote`, which has not answered yet.
     pub(super) fn new(remote: &Remote) -> Self {
         let Remote { endpoint, unused, .. } = remote.clone();
         Self { endpoint, ever_answered: false, unused }
     }
 
-    /// The answer to `call`, within the time that a client waits.
+    /// Waits for the answer to `call`, for at most the client's time limit.
     pub(super) async fn answered<T>(
         &mut self,
         call: impl Future<Output = Result<Response<T>, Status>>,
@@ -41,7 +41,7 @@ impl Peer {
         self.answered_within(answer_limit(), call).await
     }
 
-    /// The answer to `call`, within `limit`.
+    /// Waits for the answer to `call`, for at most `limit`.
     pub(super) async fn answered_within<T>(
         &mut self,
         limit: Duration,
@@ -60,7 +60,7 @@ impl Peer {
             Ok(Err(status)) => self.unanswered(&status),
             Err(_) => self.silent(),
         };
-        // A refusal is an answer, too.
+        // A refusal counts as an answer, too.
         self.ever_answered |= matches!(
             error,
             ClientError::Violations(_)
@@ -70,12 +70,12 @@ impl Peer {
         Err(error)
     }
 
-    /// It says nothing for as long as a client waits.
+    /// Returns the error of a coordinator that has not answered within the time limit.
     pub(super) fn silent(&self) -> ClientError {
         ClientError::Unanswered { endpoint: self.endpoint.clone() }
     }
 
-    /// The meaning of the status that a call ended with before its answer came.
+    /// Interprets the status of a call that ended before its first answer.
     fn unanswered(&self, status: &Status) -> ClientError {
         match self.refused(status) {
             ClientError::Lost { endpoint, .. } => {
@@ -86,7 +86,7 @@ impl Peer {
         }
     }
 
-    /// The meaning of the status that a call ended with.
+    /// Interprets the status of a failed call.
     pub(super) fn refused(&self, status: &Status) -> ClientError {
         if let Some(violations) = status::violations(status) {
             return ClientError::Violations(violations);
@@ -97,14 +97,14 @@ impl Peer {
             return error.without(&self.unused);
         }
         let reason = status.message().to_owned();
-        // What the coordinator itself answers has no source: that is an error of the transport.
+        // Statuses sent by the coordinator have no source; only errors of the transport have one.
         let answered = std::error::Error::source(status).is_none();
         match status.code() {
             Code::Unavailable if answered => ClientError::Unavailable { endpoint, reason },
             Code::Unavailable | Code::Unknown | Code::Cancelled | Code::DeadlineExceeded => {
                 ClientError::Lost { endpoint, reason }
             }
-            // tonic reports a broken HTTP/2 connection so.
+            // tonic reports a broken HTTP/2 connection as this code.
             Code::Internal if !answered => ClientError::Lost { endpoint, reason },
             code => {
                 let refused = ClientError::Refused { endpoint, code, reason, hint: hint(status) };
@@ -114,8 +114,8 @@ impl Peer {
     }
 }
 
-/// Advice to a user of the command line about a refusal, which the coordinator, whose clients are
-/// programs, does not give.
+/// Returns advice about a refusal for users of the command line. The coordinator does not give it,
+/// as its clients are programs.
 fn hint(status: &Status) -> &'static str {
     match status::missing(status) {
         Some(Resource::Job) => "; `osteon jobs` lists all jobs",
@@ -124,7 +124,7 @@ fn hint(status: &Status) -> &'static str {
     }
 }
 
-/// Waits for `call`; after a moment without an end the user is told what is waited for.
+/// Waits for `call`; after a moment tells the user what is waited for.
 pub(super) async fn unless_silent<T>(
     call: impl Future<Output = T>,
     notice: impl Fn() -> String,

@@ -1,4 +1,4 @@
-//! What a client makes of losses and answers.
+//! Tests of a client's reaction to lost connections and answers.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,8 +68,8 @@ async fn coordinator(socket: &Path) -> Coordinator {
     osteon_coordinator::start(listener, store, Config::default()).await.unwrap()
 }
 
-/// Hands what the first connection to `from` sends to `to`, and no answer back, until it is told
-/// to cut it; those after it work.
+/// Forwards the requests of the first connection to `from` to `to`, but no answers, until `cut` is
+/// notified; later connections work normally.
 async fn loses_the_first_answer(from: UnixListener, to: PathBuf, cut: Arc<Notify>) {
     let (mut client, _) = from.accept().await.unwrap();
     let mut server = UnixStream::connect(&to).await.unwrap();
@@ -133,7 +133,8 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
     cuts.abort();
 }
 
-/// TLS may be the reason why a coordinator never answers. One that was killed has answered before.
+/// TLS may be the reason if a coordinator never answers, but not if it answered before it was
+/// killed.
 #[tokio::test(flavor = "multi_thread")]
 async fn tls_is_thought_of_only_where_no_answer_ever_came() {
     let directory = tempfile::tempdir().unwrap();
@@ -153,7 +154,7 @@ async fn tls_is_thought_of_only_where_no_answer_ever_came() {
             }
             drop((client, server));
             is_broken.notify_one();
-            // As from a port that something else listens on.
+            // Behaves like a port on which a different service listens.
             loop {
                 drop(listener.accept().await.unwrap());
             }

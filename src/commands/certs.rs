@@ -15,7 +15,7 @@ use crate::new_files::{self, NewFile};
 use crate::output;
 use crate::resolved::Format;
 
-/// Name of the authority's files.
+/// Base name of the authority's files.
 const AUTHORITY: &str = "ca";
 
 /// Writes `NAME.pem` and `NAME-key.pem` for the authority, the coordinator (`server`), workers
@@ -52,7 +52,7 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
     Ok(Ending::Done)
 }
 
-/// The authority in `ca`, whose certificate is to stand in `directory`, too.
+/// Returns the authority in `ca`, and a copy of its certificate to be written to `directory`.
 fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Failure> {
     let (certificate, key) = (ca.join("ca.pem"), ca.join("ca-key.pem"));
     credential_file::identity(&certificate, &key).map_err(Failure::bad_input)?;

@@ -1,4 +1,4 @@
-//! `coordinator`: serves jobs to clients and workers until it is told to end.
+//! `coordinator`: serves jobs to clients and workers until it is asked to end.
 
 use std::fs;
 use std::pin::pin;
@@ -17,24 +17,24 @@ use crate::resolved::Format;
 use crate::result_files;
 use crate::signals;
 
-/// Signs of life while a lease lasts: some may come late.
+/// Heartbeats within the duration of a lease; several, because some may come late.
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
 /// printed, and stands in DIR/address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
     let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
-    // Read before anything is bound or made.
+    // Read before anything is bound or created.
     let door = Door::open(&arguments, &address)?;
     let mut interruption = pin!(signals::interruption()?);
     let mut reload = match &door {
-        // SIGHUP keeps its meaning where there is nothing to read again.
+        // SIGHUP keeps its default effect if there is nothing to reload.
         Door::Open => None,
         _ => Some(signals::hangups()?),
     };
     let directory = arguments.store.clone();
     if matches!(address, ListenAddress::Unix(_)) {
-        // The socket may be meant to lie in the directory of the store.
+        // The socket may be located in the directory of the store.
         SqliteStore::make_directory(&directory)
             .with_context(|| format!("cannot create the directory {}", directory.display()))
             .map_err(Failure::Failed)?;
@@ -76,14 +76,14 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     served
 }
 
-/// Reads tokens and certificates again; if any of them cannot be used, all stay as they are.
+/// Reloads tokens and certificates; if any of them cannot be used, all stay as they are.
 fn read_again(
     coordinator: &Coordinator,
     arguments: &CoordinatorArguments,
     address: &ListenAddress,
 ) {
     let kept = "tokens and certificates stay as they were";
-    // Nobody need write it a second time, and everything else would wait meanwhile.
+    // A pipe need not be written a second time, and everything else would have to wait for it.
     if let Some(pipe) = Door::pipe(arguments) {
         let reason = format!(
             "{} is a pipe, which cannot be read again; name a regular file at the next start",

@@ -47,9 +47,9 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
     Ok(Ending::Done)
 }
 
-/// Refuses a directory whose results are not those of the job: the realizations of its best point
-/// would be others. Where one of the two has no data, as the job of a propagation, they are compared in all
-/// the rest, on which realizations depend.
+/// Refuses a directory whose results are not those of the job, since the realizations at its best
+/// point would be different. If one of the two has no data, as the job of a propagation, everything
+/// else is compared, which is what realizations depend on.
 fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> anyhow::Result<()> {
     let there = |kind| results_directory::job_of(directory, kind);
     let searched = job_file::read(job, JobKind::Identification).ok();
@@ -75,7 +75,7 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
     }
 }
 
-/// The best point of the result in `directory`, or that of one of its groups.
+/// Returns the best point of the result in `directory`, or that of one of its groups.
 fn best_point(directory: &Path, group: Option<&str>) -> anyhow::Result<Point> {
     let result = results_directory::result_of(directory)?;
     let groups = result.groups();

@@ -1,4 +1,4 @@
-//! `submit`, `jobs`, `watch`, `cancel`, `fetch`: a client of a running coordinator.
+//! `submit`, `jobs`, `watch`, `cancel`, `fetch`: requests to a running coordinator.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -22,15 +22,15 @@ use crate::{unsearched_groups, verdict, warnings};
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A job to hand to a coordinator.
+/// A job to be submitted to a coordinator.
 pub(super) struct Submission<'a> {
     /// The job file.
     pub(super) job: &'a Path,
-    /// What the job does.
+    /// Kind of the job.
     pub(super) kind: JobKind,
-    /// The request that stands for it.
+    /// The request, which makes the submission idempotent.
     pub(super) request: &'a Request,
-    /// What is told besides.
+    /// Further properties of the job.
     pub(super) options: SubmitOptions,
 }
 
@@ -59,7 +59,7 @@ pub(super) async fn list(coordinator: &Remote, format: Format) -> Result<Ending,
     Ok(Ending::Done)
 }
 
-/// `jobs prune`: prints the jobs that are forgotten.
+/// `jobs prune`: prints the ids of the deleted jobs.
 pub(super) async fn prune(
     older_than: Option<Duration>,
     keep_last: Option<u64>,
@@ -89,14 +89,14 @@ pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<Ending, Fai
     Ok(ending(&last))
 }
 
-/// `cancel`: prints how the job is then.
+/// `cancel`: prints the job's state afterwards.
 pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
     let snapshot = Client::connect(coordinator).await?.cancel(job).await?;
     output::stdout(Format::Text).snapshot(&snapshot).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
-/// `fetch`: writes what an ended job left. Nothing is written while it has not ended.
+/// `fetch`: writes the results of an ended job. Nothing is written while it has not ended.
 pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<Ending, Failure> {
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
@@ -109,7 +109,7 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
         return Err(Failure::failed(anyhow!("job {job}: {missing}")));
     }
     let specification = &fetched.specification;
-    // Looked at before anything is made there, and again when nobody else can change it.
+    // Checked before anything is created there, and again when the directory is locked.
     ResultsDirectory::stored(out, specification)?;
     let directory = ResultsDirectory::open(out)?;
     let stored = ResultsDirectory::stored(out, specification)?;
@@ -125,12 +125,12 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
     Ok(Ending::Done)
 }
 
-/// Whether the fetched result takes the place of the one stored in `out`: not if it is the same,
-/// and nothing takes the place of a run that is done.
+/// Returns whether the fetched result replaces the one stored in `out`. It does not if both are the
+/// same, and a completed run is never replaced.
 fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, Failure> {
     let specification = &fetched.specification;
     let new = ResultFile::from_job(specification.kind, &fetched.result);
-    // The digest is over everything that was computed; another version may have computed it.
+    // The digest covers everything that was computed; the program's version may differ.
     if (stored.status(), stored.digest()) == (new.status(), new.digest()) {
         return Ok(false);
     }

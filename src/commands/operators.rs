@@ -1,4 +1,4 @@
-//! `workers`, `health`, `backup`: for those who run a coordinator.
+//! `workers`, `health`, `backup`: commands for operators of a coordinator.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -16,12 +16,12 @@ use crate::ending::{Ending, Failure, stdout_failure};
 use crate::output;
 use crate::resolved::Format;
 
-/// Name of a store's file in its directory, and those that SQLite keeps beside it.
+/// Name of a store's file in its directory, and of the files that SQLite keeps beside it.
 const STORE: &str = "osteon.sqlite";
 const BESIDE_STORE: [&str; 3] =
     ["osteon.sqlite-wal", "osteon.sqlite-journal", "osteon.acknowledged"];
 
-/// `workers`: prints who is attached, who went last, and who is expelled.
+/// `workers`: prints the attached workers, those that left last, and those that are expelled.
 pub(super) async fn workers(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
     let mut client = Client::connect(coordinator).await?;
     let workers = client.workers().await?;
@@ -30,7 +30,7 @@ pub(super) async fn workers(coordinator: &Remote, format: Format) -> Result<Endi
     Ok(Ending::Done)
 }
 
-/// `workers drain`: prints how the worker is then.
+/// `workers drain`: prints the worker's state afterwards.
 pub(super) async fn drain(
     worker: u64,
     coordinator: &Remote,
@@ -41,7 +41,7 @@ pub(super) async fn drain(
     Ok(Ending::Done)
 }
 
-/// `health`: whether a coordinator serves, told by the exit code, too.
+/// `health`: prints whether a coordinator serves; the exit code says the same.
 pub(super) async fn health(
     coordinator: &Remote,
     limit: Duration,
@@ -65,7 +65,7 @@ pub(super) async fn health(
     }
 }
 
-/// `backup`: a copy of the store of a running coordinator, whole or not at all.
+/// `backup`: copies the store of a running coordinator, completely or not at all.
 pub(super) async fn backup(
     directory: &Path,
     coordinator: &Remote,
@@ -88,14 +88,15 @@ pub(super) async fn backup(
         .map_err(|error| error.error)
         .with_context(|| format!("cannot make {}", visible::path(&target)))
         .map_err(Failure::Failed)?;
-    // The name, too, must outlive a power cut.
+    // Syncs the directory, so that the file's name survives a power failure, too.
     let directory = File::open(directory).and_then(|directory| directory.sync_all());
     directory.with_context(unsynced).map_err(Failure::Failed)?;
     output::stdout(format).backup(&target, &end).map_err(stdout_failure)?;
     Ok(Ending::Done)
 }
 
-/// The file of the copy, where there is none and nothing that SQLite would take for a part of it.
+/// Returns the path of the copy, after checking that neither it nor a file that SQLite would take
+/// for a part of it exists.
 fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
     for name in [STORE].iter().chain(&BESIDE_STORE) {
         let path = directory.join(name);
@@ -109,7 +110,7 @@ fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
     Ok(directory.join(STORE))
 }
 
-/// Writes the copy to `file`; what it is in all, when it is that.
+/// Writes the copy to `file`; returns its size and digest once they have been verified.
 async fn receive(client: &mut Client, file: &mut NamedTempFile) -> Result<BackupEnd, Failure> {
     let (mut length, mut digest) = (0, blake3::Hasher::new());
     let place = file.path().to_owned();

@@ -24,7 +24,7 @@ use crate::results_directory::ResultsDirectory;
 use crate::signals;
 use crate::{unsearched_groups, verdict, warnings};
 
-/// Runs the job, or shows what an earlier run left.
+/// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     let noted = job_file::read_noting(&run.job, run.kind).map_err(Failure::bad_input)?;
     let specification = &noted.specification;
@@ -40,7 +40,7 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     unsearched_groups::warn(&run.job, &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
     let mut interruption = pin!(signals::interruption()?);
-    // An address that does not answer leaves no directory behind.
+    // Connected first, so that an address that does not answer leaves no directory behind.
     let computers = tokio::select! {
         biased;
         found = Computers::find(&run.place) => found?,
@@ -49,7 +49,7 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
         }
     };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
-    // Another run may have ended between the look and the lock.
+    // Another run may have ended between the first check and the lock.
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
     }
@@ -67,14 +67,14 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     show(&run, specification, &result)
 }
 
-/// A job, and what people call it.
+/// A job and its name for display.
 #[derive(Clone, Copy)]
 struct Named<'a> {
     specification: &'a JobSpecification,
     name: &'a str,
 }
 
-/// Who computes, and is there.
+/// The computers of a run, started or connected.
 enum Computers {
     Here { workers: u32, threads: u32 },
     There(Box<Client>),
@@ -99,7 +99,7 @@ fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<Result
     }
 }
 
-/// Why the last run in the same directory failed, if another may do better.
+/// Returns the reason why the last run in the same directory failed, if another run may succeed.
 fn failed_before(run: &Run, specification: &JobSpecification) -> Result<Option<String>, Failure> {
     let stored = match &run.out {
         Some(path) => ResultsDirectory::stored(path, specification)?,
@@ -108,7 +108,7 @@ fn failed_before(run: &Run, specification: &JobSpecification) -> Result<Option<S
     Ok(stored.as_ref().and_then(verdict::machine_failure).map(str::to_owned))
 }
 
-/// Writes what an ended job left, if there is a directory for it; the result.
+/// Writes the results of an ended job, if there is a directory for them, and returns the result.
 fn keep(
     kind: JobKind,
     fetched: &Fetched,
@@ -118,7 +118,7 @@ fn keep(
     if let Some(directory) = directory
         && (missing.is_some() || fetched.result.status == Status::Cancelled)
     {
-        // The same command shall run it again, not meet the same end again.
+        // The same command must run the job again, not show the same ending.
         directory.forget_request();
     }
     if let Some(missing) = missing {
@@ -140,7 +140,7 @@ fn show(
     Ok(verdict::ending(specification, result))
 }
 
-/// The job on worker processes of this one.
+/// Runs the job on worker processes of this process.
 async fn here(
     workers: u32,
     threads: u32,
@@ -175,7 +175,7 @@ async fn here(
     result
 }
 
-/// The job on a running coordinator.
+/// Runs the job on a running coordinator.
 async fn there(
     client: Client,
     job: Named<'_>,
@@ -191,7 +191,7 @@ async fn there(
     }
 }
 
-/// Submits, watches, fetches.
+/// Submits the job, follows it and fetches its results.
 async fn drive(
     mut client: Client,
     Named { specification, name }: Named<'_>,

@@ -1,4 +1,4 @@
-//! `schema`: the shape of a file for other programs.
+//! `schema`: the JSON Schema of a file, for other programs.
 
 use osteon_common::report;
 

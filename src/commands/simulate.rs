@@ -15,7 +15,7 @@ use crate::resolved;
 use crate::simulation_directory::{Simulated, TRACES};
 use crate::warnings;
 
-/// Solves the case, writes its files if they are wanted, prints.
+/// Solves the case, writes its files if requested, and prints the result.
 pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
     let format = resolved::format(arguments.json);
     let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
@@ -54,7 +54,7 @@ fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved,
     };
     let arrival = solver.arrival(&case.bone, &mut Workspace::default());
     if let Some((directory, traces)) = traces {
-        // A check is of the solvers; what is kept is the same with one and without.
+        // A check concerns only the solvers; the files kept are the same with and without it.
         let shown =
             ShownSimulation { setup: &case.setup, arrival: &arrival, traces: None, check: None };
         let positions = case.setup.probe.receivers.positions();
@@ -74,7 +74,7 @@ fn trace_failure(error: TraceError) -> Failure {
     }
 }
 
-/// `time`, then one column per receiver headed by its x1.
+/// Writes the column `time`, then one column per receiver with its x1 as heading.
 fn csv(
     traces: &Traces,
     positions: impl Iterator<Item = f64>,

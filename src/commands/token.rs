@@ -1,4 +1,4 @@
-//! `token`: a token for a client, and the line that admits it.
+//! `token`: creates a token for a client, and its line for the coordinator's list.
 
 use anyhow::anyhow;
 use osteon_coordinator::tokens::{self, Role};
@@ -10,7 +10,7 @@ use crate::new_files::{self, NewFile};
 use crate::output;
 use crate::resolved::Format;
 
-/// Writes the token to its file; its line goes to the coordinator's list, or to stdout.
+/// Writes the token to its file, and its line to the coordinator's list or to stdout.
 pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
     let TokenArguments { name, role, out, tokens: list } = arguments;
     let role = Role::named(role).ok_or_else(|| {
@@ -29,7 +29,7 @@ pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
     match list {
         Some(list) => {
             if let Err(failure) = new_files::append(list, &line) {
-                // A token that nobody admits is of no use.
+                // A token without an entry in the list is useless.
                 drop(std::fs::remove_file(out));
                 return Err(failure);
             }

@@ -1,4 +1,4 @@
-//! `worker`: computes for a coordinator until it is told to leave.
+//! `worker`: computes for a coordinator until it is asked to leave.
 
 use anyhow::anyhow;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
@@ -9,7 +9,7 @@ use crate::ending::{Ending, Failure};
 use crate::environment::Unused;
 use crate::signals;
 
-/// Serves until a signal, the time limit, or a reason to give up.
+/// Serves until a signal, the time limit, or an error.
 pub(super) async fn serve(
     config: WorkerConfig,
     files: &CredentialFiles,
@@ -34,7 +34,7 @@ pub(super) async fn serve(
     Ok(Ending::Done)
 }
 
-/// The error, and what was not used, where that may be the reason.
+/// Returns the error, with the unused environment variables if they may be its reason.
 fn noted(error: anyhow::Error, of_trust: bool, unused: &Unused) -> anyhow::Error {
     if of_trust && !unused.is_empty() { anyhow!("{error}; {unused}") } else { error }
 }

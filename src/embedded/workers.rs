@@ -1,4 +1,5 @@
-//! The worker processes of an embedded coordinator: started, watched, started again, ended.
+//! The worker processes of an embedded coordinator: starting, supervising, restarting and ending
+//! them.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -19,28 +20,28 @@ use crate::ending::Failure;
 use crate::environment;
 use crate::progress::say;
 
-/// A worker leaves by itself after this long without this process, s.
+/// Time after which a worker ends by itself if it has lost this process, s.
 const GIVE_UP_AFTER_S: u64 = 5;
-/// Most deaths of one worker in a row without any progress of the run between them. All of them
-/// may be killed at once: deaths of others do not count.
+/// Maximum number of consecutive deaths of one worker without progress of the run in between.
+/// Deaths of other workers do not count, so all workers may be killed at once.
 const DEATHS_IN_A_ROW_MAX: u32 = 10;
-/// Wait before a worker is started again, ms, times the deaths in a row.
+/// Pause before a worker is restarted, ms, multiplied by the number of consecutive deaths.
 const RESPAWN_MS: u64 = 50;
-/// Lines of a worker's stderr that are kept to explain its death.
+/// Number of last lines of a worker's stderr that are kept to explain its death.
 const LINES_KEPT_MAX: usize = 20;
-/// Longest line of a worker's stderr, bytes.
+/// Longest line of a worker's stderr that is kept, bytes.
 const LINE_BYTES_MAX: u64 = 4096;
 /// Longest wait for the rest of a dead worker's stderr, ms.
 const LAST_WORDS_MS: u64 = 500;
 
-/// The worker processes; all end when this is dropped.
+/// The worker processes; dropping this ends all of them.
 pub(crate) struct Workers {
     tasks: JoinSet<()>,
     stop: watch::Sender<bool>,
     failures: mpsc::Receiver<anyhow::Error>,
 }
 
-/// What all keepers of workers share.
+/// Data shared by the supervisors of all workers.
 struct Shared {
     executable: PathBuf,
     endpoint: Endpoint,
@@ -56,7 +57,7 @@ struct Deaths {
 }
 
 impl Deaths {
-    /// Counts a death at `progress`; how many there were in a row.
+    /// Counts a death at `progress`; returns the number of consecutive deaths.
     fn count(&mut self, progress: u64) -> u32 {
         self.in_a_row = if progress == self.progress_at_last { self.in_a_row + 1 } else { 1 };
         self.progress_at_last = progress;
@@ -65,7 +66,7 @@ impl Deaths {
 }
 
 impl Workers {
-    /// Starts `count` worker processes of `executable`, of `threads` threads each.
+    /// Starts `count` worker processes of `executable`, with `threads` threads each.
     pub(crate) fn start(
         executable: PathBuf,
         endpoint: &Endpoint,
@@ -84,7 +85,7 @@ impl Workers {
         Self { tasks, stop, failures }
     }
 
-    /// Completes when there is no hope that the workers get on.
+    /// Completes when a worker has failed for good.
     pub(crate) async fn failed(&mut self) -> Failure {
         match self.failures.recv().await {
             Some(error) => Failure::Failed(error),
@@ -94,13 +95,13 @@ impl Workers {
 
     /// Ends and reaps all processes.
     pub(crate) async fn end(mut self) {
-        // Fails only when every task has ended already.
+        // Fails only if every task has already ended.
         let _ended = self.stop.send(true);
         while self.tasks.join_next().await.is_some() {}
     }
 }
 
-/// Keeps one worker alive until it is told to stop, or all hope is gone.
+/// Keeps one worker running until it is told to stop, or the worker has failed for good.
 async fn keep(
     number: u32,
     shared: Arc<Shared>,
@@ -115,7 +116,7 @@ async fn keep(
                 tokio::select! {
                     status = child.wait() => (describe_death(status), last_words(words).await),
                     _ = stopped.changed() => {
-                        // Kills and reaps; a process that is already dead is no error here.
+                        // Kills and reaps the process; it is not an error if it is already dead.
                         drop(child.kill().await);
                         return;
                     }
@@ -129,7 +130,7 @@ async fn keep(
                 "worker {number} exited {in_a_row} times in a row without any progress; \
                  the last time it {death}{words}"
             );
-            // A full channel holds the same message of another worker.
+            // If the channel is full, it already contains the failure of another worker.
             drop(failures.try_send(error));
             return;
         }
@@ -142,8 +143,8 @@ async fn keep(
     }
 }
 
-/// Starts one worker, in a process group of its own: the terminal's Ctrl-C is for this process,
-/// which ends its workers itself.
+/// Starts one worker, in a process group of its own: the terminal's Ctrl-C must reach only this
+/// process, which ends its workers itself.
 fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result<Child> {
     let mut command = Command::new(executable);
     command
@@ -156,7 +157,7 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
         .stderr(Stdio::piped())
         .process_group(0)
         .kill_on_drop(true);
-    // They are for coordinators of others.
+    // These credentials are meant for other coordinators.
     for variable in environment::FILES {
         command.env_remove(variable);
     }
@@ -166,7 +167,7 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
     command.spawn().with_context(|| format!("cannot start {}", executable.display()))
 }
 
-/// Passes a worker's stderr on, line by line; its last lines.
+/// Forwards a worker's stderr line by line; returns its last lines.
 async fn listen(number: u32, stderr: Option<impl AsyncRead + Unpin>) -> VecDeque<String> {
     let mut lines = VecDeque::new();
     let Some(stderr) = stderr else { return lines };
@@ -226,7 +227,7 @@ mod tests {
     #[tokio::test]
     async fn workers_that_only_die_end_the_run_with_their_last_words() {
         let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
-        // Knows no option of a worker, says so, and ends.
+        // A program that rejects the options of a worker with a message, and ends.
         let executable = PathBuf::from("cat");
         let mut workers = Workers::start(executable, &endpoint, 2, 1, Arc::default());
         let failure = workers.failed().await.to_string();
@@ -242,7 +243,7 @@ mod tests {
         let starts = directory.path().join("starts");
         std::fs::create_dir(&starts).unwrap();
         let count = || std::fs::read_dir(&starts).unwrap().count();
-        // Dies at once until there were twice as many starts as deaths of one worker may be.
+        // Dies at once, until there were twice as many starts as one worker may have deaths.
         let script = directory.path().join("worker");
         let place = starts.display();
         let text = format!(

@@ -93,7 +93,7 @@ impl Output for JsonOutput<'_> {
     }
 }
 
-/// The text of the object of a simulation, with a final newline.
+/// Returns the JSON object of a simulation as text, with a final newline.
 pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
     let ShownSimulation { setup, arrival, check, .. } = *simulation;
     let Program { version, numerics, commit } = program::this();
@@ -117,7 +117,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
     written.to_json()
 }
 
-/// One solution, with what came out and how it differs from the refined one.
+/// Converts one solution, with its outcome and its difference from the refined one.
 fn checked(solution: &Solution) -> CheckedSolution {
     let arrival = solution.arrival.as_ref();
     CheckedSolution {

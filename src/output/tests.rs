@@ -95,7 +95,7 @@ fn two_searched_parameters_are_determined() {
     insta::assert_snapshot!(shown(JobKind::Identification, &free, RESULT));
 }
 
-/// `newton` alone says what the other values are, and only where it has matched the data.
+/// Only `newton` says what the other values mean, and only if it has matched the data.
 #[test]
 fn a_search_for_the_nearest_point_says_so() {
     let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
@@ -109,7 +109,7 @@ fn a_search_for_the_nearest_point_says_so() {
     let nearest = "this is the one nearest to the start";
     let text = unwrapped(&shown(RESULT));
     assert!(text.contains(nearest), "{text}");
-    // Within the noise of its moments, and not to the tolerance.
+    // The fit is within the noise of its moments, but has not reached the tolerance.
     let settled = RESULT
         .replace("3.21e-11", "3.21e-7")
         .replace("\"status\": \"converged\"", "\"status\": \"converged\", \"reason\": \"settled\"");
@@ -118,12 +118,12 @@ fn a_search_for_the_nearest_point_says_so() {
     assert!(!text.contains(nearest) && text.contains("this is one of them"), "{text}");
 }
 
-/// A text as one line.
+/// Joins the lines of a text.
 fn unwrapped(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What measured velocities say, and what failures may have done.
+/// Shows the conclusions from measured velocities, and the possible effect of failures.
 #[test]
 fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     let free = ["longitudinal_young_modulus", "transverse_young_modulus", "dispersion"];
@@ -134,7 +134,7 @@ fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     insta::assert_snapshot!(printed(Format::Text, |output| output.result(&shown).unwrap()));
 }
 
-/// `RESULT` of a likelihood, with intervals of the data, a test, and what failures may have done.
+/// `RESULT` with a likelihood, intervals of the data, a test, and the possible effect of failures.
 fn detailed() -> String {
     RESULT
         .replace(
@@ -223,7 +223,7 @@ fn a_control_variate_that_was_not_used_is_told() {
     check("false", "false", false);
 }
 
-/// `RESULT` with what the data say, from five starts.
+/// `RESULT` with the conclusions from the data, from five starts.
 fn identified(matched: bool) -> String {
     let known = |value: f64, error: f64| {
         serde_json::json!({ "value": value, "standard_error": error,
@@ -249,7 +249,7 @@ fn identified(matched: bool) -> String {
         point["parameters"]["density"] = density.into();
         point
     };
-    // √(c1111/ρ) is 3960.13 m/s at 1598.8 kg/m³, and falls with the root of the density.
+    // √(c1111/ρ) is 3960.13 m/s at 1598.8 kg/m³, and decreases with the root of the density.
     let points = [point(1598.8, 1e-13), point(1700.0, 1e-12), point(1900.0, 1e-3)];
     let spread = serde_json::json!({
         "density": { "smallest": 1598.8, "largest": 1700.0, "mean": 1650.0 } });
@@ -359,8 +359,8 @@ fn arrival() -> Arrival {
     }
 }
 
-/// Three receivers. The exact method's sampling changes with every improvement; the hybrid
-/// method's discretisation is the user's.
+/// A setup with three receivers. The exact method's sampling changes with every improvement of it;
+/// the hybrid method's discretisation is set by the user.
 fn setup(method: Method) -> Setup {
     let mut setup = Setup::default();
     setup.probe.receivers.count = 3;
@@ -372,7 +372,7 @@ fn simulation(format: Format, arrival: &Result<Arrival, Failure>, check: Option<
     let setup = setup(Method::Hybrid);
     let shown =
         ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
-    // Each build has its own.
+    // Each build has its own commit.
     let commit = format!("\"commit\": {}", serde_json::json!(crate::program::COMMIT));
     printed(format, |output| output.simulation(&shown).unwrap())
         .replace(&commit, "\"commit\": \"(of the build)\"")
@@ -411,7 +411,7 @@ fn the_sampling_that_decided_is_shown() {
     }
 }
 
-/// A check in which the hybrid method differs as given.
+/// A check in which the hybrid method differs by this.
 fn checked(hybrid: Difference) -> Check {
     let solution = |method, velocity, difference| Solution {
         setup: setup(method),
@@ -540,7 +540,8 @@ fn expelled_workers_are_shown_and_forgotten_jobs_listed() {
     assert_eq!(value, serde_json::json!({ "pruned": ["3", "5"] }));
 }
 
-/// What a coordinator says is shown so that it cannot write on the terminal; programs get it as it is.
+/// A coordinator's messages are shown in a form that cannot control the terminal; programs receive
+/// them unchanged.
 #[test]
 fn what_others_say_is_shown_without_hidden_characters() {
     use osteon_common::visible::is_hidden;

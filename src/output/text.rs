@@ -1,4 +1,4 @@
-//! Output for people.
+//! Output as text for people.
 
 mod check;
 mod fit;
@@ -24,10 +24,10 @@ use super::{Output, ShownResult, ShownSimulation, solver_of};
 use crate::client;
 use crate::progress::{Observed, line, span};
 
-/// Columns of the time before a line of `watch`.
+/// Width of the time before a line of `watch`, in columns.
 const TIME_WIDTH: usize = 9;
 
-/// Output for people.
+/// Output as text for people.
 pub(crate) struct TextOutput<'a> {
     writer: Box<dyn Write + 'a>,
 }
@@ -88,7 +88,7 @@ impl Output for TextOutput<'_> {
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
         let time = glued(&format!("{:>7}  ", span(snapshot.elapsed_s)));
-        // Who runs has an evaluation to show for it.
+        // A job counts as running once it has an evaluation.
         let state = match snapshot.state() {
             JobState::Running => String::new(),
             _ => format!("{}: ", operators::state(snapshot)),
@@ -106,7 +106,7 @@ impl Output for TextOutput<'_> {
     }
 }
 
-/// A line for each worker that was found to compute wrongly.
+/// Returns a line for each worker that was expelled because it computed wrongly.
 fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     let line = |worker: &ExpelledWorker| {
         let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
@@ -117,7 +117,7 @@ fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
     expelled.iter().map(line).collect()
 }
 
-/// `identification` or `propagation`.
+/// Returns `identification` or `propagation`.
 pub(super) fn kind_name(snapshot: &JobSnapshot) -> &'static str {
     match snapshot.kind() {
         JobKind::Identification => "identification",
@@ -126,7 +126,7 @@ pub(super) fn kind_name(snapshot: &JobSnapshot) -> &'static str {
     }
 }
 
-/// `waiting`, `running` or `ended`.
+/// Returns `waiting`, `running` or `ended`.
 pub(super) fn state_name(snapshot: &JobSnapshot) -> &'static str {
     match snapshot.state() {
         JobState::Waiting => "waiting",
@@ -136,12 +136,13 @@ pub(super) fn state_name(snapshot: &JobSnapshot) -> &'static str {
     }
 }
 
-/// How the job ended; `None` while it has not.
+/// Returns the name of the final status; `None` while the job has not ended.
 pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
     client::job_status(snapshot).map(osteon_common::results::Status::name)
 }
 
-/// What there is to tell of a job in so many columns; a reason comes whole, however long it is.
+/// Returns the progress of a job in this many columns; a reason is not shortened, however long it
+/// is.
 fn progress(snapshot: &JobSnapshot, width: usize) -> String {
     // A case file may follow the first line of a reason.
     let reason = snapshot.reason.lines().next().unwrap_or_default();

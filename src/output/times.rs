@@ -1,11 +1,11 @@
-//! Times of the coordinator's clock, for people and programs alike.
+//! Times of the coordinator's clock, in the same form for people and programs.
 
 use std::time::Duration;
 
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-/// A time since the Unix epoch in UTC by RFC 3339, to the second: `2026-01-31T09:30:00Z`.
+/// Returns a time since the Unix epoch in UTC by RFC 3339, to the second: `2026-01-31T09:30:00Z`.
 pub(super) fn utc(since_epoch: Duration) -> Option<String> {
     let seconds = i64::try_from(since_epoch.as_secs()).ok()?;
     OffsetDateTime::from_unix_timestamp(seconds).ok()?.format(&Rfc3339).ok()

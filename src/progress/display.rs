@@ -1,34 +1,34 @@
-//! What is shown of a job while it computes: parts of different weight, of which as many are shown as
-//! the width allows.
+//! Progress of a job as text: parts of different priority, of which as many are shown as the width
+//! allows.
 
 use osteon_common::visible;
 use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
-/// What one snapshot does not tell.
+/// Data that a single snapshot does not contain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Observed {
-    /// How many of the most evaluations would measure derivatives, as far as known.
+    /// Number of evaluations, within the maximum, that would measure derivatives, as far as known.
     pub(crate) derivatives: u64,
-    /// Outcomes of the present evaluation, if it takes so long that a bar helps.
+    /// Outcomes of the current evaluation, if it takes so long that a bar is useful.
     pub(crate) bar: Option<u64>,
-    /// What an evaluation has taken until now, s.
+    /// Mean duration of an evaluation so far, s.
     pub(crate) evaluation_s: Option<f64>,
 }
 
 /// A piece of a line.
 struct Part {
-    /// What is dropped first has the highest.
+    /// Parts with the highest rank are dropped first.
     rank: u8,
-    /// Stands before the text, unless it is the first.
+    /// Separator before the text, unless it is the first part.
     joint: &'static str,
     text: String,
 }
 
-/// Widest bar.
+/// Maximum width of a bar.
 const BAR_WIDTH_MAX: usize = 16;
 
-/// The lines of a job for a terminal of so many columns: how far it is, the best so far, what it
-/// waits for, and a bar where there is a part whose end is known.
+/// Returns the lines of a job for a terminal of this width: its progress, the best point so far,
+/// what it waits for, and a bar if the current evaluation takes long.
 pub(crate) fn lines(snapshot: &JobSnapshot, observed: &Observed, width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     if snapshot.kind() == JobKind::Identification {
@@ -45,7 +45,7 @@ pub(crate) fn lines(snapshot: &JobSnapshot, observed: &Observed, width: usize) -
     lines
 }
 
-/// The same in one line.
+/// Returns the same in one line.
 pub(crate) fn line(snapshot: &JobSnapshot, observed: &Observed, width: usize) -> String {
     let mut parts = course(snapshot, observed);
     parts.extend(waiting(snapshot));
@@ -60,7 +60,7 @@ pub(crate) fn line(snapshot: &JobSnapshot, observed: &Observed, width: usize) ->
     cut(fitted(parts, width), width)
 }
 
-/// How far the job is, and how fast.
+/// Progress and speed of the job.
 fn course(snapshot: &JobSnapshot, observed: &Observed) -> Vec<Part> {
     let part = |rank, joint, text: String| Part { rank, joint, text };
     let running = snapshot.state() == JobState::Running;
@@ -100,7 +100,7 @@ fn best(snapshot: &JobSnapshot) -> Vec<Part> {
     let part = |rank, text: String| Part { rank, joint: ", ", text };
     let mut parts = Vec::new();
     if let Some(cost) = snapshot.best_cost.filter(|cost| cost.is_finite()) {
-        // Logarithms of likelihoods differ in their last digits.
+        // Logarithms of likelihoods differ only in their last digits.
         let digits = if cost.abs() < 1.0 { format!("{cost:.2e}") } else { format!("{cost:.6}") };
         parts.push(part(2, format!("best cost {digits}")));
     }
@@ -122,8 +122,7 @@ fn outcomes(snapshot: &JobSnapshot, done: u64) -> String {
     format!("{done} of {} realizations", snapshot.realizations)
 }
 
-/// Time left. Of a search only the most is known: nobody can say when it will have found what it
-/// looks for.
+/// Time left. For a search only an upper limit is known, since it may find its point at any time.
 fn time_left(snapshot: &JobSnapshot, observed: &Observed) -> Vec<Part> {
     let (done, all) = (snapshot.realizations_done as f64, snapshot.realizations.max(1) as f64);
     let by_rate = all / snapshot.realizations_per_second;
@@ -142,14 +141,14 @@ fn time_left(snapshot: &JobSnapshot, observed: &Observed) -> Vec<Part> {
     vec![Part { rank: 3, joint: ", ", text }, Part { rank: 9, joint: " ", text: condition }]
 }
 
-/// A bar of the present evaluation.
+/// A bar of the current evaluation.
 fn bar(snapshot: &JobSnapshot, done: u64, width: usize) -> String {
     let all = snapshot.realizations.max(1);
     let fraction = done.min(all) as f64 / all as f64;
     let bar_width = (width / 5).min(BAR_WIDTH_MAX);
     let full = (fraction * bar_width as f64) as usize;
     let bar = format!("{}{}", "█".repeat(full), "░".repeat(bar_width - full));
-    // Rounded down: 100 % is the end.
+    // Rounded down, so that 100 % means complete.
     let percent = format!("{:.0} %", (100.0 * fraction).floor());
     let part = |rank, joint, text: String| Part { rank, joint, text };
     let mut parts = vec![part(0, "", bar), part(1, " ", percent)];
@@ -166,7 +165,7 @@ fn bar(snapshot: &JobSnapshot, done: u64, width: usize) -> String {
     fitted(parts, width)
 }
 
-/// As many of the parts as the width allows, in their order.
+/// Returns as many of the parts as the width allows, in their order.
 fn fitted(mut parts: Vec<Part>, width: usize) -> String {
     loop {
         let text = joined(&parts);
@@ -191,7 +190,7 @@ fn joined(parts: &[Part]) -> String {
     text
 }
 
-/// What has no smaller part is cut, and says so.
+/// Cuts a text that has no smaller parts, and marks the cut.
 fn cut(text: String, width: usize) -> String {
     if text.chars().count() <= width {
         return text;
@@ -200,7 +199,7 @@ fn cut(text: String, width: usize) -> String {
     kept.chain(['…']).collect()
 }
 
-/// A span of time in words of at most three characters' precision.
+/// Returns a duration as text with at most three significant characters.
 pub(crate) fn span(seconds: f64) -> String {
     match seconds {
         s if s < 9.95 => format!("{s:.1} s"),

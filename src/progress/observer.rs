@@ -1,4 +1,4 @@
-//! What successive snapshots of a job tell together.
+//! Derives information from successive snapshots of a job.
 
 use std::time::Duration;
 
@@ -6,36 +6,36 @@ use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
 use super::display::Observed;
 
-/// An evaluation that takes this long has a bar: one that is over in a moment would only flicker.
+/// An evaluation that takes this long gets a bar; for a shorter one it would only flicker.
 const LONG: Duration = Duration::from_secs(3);
 
-/// Sees the snapshots of one job in their order.
+/// Observes the snapshots of one job, in their order.
 #[derive(Debug, Default)]
 pub(super) struct Observer {
     derivatives: u64,
-    /// When the first progress was seen, and how far the job was then, in evaluations.
+    /// Time of the first observed progress, and the progress at that time in evaluations.
     begun: Option<(Duration, f64)>,
     present: Option<Present>,
-    /// What the last complete evaluation took.
+    /// Duration of the last complete evaluation.
     last_took: Duration,
 }
 
-/// The present evaluation.
+/// The current evaluation.
 #[derive(Debug, Clone, Copy)]
 struct Present {
     evaluations: u64,
     since: Duration,
-    /// The most outcomes that were seen: some may be computed again.
+    /// Largest number of outcomes seen so far; the number falls if some are computed again.
     furthest: u64,
 }
 
 impl Observer {
-    /// Of a job that would measure this many derivatives.
+    /// Creates the observer of a job that would measure this many derivatives.
     pub(super) fn new(derivatives: u64) -> Self {
         Self { derivatives, ..Self::default() }
     }
 
-    /// What is known with this snapshot, which came at `now`.
+    /// Returns the data known with this snapshot, which arrived at `now`.
     pub(super) fn observe(&mut self, snapshot: &JobSnapshot, now: Duration) -> Observed {
         let evaluation_s = self.pace(snapshot, now);
         let mut present = match self.present {
@@ -58,14 +58,14 @@ impl Observer {
         Observed { derivatives: self.derivatives, bar, evaluation_s }
     }
 
-    /// Mean duration of an evaluation until now, s; the rate of the last seconds jumps from point to
-    /// point.
+    /// Returns the mean duration of an evaluation so far, s. It is steadier than the rate of the
+    /// last seconds, which jumps from point to point.
     fn pace(&mut self, snapshot: &JobSnapshot, now: Duration) -> Option<f64> {
         let all = snapshot.realizations.max(1) as f64;
         let far = snapshot.evaluations as f64 + snapshot.realizations_done as f64 / all;
         let idle = snapshot.state() != JobState::Running || snapshot.realizations_per_second <= 0.0;
         match self.begun {
-            // A job whose evaluations are computed again is behind where it began.
+            // A job whose evaluations are computed again may be behind its starting point.
             Some((since, from)) if far >= from => {
                 let done = far - from;
                 (done >= 1.0).then(|| now.saturating_sub(since).as_secs_f64() / done)
@@ -94,7 +94,7 @@ mod tests {
         }
     }
 
-    /// The bars of snapshots at these times (s), each with its evaluations and outcomes.
+    /// Returns the bars of snapshots at these times (s), each with its evaluations and outcomes.
     fn bars(seen: &[(u64, u64, u64)]) -> Vec<Option<u64>> {
         let mut observer = Observer::default();
         let observe = |&(at, evaluations, done): &(u64, u64, u64)| {
@@ -140,9 +140,9 @@ mod tests {
         assert_eq!(pace(11, 5, 50), None);
         assert_eq!(pace(12, 6, 0), Some(2.0));
         assert_eq!(pace(16, 8, 0), Some(2.0));
-        // One slow point changes it little.
+        // One slow point has little effect.
         assert_eq!(pace(26, 9, 0), Some(4.0));
-        // A repair begins anew.
+        // After a repair the measurement starts again.
         assert_eq!(pace(27, 2, 0), None);
         assert_eq!(pace(28, 3, 0), Some(1.0));
     }

@@ -159,7 +159,7 @@ fn a_file_that_no_run_has_written_is_not_read_to_its_end() {
     let directory = tempfile::tempdir().unwrap();
     for name in [JOB, RESULT, REQUEST] {
         let path = directory.path().join(name);
-        // Sparse: it takes no room on the disk.
+        // A sparse file, which takes no space on the disk.
         File::create(&path).unwrap().set_len(FILE_BYTES_MAX + 1).unwrap();
         let refused = read_if_there(&path).unwrap_err().to_string();
         assert!(refused.contains(name) && refused.contains("67108864 bytes"), "{refused}");

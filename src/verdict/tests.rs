@@ -68,7 +68,7 @@ fn only_a_search_that_somebody_ended_is_cancelled() {
 
 #[test]
 fn what_lay_in_the_machines_may_end_otherwise() {
-    // The kind counts, whatever the reason says.
+    // The kind of the failure is decisive, whatever the reason says.
     let reason = "integrity error: stored evaluation 3 was alone on workers that were lost";
     for (status, failure, expected) in [
         ("failed", "\"integrity_error\"", true),

@@ -2,10 +2,10 @@ use osteon_common::job::{Data, Group, MonteCarlo, Objective, Search};
 
 use super::*;
 
-/// The paper's optimum.
+/// The optimum of the paper.
 const OPTIMUM: [f64; 7] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029];
 
-/// A search for e_L and δ, and for the density if `density` is free.
+/// Creates a search for e_L and δ, and for the density if `density` is free.
 fn job(data: Data, density: Range) -> JobSpecification {
     let mut parameters = OPTIMUM.map(Range::Fixed);
     parameters[0] = density;
@@ -84,7 +84,7 @@ fn a_coefficient_of_variation_out_of_reach_is_told() {
     fixed.parameters[6] = Range::Fixed(0.1);
     let lines = out_of_reach(&fixed);
     assert!(lines[0].ends_with("; free parameters.dispersion"), "{lines:?}");
-    // Two velocities may be as far apart as they like.
+    // Two velocities may differ by any amount.
     let two = Data::Velocities(vec![3600.0, 4400.0]);
     assert_eq!(out_of_reach(&job(two, FIXED)), [""; 0]);
 }
@@ -114,7 +114,7 @@ fn a_start_without_velocity_is_told() {
     assert!(lines[0].starts_with(expected), "{lines:?}");
 }
 
-/// Where the fastest model has no bound, and corners cannot be solved, nothing is said of them.
+/// If the fastest model is unbounded, and corners cannot be solved, there is no warning about them.
 #[test]
 fn what_is_not_known_is_not_told() {
     let mut job = job(moments(7000.0, 0.0271), FIXED);

@@ -1,4 +1,4 @@
-//! Errors of the exact method at default settings, and how well it estimates them.
+//! Errors of the exact method at default settings, and accuracy of its error estimates.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::quantile::quantile;
@@ -15,7 +15,7 @@ use crate::{Progress, StudyError};
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
 /// Dispersions.
 const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 1000;
 /// Columns of [`summary`].
 pub(crate) const SUMMARY: [&str; 7] = [
@@ -30,11 +30,11 @@ pub(crate) const SUMMARY: [&str; 7] = [
 /// Refinement of the reference.
 pub(crate) const REFERENCE: f64 = 5.0;
 
-/// Relative errors of velocities against refinement 5, and the ratio of the estimated error to
-/// the true one, by thickness and dispersion.
+/// Returns the relative errors of velocities compared to refinement 5, and the ratio of the
+/// estimated error to the true one, by thickness and dispersion.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[&["plate (mm)", "dispersion"][..], &SUMMARY].concat());
     for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
@@ -88,8 +88,8 @@ pub(crate) struct Measured {
     estimated_error: f64,
 }
 
-/// Median, 99 % and largest error, share of different picks (%), and three quantiles of the
-/// estimated over the true error, as [`SUMMARY`] has them.
+/// Returns median, 99 % and largest error, fraction of different picks (%), and three quantiles of
+/// the ratio of the estimated to the true error, in the columns of [`SUMMARY`].
 pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
     let differences: Vec<_> = measured.iter().map(|draw| draw.difference).collect();
     let spread = Spread::of(&differences);
@@ -100,7 +100,8 @@ pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
     cells
 }
 
-/// Estimated over true error, ascending, of the draws with the same pick and an error at all.
+/// Returns the ratios of the estimated to the true error, ascending, of the draws with the same
+/// pick and a nonzero error.
 fn ratios(measured: &[Measured]) -> Vec<f64> {
     let mut ratios: Vec<f64> = measured
         .iter()

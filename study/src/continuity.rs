@@ -1,4 +1,4 @@
-//! How far a velocity jumps when the elasticity hardly changes.
+//! Jumps of the velocity under tiny changes of the elasticity.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::Elasticity;
@@ -17,22 +17,22 @@ use crate::{Progress, StudyError};
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
 /// Dispersions.
 const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 20_000;
 /// Largest relative change of an entry of the elasticity.
 const CHANGE: f64 = 1e-9;
-/// A velocity that keeps its extremum may not jump further, relative.
+/// Largest allowed relative jump of a velocity whose extremum stays the same.
 const JUMP_MAX: f64 = 1e-5;
 
-/// Pairs of bones whose entries differ by up to 1e-9, relative: largest jump of a velocity that
-/// keeps its extremum, how many such jumps are above 1e-5, and how many pairs change their
-/// extremum or the kind of their failure.
+/// Compares pairs of bones whose entries differ by up to 1e-9, relative. Returns the largest jump
+/// of a velocity whose extremum stays the same, how many such jumps are above 1e-5, and how many
+/// pairs change their extremum or the kind of their failure.
 ///
-/// Every second pair lies on an edge of the ladder of speeds that samplings are made for, where a
-/// jump of the method itself would be.
+/// Every second pair lies on an edge of the speed ladder (the grid of speeds for which samplings
+/// are made), where the method itself might jump.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "plate (mm)",
@@ -73,7 +73,8 @@ fn summary(differences: &[Difference]) -> Vec<String> {
     ]
 }
 
-/// The density, kg/m³, with which the bone's fastest wave is as fast as its rung of the ladder allows.
+/// Returns the density, kg/m³, with which the bone's fastest wave has exactly the maximum speed of
+/// its rung.
 fn density_on_edge(bone: &Bone, setup: &Setup) -> f64 {
     let speed = fastest_wave(bone);
     let Some(rung) = sampling::rung(setup, speed) else {
@@ -83,8 +84,8 @@ fn density_on_edge(bone: &Bone, setup: &Setup) -> f64 {
     bone.density * ratio * ratio
 }
 
-/// The bone with each of its 21 entries changed by a share between ±[`CHANGE`] that follows from
-/// `index`.
+/// Returns the bone with each of its 21 entries changed by a fraction between ±[`CHANGE`] that is
+/// derived from `index`.
 fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
     let mut rows = *bone.elasticity.rows();
     let mut generator = Generator::new(index);

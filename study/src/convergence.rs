@@ -1,4 +1,4 @@
-//! How the hybrid method's error falls with its elements and its time step.
+//! Convergence of the hybrid method's error with its elements and its time step.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::settings::{Method, SolverSettings};
@@ -22,20 +22,21 @@ const SIZES: [(u32, [f64; 4]); 4] = [
     (6, [2e-3, 1e-3, 0.5e-3, 0.25e-3]),
     (8, [2e-3, 1e-3, 0.5e-3, 0.25e-3]),
 ];
-/// Halvings of the time step.
+/// Number of halvings of the time step.
 const HALVINGS: u32 = 3;
 
-/// Rows of one study, in which one quantity falls.
+/// Rows of one study, in which one quantity decreases.
 struct Series {
     rows: Result<Vec<ConvergenceRow>, Failure>,
     varied: fn(&ConvergenceRow) -> f64,
 }
 
-/// Errors of one bone's pressures, relative to the largest, by size and order of the elements and
-/// then by time step, under a smooth load, with the order by which they fall from row to row.
+/// Returns the errors of one bone's pressures, relative to the largest, by size and order of the
+/// elements and then by time step, under a smooth load, with the order of convergence from row to
+/// row.
 ///
 /// # Errors
-/// When the bone cannot be drawn.
+/// If the bone cannot be drawn.
 pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, StudyError> {
     let cell = Cell::new(THICKNESS, DISPERSION, &Draws { realizations: 1, seed: SEED, isa })?;
     let setup = cell.setup(SolverSettings { method: Method::Hybrid, ..SolverSettings::default() });
@@ -53,7 +54,7 @@ pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, StudyError> {
     Ok(table)
 }
 
-/// The series of all orders, then that of the time step.
+/// Returns the series of all orders, then that of the time step.
 fn all_series(setup: &Setup, bone: &Bone) -> Vec<Series> {
     let of_sizes = SIZES.par_iter().map(|(order, sizes)| Series {
         rows: element_convergence(setup, bone, *order, sizes),
@@ -90,7 +91,7 @@ fn failed(failure: &Failure) -> Vec<String> {
     vec![failure.kind.name().to_owned()]
 }
 
-/// The p of an error C hᵖ that is as given at two values (h, error).
+/// Returns p of an error C hᵖ, given two pairs (h, error).
 fn order((h0, error0): (f64, f64), (h1, error1): (f64, f64)) -> f64 {
     (error0 / error1).ln() / (h0 / h1).ln()
 }

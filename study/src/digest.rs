@@ -1,4 +1,4 @@
-//! The digest of a batch on every instruction set of the machine: one and the same.
+//! The digest of a batch on every instruction set of the machine, which must always be the same.
 
 use osteon_common::digest::PathDigest;
 use osteon_common::outcome::Outcome;
@@ -10,15 +10,16 @@ use crate::draws::{Cell, Draws, OPTIMUM, arrival};
 use crate::table::{Table, millimetres};
 use crate::{Progress, StudyError};
 
-/// Thickness of the plate, m, and dispersion: the paper's, and where more is hard.
+/// Thickness of the plate, m, and dispersion: those of the paper, and a more difficult case.
 const BATCHES: [(f64, f64); 2] = [(4e-3, 0.1029), (2e-3, 0.45)];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 2000;
 
-/// Digest of the paper's optimum and of a widely scattered, thinner plate, by instruction set.
+/// Returns the digests of the paper's optimum and of a thinner plate with wide scatter, by
+/// instruction set.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&["plate (mm)", "dispersion", "instruction set", "digest"]);
     for (thickness, dispersion) in BATCHES {

@@ -1,4 +1,4 @@
-//! Bones to study: draws of the paper's optimum, by dispersion and thickness of the plate.
+//! Bones for studies: draws around the paper's optimum, by dispersion and thickness of the plate.
 
 use std::ops::Range;
 
@@ -11,17 +11,17 @@ use osteon_common::settings::SolverSettings;
 use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 use rayon::prelude::*;
 
-/// The paper's optimum.
+/// The optimum of the paper.
 pub const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
-/// How many bones to draw, with which seed, and what computes.
+/// Number of bones to draw, seed and instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Draws {
     /// Realizations of each row.
     pub realizations: u64,
     /// Seed of the germs.
     pub seed: u64,
-    /// Instruction set; nothing depends on it but the time.
+    /// Instruction set, which affects only the time.
     pub isa: Isa,
 }
 
@@ -38,10 +38,10 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// A cell of `draws`.
+    /// Creates a cell of `draws`.
     ///
     /// # Errors
-    /// When no bone has that dispersion.
+    /// If no bone has that dispersion.
     pub(crate) fn new(thickness: f64, dispersion: f64, draws: &Draws) -> Result<Self, PointError> {
         let mut point = OPTIMUM;
         point.0[Parameter::Dispersion as usize] = dispersion;
@@ -49,25 +49,25 @@ impl Cell {
         Ok(Self { thickness, dispersion, ensemble, draws: *draws })
     }
 
-    /// The setup with these settings.
+    /// Returns the setup with these settings.
     pub(crate) fn setup(&self, solver: SolverSettings) -> Setup {
         let mut setup = Setup { solver, ..Setup::default() };
         setup.layers.bone_thickness = self.thickness;
         setup
     }
 
-    /// What computes.
+    /// Returns the instruction set.
     pub(crate) fn isa(&self) -> Isa {
         self.draws.isa
     }
 
-    /// A solver with these settings.
+    /// Returns a solver with these settings.
     pub(crate) fn solver(&self, settings: SolverSettings) -> Solver {
         Solver::with_isa(&self.setup(settings), self.draws.isa)
     }
 
-    /// `measure` of the bone at every index, in index order; what cannot be drawn is the failure
-    /// of its index.
+    /// Returns `measure` of the bone at every index, in index order. If a bone cannot be drawn,
+    /// that is the failure of its index.
     pub(crate) fn each<T: Send>(
         &self,
         measure: impl Fn(u64, &Result<Bone, Failure>, &mut Workspace) -> T + Sync,
@@ -81,18 +81,18 @@ impl Cell {
             .collect()
     }
 
-    /// The bone at `index`; what cannot be drawn is the failure of its index.
+    /// Returns the bone at `index`, or the failure if it cannot be drawn.
     pub(crate) fn bone(&self, index: u64) -> Result<Bone, Failure> {
         self.ensemble.bone(index).map_err(not_elastic)
     }
 }
 
-/// The failure of a bone whose elasticity is none.
+/// Returns the failure of a bone whose matrix is not an elasticity.
 pub(crate) fn not_elastic(error: NotElastic) -> Failure {
     Failure { kind: FailureKind::NotFinite, detail: error.to_string() }
 }
 
-/// The arrival of a bone that may not be one.
+/// Returns the arrival of a bone, or the failure to draw it.
 pub(crate) fn arrival(
     solver: &Solver,
     bone: &Result<Bone, Failure>,
@@ -101,14 +101,14 @@ pub(crate) fn arrival(
     bone.as_ref().map_err(Clone::clone).and_then(|bone| solver.arrival(bone, workspace))
 }
 
-/// The first `count` realizations of an ensemble, in index order.
+/// Computes the first `count` realizations of an ensemble, in index order.
 pub(crate) fn solved(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<Solved> {
     let realization =
         |workspace: &mut Workspace, index| solver.realization(ensemble, index, workspace);
     (0..count).into_par_iter().map_init(Workspace::default, realization).collect()
 }
 
-/// The cells of all thicknesses (m) and dispersions, dispersions running faster.
+/// Returns the cells of all thicknesses (m) and dispersions; the dispersion changes fastest.
 pub(crate) fn cells(
     thicknesses: &[f64],
     dispersions: &[f64],

@@ -1,4 +1,4 @@
-//! Why a study has no table.
+//! Errors of studies.
 
 use std::convert::Infallible;
 
@@ -6,13 +6,13 @@ use osteon_common::realization::PointError;
 use osteon_search::IdentifyError;
 use thiserror::Error;
 
-/// Why a study has no table.
+/// Reason why a study has no table.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum StudyError {
     /// A point has no ensemble.
     #[error(transparent)]
     Point(#[from] PointError),
-    /// An identification was not made.
+    /// An identification failed.
     #[error(transparent)]
     Identification(#[from] IdentifyError<Infallible>),
 }

@@ -1,4 +1,4 @@
-//! How often a realization has no velocity, and why.
+//! Frequency and kinds of realizations without a velocity.
 
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::settings::SolverSettings;
@@ -11,13 +11,13 @@ use crate::{Progress, StudyError};
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
 /// Dispersions.
 const DISPERSIONS: [f64; 5] = [0.1, 0.2, 0.3, 0.45, 0.6];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 100_000;
 
-/// Rate of each kind of failure (%), by thickness and dispersion.
+/// Returns the rate of each kind of failure (%), by thickness and dispersion.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut columns = vec!["plate (mm)", "dispersion", "failed (%)"];
     columns.extend(FailureKind::ALL.map(FailureKind::name));
@@ -36,7 +36,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-/// Share of all failures, then of each kind.
+/// Returns the fraction of all failures, then of each kind.
 fn rates(outcomes: &[Outcome]) -> Vec<String> {
     let counts = FailureCounts::of(outcomes);
     let all = outcomes.len() as u64;

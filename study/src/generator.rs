@@ -1,4 +1,4 @@
-//! Reproducible random numbers for what a study varies beside the germs of its bones.
+//! Reproducible random numbers for the quantities that a study varies in addition to the germs.
 
 /// Keeps the generators of neighbouring indices apart.
 const INDEX_STEP: u64 = 0x2545_f491_4f6c_dd1d;
@@ -10,17 +10,17 @@ pub(crate) struct Generator {
 }
 
 impl Generator {
-    /// The generator of a seed.
+    /// Creates the generator of a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// The generator of one index of a study with this seed.
+    /// Creates the generator of one index of a study with this seed.
     pub(crate) fn of_index(seed: u64, index: u64) -> Self {
         Self::new(seed ^ index.wrapping_mul(INDEX_STEP))
     }
 
-    /// The next number, from 0 to 1.
+    /// Returns the next number, from 0 to 1.
     pub(crate) fn uniform(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.state;
@@ -30,12 +30,12 @@ impl Generator {
         (z >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// The next number between two.
+    /// Returns the next number between two numbers.
     pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.uniform()
     }
 
-    /// The next number between two positive ones, its logarithm uniform.
+    /// Returns the next number between two positive ones, with a uniform logarithm.
     pub(crate) fn decades(&mut self, from: f64, to: f64) -> f64 {
         from * libm::pow(to / from, self.uniform())
     }
@@ -50,7 +50,7 @@ mod tests {
         let mut generator = Generator::new(1);
         let numbers: Vec<f64> = (0..1000).map(|_| generator.decades(1e-3, 10.0)).collect();
         assert!(numbers.iter().all(|number| (1e-3..=10.0).contains(number)));
-        // The median of a logarithmic law is the geometric mean of its ends.
+        // The median of a log-uniform law is the geometric mean of its ends.
         let below = numbers.iter().filter(|&&number| number < 0.1).count();
         assert!((440..560).contains(&below), "{below}");
         let mean: f64 = (0..1000).map(|_| generator.between(-1.0, 1.0)).sum::<f64>() / 1000.0;

@@ -1,4 +1,4 @@
-//! Identifications in this process, over all cores.
+//! Identifications in this process, on all cores.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -13,13 +13,14 @@ use osteon_solver::{Isa, Solver};
 
 use crate::draws::solved;
 
-/// The realizations at points that several identifications begin at, by the bits of the point.
+/// Cache of the realizations at the points at which several identifications begin, by the bits of
+/// the point.
 pub(crate) type Known = BTreeMap<[u64; 7], Vec<Solved>>;
 
-/// The outcomes of every realization at a point of the paper's geometry, in index order.
+/// Computes the outcomes of every realization at a point of the paper's geometry, in index order.
 ///
 /// # Errors
-/// When the point has no ensemble.
+/// If the point has no ensemble.
 pub(crate) fn outcomes(
     point: &Point,
     monte_carlo: &MonteCarlo,
@@ -31,11 +32,11 @@ pub(crate) fn outcomes(
     Ok(solved.into_iter().map(|one| one.outcome).collect())
 }
 
-/// Goes to the end of an identification. The realizations at its first point are taken from `known`, or
-/// kept there.
+/// Runs an identification to its end. The realizations at its first point are taken from `known`,
+/// or stored there.
 ///
 /// # Errors
-/// When the specification breaks rules.
+/// If the specification violates rules.
 pub(crate) fn identify(
     specification: &JobSpecification,
     known: &mut Known,

@@ -1,7 +1,7 @@
-//! Measures the solvers against each other, the ways of drawing bones ([`variance`]) and the methods of
-//! search ([`searches`]) by studies that end in a [`Table`]. The program `osteon-study` prints them.
+//! Studies that compare the solvers, the sampling methods ([`variance`]) and the search methods
+//! ([`searches`]); each returns a [`Table`]. The program `osteon-study` prints them.
 //!
-//! A study is a function of its draws alone: realizations are computed on all cores and taken
+//! A study is a function of its draws alone: realizations are computed on all cores and processed
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
 
 pub mod accuracy;
@@ -27,5 +27,5 @@ pub use draws::{Draws, OPTIMUM};
 pub use error::StudyError;
 pub use table::Table;
 
-/// Hears of every row of a table that is finished.
+/// Callback that receives every completed row of a table.
 pub type Progress<'a> = &'a dyn Fn(&str);

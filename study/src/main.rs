@@ -1,7 +1,7 @@
-//! Prints a table of how the solvers and the searches do over many draws.
+//! Prints a table that shows the performance of solvers or searches over many draws.
 //!
-//! The table goes to stdout, each of its rows to stderr when it is finished. Exit codes: 0 done, 1 failed,
-//! 2 bad usage.
+//! The table goes to stdout, each of its rows to stderr when it is finished. Exit codes: 0 done, 1
+//! failed, 2 bad usage.
 
 mod arguments;
 
@@ -68,19 +68,19 @@ fn main() -> ExitCode {
     }
 }
 
-/// Says why there is no table; the exit code.
+/// Prints the reason why there is no table; returns the exit code.
 fn failed(error: &dyn std::error::Error, code: u8) -> ExitCode {
     say(&format!("osteon-study: {error}"));
     ExitCode::from(code)
 }
 
-/// One line on stderr.
+/// Prints one line on stderr.
 fn say(line: &str) {
-    // Nothing is left to be done when stderr is closed.
+    // If stderr is closed, nothing more can be done.
     drop(writeln!(std::io::stderr(), "{line}"));
 }
 
-/// The table of a study under the command line that makes it again.
+/// Returns the table of a study below the command line that reproduces it.
 fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
     match study {
         Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
@@ -132,7 +132,7 @@ fn over_twins(
     Ok(titled(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
 }
 
-/// A table under what makes it again.
+/// Returns a table below the command that reproduces it.
 fn titled(arguments: &str, table: &Table) -> String {
     format!("`osteon-study {arguments}` ({})\n\n{table}", version::fingerprint())
 }

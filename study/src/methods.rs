@@ -1,4 +1,4 @@
-//! Both methods against a refined solution.
+//! Comparison of both methods with a refined solution.
 
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_solver::check::{Difference, difference};
@@ -13,14 +13,14 @@ use crate::{Progress, StudyError};
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
 /// Dispersions.
 const DISPERSIONS: [f64; 3] = [0.1, 0.3, 0.6];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 50;
 
-/// Relative differences of velocities, largest difference of times (ns) and number of different
-/// picks of both methods at default settings against the exact one at refinement 5.
+/// Returns relative differences of velocities, largest difference of times (ns) and number of
+/// different picks of both methods at default settings compared to the exact one at refinement 5.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "plate (mm)",
@@ -44,7 +44,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-/// Of the exact and of the hybrid method.
+/// Returns the differences of the exact and of the hybrid method.
 fn differences(cell: &Cell) -> [Vec<Difference>; 2] {
     let settings = SolverSettings::default();
     let setup = cell.setup(settings);

@@ -1,4 +1,5 @@
-//! The exact method away from the paper's optimum: random mean models within the bounds of a search.
+//! The exact method away from the paper's optimum: random mean models within the bounds of a
+//! search.
 
 use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
@@ -14,7 +15,7 @@ use crate::{Progress, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
-/// Mean models of each row, unless chosen otherwise.
+/// Default number of mean models of each row.
 pub const REALIZATIONS: u64 = 1000;
 /// Bounds of the seven parameters.
 pub(crate) const BOUNDS: [(f64, f64); 7] = [
@@ -26,14 +27,14 @@ pub(crate) const BOUNDS: [(f64, f64); 7] = [
     (0.2, 0.5),
     (0.02, 0.3),
 ];
-/// Most attempts to draw an admissible mean model.
+/// Maximum number of attempts to draw an admissible mean model.
 const TRIES_MAX: usize = 1000;
 
-/// Relative errors of velocities at default settings against refinement 5, each of a bone of its own
-/// random mean model and dispersion, in the paper's geometry, by thickness.
+/// Returns the relative errors of velocities at default settings compared to refinement 5, each for
+/// a bone with its own random mean model and dispersion, in the paper's geometry, by thickness.
 ///
 /// # Errors
-/// When a mean model or dispersion has no ensemble.
+/// If a mean model or dispersion has no ensemble.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[&["plate (mm)"][..], &SUMMARY].concat());
     for thickness in THICKNESSES {
@@ -58,7 +59,8 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<Measured>, PointError> 
         .collect()
 }
 
-/// Mean model and dispersion of one bone: uniform within the bounds, the first that is admissible.
+/// Draws mean model and dispersion of one bone: uniform within the bounds, the first that is
+/// admissible.
 pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
     let mut generator = Generator::of_index(seed, index);
     let mut drawn = || Point(BOUNDS.map(|(from, to)| generator.between(from, to)));

@@ -1,4 +1,4 @@
-//! How the exact method's error falls with refinement.
+//! Convergence of the exact method's error with refinement.
 
 use osteon_common::limits::REFINEMENT_MAX;
 use osteon_common::settings::SolverSettings;
@@ -13,16 +13,16 @@ use crate::{Progress, StudyError};
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
 /// Dispersions.
 const DISPERSIONS: [f64; 2] = [0.1029, 0.3];
-/// Refinements that are measured; the reference is the largest there is.
+/// Measured refinements; the reference is the largest possible one.
 const REFINEMENTS: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
-/// Realizations of each row, unless chosen otherwise.
+/// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 100;
 
-/// Relative differences of velocities at rising refinement against refinement 16, by thickness
-/// and dispersion.
+/// Returns the relative differences of velocities at increasing refinement compared to refinement
+/// 16, by thickness and dispersion.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "plate (mm)",
@@ -45,7 +45,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-/// Of each refinement.
+/// Returns the differences at each refinement.
 fn differences(cell: &Cell) -> [Vec<Difference>; REFINEMENTS.len()] {
     let solver = |refinement| {
         let settings = SolverSettings { refinement, ..SolverSettings::default() };
@@ -81,7 +81,7 @@ mod tests {
         let draws = Draws { realizations: 3, seed: 2, isa: Isa::fastest() };
         let cell = Cell::new(4e-3, 0.1029, &draws).unwrap();
         let largest = differences(&cell).map(|at| Spread::of(&at).velocity(1.0).unwrap());
-        // From the quick sampling to those whose band grows: each is far below the first.
+        // From the quick sampling to those whose band grows, every error is far below the first.
         assert!(largest[0] < 1e-3, "{largest:?}");
         assert!(largest[2] < 0.2 * largest[0], "{largest:?}");
         assert!(largest[4] < 3e-6, "{largest:?}");

@@ -1,4 +1,4 @@
-//! How many evaluations the methods of search need, and where they end.
+//! Number of evaluations that the search methods need, and the points at which they end.
 
 use std::convert::Infallible;
 
@@ -18,27 +18,27 @@ use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
 use crate::{Progress, StudyError};
 
-/// Realizations of each evaluation, unless chosen otherwise.
+/// Default number of realizations of each evaluation.
 pub const REALIZATIONS: u64 = 500;
-/// Starts drawn at random.
+/// Number of starts drawn at random.
 const RANDOM_STARTS: u64 = 9;
-/// Most evaluations of a search.
+/// Maximum number of evaluations of a search.
 const EVALUATIONS_MAX: u64 = 1000;
-/// What the simplex is run to; `newton` has its default.
+/// Target cost of the simplex; `newton` has its default.
 const SIMPLEX_COST: f64 = 1e-6;
-/// Costs whose first evaluation is told.
+/// Costs for which the number of evaluations is reported.
 const COSTS: [f64; 3] = [1e-4, 1e-6, 1e-10];
 
-/// Evaluations of N realizations until the cost is below 1e-4, 1e-6 and 1e-10, from nine starts
-/// that are uniform within the bounds and one corner where shear is slow, by both methods; all
-/// seven parameters are free. The data are the moments at the paper's optimum by another seed.
+/// Counts the evaluations of N realizations until the cost is below 1e-4, 1e-6 and 1e-10, from nine
+/// starts that are uniform within the bounds and one corner where shear is slow, by both methods;
+/// all seven parameters are free. The data are the moments at the paper's optimum by another seed.
 ///
-/// The simplex is run to a cost of 1e-6. `distance` is that of the answer from the start in edges
-/// of the box. `off` is the distance of the answer from the point that is nearest to the start
-/// where the moments are linearised at the answer by central differences.
+/// The simplex is run to a cost of 1e-6. `distance` is the distance of the solution from the start
+/// in edges of the box. `off` is the distance of the solution from the nearest point to the start
+/// when the moments are linearised at the solution by central differences.
 ///
 /// # Errors
-/// When the optimum has no ensemble.
+/// If the optimum has no ensemble.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "start",
@@ -65,7 +65,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-/// The starts with their names.
+/// Returns the starts with their names.
 fn starts(seed: u64) -> Vec<(String, Point)> {
     let random = (0..RANDOM_STARTS).map(|k| (format!("random {}", k + 1), mean_model(seed, k)));
     let mut corner = Point(BOUNDS.map(|(lower, upper)| 0.5 * (lower + upper)));
@@ -74,7 +74,7 @@ fn starts(seed: u64) -> Vec<(String, Point)> {
     random.chain([("slow shear".to_owned(), corner)]).collect()
 }
 
-/// Moments at the optimum, with germs of another seed than the search's.
+/// Returns the moments at the optimum, with germs of another seed than the search's.
 fn data(draws: &Draws) -> Result<Moments, PointError> {
     let other = MonteCarlo { seed: draws.seed + 1, ..monte_carlo(draws) };
     let outcomes = outcomes(&OPTIMUM, &other, draws.isa)?;
@@ -86,7 +86,7 @@ fn monte_carlo(draws: &Draws) -> MonteCarlo {
     MonteCarlo { realizations: draws.realizations, seed: draws.seed, ..MonteCarlo::default() }
 }
 
-/// A search that has ended.
+/// A completed search.
 struct Found {
     specification: JobSpecification,
     status: Status,
@@ -100,7 +100,7 @@ impl Found {
         self.costs.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Evaluations until the cost was below `cost`.
+    /// Returns the number of evaluations until the cost was below `cost`.
     fn first_below(&self, cost: f64) -> Option<usize> {
         self.costs.iter().position(|&found| found < cost).map(|before| before + 1)
     }
@@ -160,11 +160,11 @@ fn cells(found: &Found, data: Moments, draws: &Draws) -> Result<Vec<String>, Poi
     Ok(cells)
 }
 
-/// Step of the differences at the answer, in edges of the box.
+/// Step of the differences at the solution, in edges of the box.
 const DIFFERENCE: f64 = 1e-4;
 
-/// The point nearest to `start` of those that match the data by the moments as they are linearised
-/// at `at`; `None` where they cannot be.
+/// Returns the point nearest to `start` among those that match the data by the moments linearised
+/// at `at`; `None` if they cannot be linearised.
 fn nearest(
     start: &Point,
     at: &Point,
@@ -209,7 +209,7 @@ fn of_unit(unit: &[f64]) -> Point {
     Point(BOUNDS.map(|(lower, upper)| lower + unit.next().unwrap_or(&0.0) * (upper - lower)))
 }
 
-/// In edges of the box.
+/// Returns the distance in edges of the box.
 fn distance(a: &Point, b: &Point) -> f64 {
     let (a, b) = (to_unit(a), to_unit(b));
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
@@ -221,8 +221,8 @@ mod tests {
 
     use super::*;
 
-    /// Every start is admissible; `newton` matches the data to 1e-10 within ten evaluations from nine
-    /// of the ten at least. The number of realizations changes the counts little.
+    /// Every start is admissible; `newton` matches the data to 1e-10 within ten evaluations from at
+    /// least nine of the ten. The number of realizations has little influence on the counts.
     #[test]
     fn newton_needs_ten_evaluations_at_most() {
         let draws = Draws { realizations: 40, seed: 1, isa: Isa::fastest() };
@@ -238,7 +238,7 @@ mod tests {
         assert!(within.count() >= 9);
     }
 
-    /// From three of the starts, and with few realizations: the study itself takes minutes.
+    /// From three of the starts, with few realizations: the complete study takes minutes.
     #[test]
     fn the_simplex_comes_to_one_in_a_million() {
         let draws = Draws { realizations: 12, seed: 1, isa: Isa::fastest() };

@@ -22,17 +22,18 @@ use crate::spread::Spread;
 use crate::table::{Table, percent, two_digits};
 use crate::{Progress, StudyError};
 
-/// Cases of the study, unless chosen otherwise.
+/// Default number of cases of the study.
 pub const REALIZATIONS: u64 = 1000;
-/// Classes of plate thickness times centre frequency, m Hz: each up to its bound.
+/// Classes of plate thickness times centre frequency, m Hz, each with its upper limit.
 const CLASSES: [(f64, &str); 3] =
     [(1000.0, "below 1"), (2000.0, "1 to 2"), (f64::INFINITY, "above 2")];
-/// Most pairs, at refinement 1 and at the reference's, of a case that is drawn: a bound of time.
+/// Maximum number of pairs of a case, at refinement 1 and at the reference's, which limits the
+/// time.
 const PAIRS_MAX: (f64, f64) = (1e5, 2e6);
-/// Most attempts to draw a case that is admissible and not too large.
+/// Maximum number of attempts to draw a case that is admissible and not too large.
 const TRIES_MAX: usize = 1000;
 
-/// One case: a bone on its own setup, and what it was drawn from.
+/// One case: a bone with its own setup, and the quantities from which it was drawn.
 #[derive(Debug, Clone)]
 struct Drawn {
     setup: Setup,
@@ -40,7 +41,7 @@ struct Drawn {
     point: Point,
 }
 
-/// What became of one case.
+/// Results of one case.
 #[derive(Debug)]
 struct Measured {
     index: u64,
@@ -50,12 +51,13 @@ struct Measured {
     difference: Difference,
 }
 
-/// Relative errors of velocities at default settings against refinement 5 over cases whose layers,
-/// probe and bone are drawn at random, by thickness times centre frequency. Cases with another
-/// outcome, or with a larger error than a product may have, are told one by one.
+/// Returns the relative errors of velocities at default settings compared to refinement 5, for
+/// cases whose layers, probe and bone are drawn at random, by thickness times centre frequency.
+/// Cases with a different outcome, or with a larger error than is accepted, are reported
+/// individually.
 ///
 /// # Errors
-/// When a mean model or dispersion has no ensemble.
+/// If a mean model or dispersion has no ensemble.
 pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
     let measured = measured(draws)?;
     for one in measured.iter().filter(|one| one.is_remarkable()) {
@@ -119,7 +121,7 @@ impl Measured {
         Self { index, drawn, found, reference, difference }
     }
 
-    /// Thickness times centre frequency, m Hz.
+    /// Returns thickness times centre frequency, m Hz.
     fn product(&self) -> f64 {
         self.drawn.setup.layers.bone_thickness * self.drawn.setup.probe.center_frequency
     }
@@ -132,14 +134,14 @@ impl Measured {
         }
     }
 
-    /// Estimated over true error.
+    /// Returns the ratio of the estimated error to the true one.
     fn estimate_ratio(&self) -> Option<f64> {
         let error = self.difference.velocity().filter(|&error| error > 0.0)?;
         let found = self.found.as_ref().ok()?;
         Some(found.estimated_error / error)
     }
 
-    /// The case in a line.
+    /// Describes the case in one line.
     fn described(&self) -> String {
         let outcome = |outcome: &Result<Arrival, Failure>| match outcome {
             Ok(arrival) => {
@@ -178,15 +180,15 @@ impl Measured {
     }
 }
 
-/// Case `index` of the study: layers, probe and bone; `None` if none suitable was drawn.
+/// Returns case `index` of the study: layers, probe and bone; `None` if no suitable one was drawn.
 ///
 /// # Errors
-/// When its mean model or dispersion has no ensemble.
+/// If its mean model or dispersion has no ensemble.
 pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
     Ok(drawn(seed, index)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
 }
 
-/// The first case of `index` that validation accepts, within the bound of time.
+/// Returns the first case of `index` that passes validation and is within the limit of time.
 fn drawn(seed: u64, index: u64) -> Result<Option<Drawn>, PointError> {
     let mut generator = Generator::of_index(seed, index);
     for _ in 0..TRIES_MAX {
@@ -194,7 +196,7 @@ fn drawn(seed: u64, index: u64) -> Result<Option<Drawn>, PointError> {
         if !is_suitable(&setup) {
             continue;
         }
-        // Wide dispersions now and then draw what rounding cannot tell from a singular matrix.
+        // Wide dispersions occasionally give a matrix that rounding makes singular.
         if let Ok(bone) = Ensemble::new(&point, seed)?.bone(index) {
             return Ok(Some(Drawn { setup, bone, point }));
         }
@@ -218,7 +220,7 @@ fn setup(generator: &mut Generator) -> Setup {
     let mut height = || generator.decades(0.5e-3, 6e-3);
     let (source, receivers) = (height(), height());
     let first_x1 = generator.decades(3e-3, 30e-3);
-    // Times differ by microseconds over such an array: a velocity is as good as they are.
+    // Times over such an array differ by microseconds, which determines the accuracy of a velocity.
     let span = generator.decades(8e-3, 40e-3);
     let count = generator.between(3.0, 25.0) as u32;
     Setup {
@@ -246,7 +248,7 @@ fn fluid(generator: &mut Generator) -> Fluid {
     }
 }
 
-/// Half of the means are the optimum's, stiffer or softer; half are isotropic.
+/// Half of the means are the optimum's, made stiffer or softer; half are isotropic.
 fn point(generator: &mut Generator) -> Point {
     let [_, e_l, nu_l, g_l, e_t, nu_t, _] = OPTIMUM.0;
     let density = generator.between(1400.0, 2200.0);
@@ -310,15 +312,15 @@ mod tests {
         );
     }
 
-    /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin plate
-    /// needs the refined look: each was off by 3e-4 to 2e-3 without.
+    /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin
+    /// plate needs the refined look. Without these measures each had an error of 3e-4 to 2e-3.
     #[test]
     fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
         for index in [53, 101, 111, 149, 173, 177, 381] {
             let drawn = drawn(1, index).unwrap().unwrap();
             let one = Measured::of(index, drawn, Isa::fastest(), &mut Workspace::default());
             let error = one.difference.velocity();
-            // No better than the reference knows itself.
+            // The error cannot be smaller than that of the reference itself.
             let bound = one.reference.as_ref().map_or(0.0, |found| found.estimated_error).max(2e-4);
             assert!(error.is_some_and(|error| error < bound), "{error:?}: {}", one.described());
         }

@@ -1,16 +1,16 @@
-//! Many differences between solutions in a few numbers.
+//! Summary statistics of many differences between solutions.
 
 use osteon_common::quantile::quantile;
 use osteon_solver::check::Difference;
 
-/// Many differences in a few numbers.
+/// Summary statistics of many differences.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spread {
     /// Relative differences of velocities, ascending.
     velocities: Vec<f64>,
     /// Largest difference of picked times, s.
     pub(crate) largest_time: Option<f64>,
-    /// How many picked differently.
+    /// Number of different picks.
     pub(crate) different_picks: usize,
 }
 
@@ -27,7 +27,7 @@ impl Spread {
         }
     }
 
-    /// Quantile of the relative differences of velocities.
+    /// Returns a quantile of the relative differences of velocities.
     pub(crate) fn velocity(&self, p: f64) -> Option<f64> {
         quantile(&self.velocities, p)
     }

@@ -1,4 +1,4 @@
-//! A table as Markdown.
+//! Tables in Markdown.
 
 use std::fmt;
 
@@ -10,32 +10,32 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub(crate) fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&name| name.to_owned()).collect(), rows: Vec::new() }
     }
 
-    /// Adds a row; what it lacks is empty, what it has too many of is left out.
+    /// Adds a row; missing cells are empty, surplus cells are dropped.
     pub(crate) fn push(&mut self, mut row: Vec<String>) {
         row.resize(self.columns.len(), String::new());
         self.rows.push(row);
     }
 
-    /// The last row, its cells named, for people who wait.
+    /// Returns the last row with the names of its columns, for progress output.
     pub(crate) fn last_row(&self) -> String {
         let cells = self.rows.last().into_iter().flatten();
         let named = self.columns.iter().zip(cells).map(|(name, cell)| format!("{name} {cell}"));
         named.collect::<Vec<_>>().join(", ")
     }
 
-    /// The rows, each with a cell for every column.
+    /// Returns the rows, each with a cell for every column.
     pub fn rows(&self) -> &[Vec<String>] {
         &self.rows
     }
 }
 
 impl fmt::Display for Table {
-    /// Markdown, columns padded to one width, cells aligned to the right.
+    /// Formats Markdown with columns padded to one width and cells aligned to the right.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = |column: usize| {
             let cells = self.rows.iter().map(|row| &row[column]).chain([&self.columns[column]]);
@@ -57,7 +57,7 @@ impl fmt::Display for Table {
     }
 }
 
-/// A number with two significant digits; a dash where there is none.
+/// Formats a number with two significant digits, or a dash if there is none.
 pub(crate) fn two_digits(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),
@@ -75,7 +75,7 @@ pub(crate) fn two_digits(value: Option<f64>) -> String {
     }
 }
 
-/// A share in percent: `count` of `all`.
+/// Formats the fraction `count` of `all` in percent.
 pub(crate) fn percent(count: u64, all: u64) -> String {
     match (count, all) {
         (_, 0) => "–".to_owned(),
@@ -84,7 +84,7 @@ pub(crate) fn percent(count: u64, all: u64) -> String {
     }
 }
 
-/// A length in millimetres.
+/// Formats a length in millimetres.
 pub(crate) fn millimetres(length: f64) -> String {
     format!("{}", (length * 1e7).round() / 1e4)
 }

@@ -1,4 +1,5 @@
-//! Whether an identification finds again what made its data, and how often within its intervals.
+//! Twin experiments: whether an identification recovers the parameters that made its data, and how
+//! often its intervals contain them.
 
 use std::convert::Infallible;
 
@@ -19,30 +20,30 @@ use crate::models::{BOUNDS, mean_model};
 use crate::table::{Table, two_digits};
 use crate::{Progress, StudyError};
 
-/// How much to repeat, and what computes.
+/// Number of repetitions, seed and instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Twins {
-    /// Parameter sets or data sets.
+    /// Number of parameter sets or data sets.
     pub repetitions: u64,
     /// Seed of the parameter sets, the data and the germs.
     pub seed: u64,
-    /// Instruction set; nothing depends on it but the time.
+    /// Instruction set, which affects only the time.
     pub isa: Isa,
 }
 
-/// Parameter sets of [`table`], unless chosen otherwise.
+/// Default number of parameter sets of [`table`].
 pub const SETS: u64 = 20;
-/// Data sets of [`coverage`], unless chosen otherwise.
+/// Default number of data sets of [`coverage`].
 pub const REPETITIONS: u64 = 200;
-/// Velocities of the data of each parameter set, as many as the paper has.
+/// Number of velocities of the data of each parameter set, as many as the paper has.
 const VELOCITIES: u64 = 2747;
-/// Velocities of each data set whose intervals are counted.
+/// Number of velocities of each data set in [`coverage`].
 const COUNTED: u64 = 100;
-/// Most failed realizations of data.
+/// Maximum fraction of failed realizations of the data.
 const FAILED_MAX: f64 = 0.01;
-/// Realizations of the model.
+/// Number of realizations of the model.
 const REALIZATIONS: u64 = 256;
-/// What is searched beside the dispersion, one after the other.
+/// The parameters searched together with the dispersion, one after another.
 const SEARCHED: [Parameter; 5] = [
     Parameter::LongitudinalYoungModulus,
     Parameter::Density,
@@ -51,15 +52,15 @@ const SEARCHED: [Parameter; 5] = [
     Parameter::TransversePoissonRatio,
 ];
 
-/// Identifications from the velocities of known parameter sets, with the dispersion and one of five
-/// other parameters free and the rest fixed: what was found, and its distance from the truth in
-/// reported standard errors.
+/// Identifies parameters from the velocities of known parameter sets, with the dispersion and one
+/// of five other parameters free and the rest fixed. Returns the values found, and their distance
+/// from the truth in reported standard errors.
 ///
 /// The sets are uniform within the bounds of the paper's example, the dispersion in 0.05 to 0.2;
-/// those of which more than one realization in a hundred fails are drawn anew.
+/// sets for which more than one realization in a hundred fails are drawn again.
 ///
 /// # Errors
-/// When a point has no ensemble.
+/// If a point has no ensemble.
 pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "set",
@@ -90,11 +91,11 @@ pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-/// How many of the 95 % intervals of √(c1111/ρ) and of the dispersion hold the truth, over data sets
-/// of a hundred velocities drawn at the paper's optimum, with e_L and the dispersion free.
+/// Counts the 95 % intervals of √(c1111/ρ) and of the dispersion that contain the truth, over data
+/// sets of a hundred velocities drawn at the paper's optimum, with e_L and the dispersion free.
 ///
 /// # Errors
-/// When a point has no ensemble.
+/// If a point has no ensemble.
 pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "quantity",
@@ -110,7 +111,7 @@ pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyErr
         let data = velocities(&OPTIMUM, COUNTED, data_seed(twins.seed, repetition), twins.isa)?;
         let searched = Parameter::LongitudinalYoungModulus;
         let mut specification = specification(&OPTIMUM, searched, data, twins.seed);
-        // One and the same, off the truth.
+        // The same start for all data sets, different from the truth.
         specification.parameters[searched as usize] = free(searched, 19e9);
         specification.parameters[Parameter::Dispersion as usize] =
             free(Parameter::Dispersion, 0.12);
@@ -135,7 +136,8 @@ pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyErr
     Ok(table)
 }
 
-/// The next set whose velocities can be had, with them.
+/// Returns the next parameter set for which enough velocities can be computed, with these
+/// velocities.
 fn drawn_set(
     twins: &Twins,
     candidates: &mut impl Iterator<Item = u64>,
@@ -153,18 +155,19 @@ fn drawn_set(
     }
 }
 
-/// Of other germs than the model's.
+/// Returns a seed whose germs differ from the model's.
 fn data_seed(seed: u64, number: u64) -> u64 {
     seed + 1 + number
 }
 
-/// Velocities of independent realizations at a point.
+/// Returns the velocities of independent realizations at a point.
 fn velocities(point: &Point, count: u64, seed: u64, isa: Isa) -> Result<Vec<f64>, PointError> {
     let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
     Ok(outcomes(point, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect())
 }
 
-/// Dispersion and `searched` are free, begun in the middle of their bounds, the rest is known.
+/// Returns a specification in which dispersion and `searched` are free, with starts in the middle
+/// of their bounds, and the rest is known.
 fn specification(
     truth: &Point,
     searched: Parameter,
@@ -197,8 +200,8 @@ fn specification(
     }
 }
 
-/// The middle of the bounds, or, where that is not admissible with what is fixed, the truth and a
-/// bit less.
+/// Returns the middle of the bounds, or, if that is not admissible together with the fixed
+/// parameters, a value slightly below the truth.
 fn start_within(parameter: Parameter, truth: &Point, middle: Range) -> Range {
     let mut point = *truth;
     point.0[parameter as usize] = middle.start();
@@ -228,7 +231,7 @@ fn of(found: &Inference, parameter: Parameter) -> Option<Quantity> {
     }
 }
 
-/// Distance from the truth in standard errors.
+/// Returns the distance from the truth in standard errors.
 fn errors(found: &Quantity, truth: f64) -> Option<f64> {
     found.known.map(|known| (found.value - truth) / known.standard_error)
 }

@@ -1,5 +1,5 @@
-//! How far moments scatter from one seed to the next, by sampling, and how right their reported
-//! standard errors are.
+//! Scatter of the moments between seeds, by sampling method, and accuracy of their reported
+//! standard errors.
 
 use osteon_common::case::Setup;
 use osteon_common::job::{MonteCarlo, Sampling};
@@ -17,41 +17,42 @@ use crate::{Progress, StudyError};
 const DISPERSIONS: [f64; 2] = [0.1029, 0.3];
 /// Realizations of each estimate.
 const REALIZATIONS: [u64; 3] = [256, 1024, 4096];
-/// How realizations are drawn, with how many scrambles; the first is what the others are compared with.
+/// Sampling methods, with the number of scrambles; the others are compared with the first.
 const SAMPLINGS: [(Sampling, u64); 3] =
     [(Sampling::MonteCarlo, 1), (Sampling::Sobol, 1), (Sampling::Sobol, 8)];
-/// Seeds, unless chosen otherwise.
+/// Default number of seeds.
 pub const SEEDS: u64 = 20;
 
-/// Which estimates to repeat, and what computes.
+/// The estimates to be repeated, and the instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Repetitions {
-    /// How many, each with its own seed.
+    /// Number of repetitions, each with its own seed.
     pub seeds: u64,
     /// The first seed; the others follow it.
     pub first: u64,
-    /// Instruction set; nothing depends on it but the time.
+    /// Instruction set, which affects only the time.
     pub isa: Isa,
 }
 
-/// What repetitions of one estimate tell.
+/// Result of the repetitions of one estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scatter {
-    /// Standard deviation of the moments over the seeds: of the mean in m/s, and of the coefficient of
-    /// variation.
+    /// Standard deviations of the moments over the seeds: of the mean in m/s, and of the
+    /// coefficient of variation.
     pub deviation: Moments,
     /// Root mean square of the reported standard errors.
     pub reported: Moments,
-    /// Failed realizations, over all seeds.
+    /// Number of failed realizations, over all seeds.
     pub failed: usize,
 }
 
-/// Standard deviations of mean and coefficient of variation over seeds at the paper's optimum, their
-/// squares against those of plain Monte Carlo, and reported standard errors against them, by dispersion,
-/// number of realizations, sampling and use of the control variate.
+/// Returns the standard deviations of mean and coefficient of variation over seeds at the paper's
+/// optimum, the ratio of their squares to those of plain Monte Carlo, and the ratio of reported
+/// standard errors to them, by dispersion, number of realizations, sampling and use of the control
+/// variate.
 ///
 /// # Errors
-/// When there are no draws at a dispersion.
+/// If there are no draws at a dispersion.
 pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table, StudyError> {
     let mut table = Table::new(&[
         "dispersion",
@@ -90,10 +91,10 @@ pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table,
     Ok(table)
 }
 
-/// Without and with the control variate, on the same realizations.
+/// Returns the scatter without and with the control variate, on the same realizations.
 ///
 /// # Errors
-/// When there is no ensemble at the point.
+/// If there is no ensemble at the point.
 pub fn scatter(
     point: &Point,
     realizations: u64,
@@ -178,7 +179,7 @@ mod tests {
         }
     }
 
-    /// What the documentation promises of 1024 points.
+    /// Checks the statement of the documentation about 1024 points.
     #[test]
     fn sobol_points_are_worth_a_thousand_times_their_number() {
         let of = |sampling| scatter(&OPTIMUM, 1024, sampling, 1, &REPETITIONS()).unwrap();

@@ -1,4 +1,4 @@
-//! Workers that answer twice, out of turn, too late, never, or wrongly, or are of another version.
+//! Workers that answer twice, out of order, too late, never, or wrongly, or are of another version.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,10 +18,10 @@ use crate::proxy::Proxy;
 use crate::service::{Service, undisturbed};
 use crate::support::{Scratch, eventually, job, run as osteon};
 
-/// How long a peer waits for a second batch before it answers the first.
+/// Time for which a peer waits for a second batch before it answers the first.
 const MORE: Duration = Duration::from_millis(50);
 
-/// A coordinator, its client, a job that it has accepted, and the digest that it must have.
+/// A coordinator, its client, an accepted job, and its expected digest.
 struct Story {
     scratch: Scratch,
     service: Service,
@@ -63,14 +63,14 @@ fn on_thread<T: Send + 'static, F: Future<Output = T>>(
     })
 }
 
-/// What a peer returns, once it has ended.
+/// Waits for the end of a peer and returns its result.
 fn end<T>(peer: JoinHandle<T>) -> T {
     eventually("the peer's stay ends", || peer.is_finished());
     peer.join().unwrap()
 }
 
-/// Right answers, each twice, the later batch first, and one to a batch that nobody sent, until
-/// the stay ends; how often batches were answered out of turn.
+/// Sends right answers, each twice and the later batch first, and one to a batch that was never
+/// sent, until the attachment ends. Returns how often batches were answered out of order.
 async fn shuffler(url: String) -> usize {
     let mut peer = Peer::attach(&url, hello(1)).await.unwrap();
     let mut held = Vec::new();
@@ -101,7 +101,7 @@ fn duplicated_and_reordered_answers_change_nothing() {
     assert!(end(peer) > 0, "nothing was answered out of turn");
 }
 
-/// A worker that gives signs of life and never answers, until its stay ends; counts its batches.
+/// A worker that sends heartbeats but never answers, until its attachment ends; counts its batches.
 async fn silent(url: String, hello: WorkerHello, batches: Arc<AtomicUsize>) {
     let mut peer = Peer::attach(&url, hello).await.unwrap();
     while peer.batch().await.is_ok() {
@@ -122,7 +122,7 @@ fn what_a_worker_never_answers_is_computed_by_another() {
         seen.waiting_for.contains("the answer of peer (process ")
             && seen.waiting_for.ends_with("; nothing of this job is answered yet")
     };
-    // Both have as much as a worker may hold: nobody is there to take it over.
+    // Both hold as much as a worker may, and there is no other worker to replace them.
     story.api.until("the job says whom it waits for", &story.job, says);
     let before = batches.load(Ordering::Relaxed);
     assert!(before > 0, "they hold nothing");
@@ -138,7 +138,7 @@ fn what_a_worker_never_answers_is_computed_by_another() {
     }
 }
 
-/// A worker that lies about every batch until its stay ends; how it ends.
+/// A worker that answers every batch wrongly until its attachment ends; returns the final status.
 async fn liar(url: String, hello: WorkerHello) -> Status {
     let mut peer = match Peer::attach(&url, hello).await {
         Ok(peer) => peer,
@@ -185,8 +185,8 @@ fn one_liar_among_two_is_an_integrity_error_that_names_both() {
     assert!(story.expelled().is_empty(), "nobody can say who lied");
 }
 
-/// A worker that takes a batch and is silent until its lease ends, then comes back and answers
-/// the old batch wrongly.
+/// A worker receives a batch and is silent until its lease ends; then it returns and answers the
+/// old batch wrongly.
 #[test]
 fn what_a_worker_answers_after_its_lease_changes_nothing() {
     let mut story = Story::begin(&["--lease", "1", "--audit-fraction", "1"]);
@@ -212,10 +212,10 @@ fn what_a_worker_answers_after_its_lease_changes_nothing() {
     assert!(story.expelled().is_empty());
 }
 
-/// Workers that compute rightly and die of one realization, again and again.
+/// Workers that compute correctly but die repeatedly of one realization.
 async fn mortals(url: String, process: u32, deadly: (u64, u64)) {
     let mut attached = 0;
-    // Until the coordinator is gone.
+    // Repeats until the coordinator has gone.
     while let Ok(mut peer) = Peer::attach(&url, hello(process + attached)).await {
         attached += 1;
         while let Ok((batch, work)) = peer.batch().await {
@@ -260,7 +260,7 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
     }
 }
 
-/// Its hello is changed on the way to the coordinator.
+/// Its hello is altered on the way to the coordinator.
 #[test]
 fn a_worker_of_another_version_reads_why_it_is_refused() {
     let scratch = Scratch::new();

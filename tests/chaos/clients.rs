@@ -9,7 +9,7 @@ use crate::api::Api;
 use crate::service::{Service, undisturbed};
 use crate::support::{Owned, Scratch, eventually, job, osteon, run, text};
 
-/// Looks until the one job there is has so many evaluations.
+/// Waits until the only job has this number of evaluations.
 fn until_evaluations(api: &mut Api, least: u64) -> JobSnapshot {
     let mut found = None;
     eventually("the job goes on", || {
@@ -27,8 +27,8 @@ fn identify(file: &Path, out: &Path, url: &str) -> Owned {
     Owned::spawn(&mut command)
 }
 
-/// First the client is killed, then its coordinator, twice, while the same command follows the
-/// same job.
+/// First the client is killed, then its coordinator, twice, while the same command follows the same
+/// job.
 #[test]
 fn a_killed_client_goes_on_with_its_job_and_a_living_one_finds_its_coordinator_again() {
     let scratch = Scratch::new();
@@ -56,7 +56,7 @@ fn a_killed_client_goes_on_with_its_job_and_a_living_one_finds_its_coordinator_a
     assert_eq!(written["digest"], *digest);
     assert_eq!(api.jobs().unwrap().len(), 1);
 
-    // Finished: it is shown again, and no coordinator is asked.
+    // The finished job is shown again without a coordinator.
     service.kill();
     let again = run(&["identify", text(&file), "--out", text(&out), "--json"]);
     assert_eq!(again.json()["digest"], *digest);

@@ -1,4 +1,4 @@
-//! Many clients, clients that do not read, and whoever speaks no gRPC at all.
+//! Many clients, clients that do not read, and peers that do not speak gRPC.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -19,18 +19,18 @@ use crate::service::{Service, undisturbed};
 use crate::support::{DEADLINE, Owned, Scratch, eventually, job, run};
 
 const CLIENTS: usize = 200;
-/// Realizations of the crowd that the share is measured over.
+/// Number of realizations of the crowd over which the share is measured.
 const MEASURED: u64 = 1200;
-/// Of what the crowd gets, the other client must get so much: less than all, since batches are
-/// not of one size.
+/// Minimum ratio of the other client's share to that of the crowd: less than 1, since batches
+/// differ in size.
 const SHARE: f64 = 0.6;
-/// Realizations of an evaluation of the other client: so many that it seldom waits for the disk.
+/// Realizations of an evaluation of the other client: so many that it rarely waits for the disk.
 const LARGE: u32 = 400;
 const SEED: u64 = 11;
 const WATCHERS: usize = 20;
 
-/// Submits `request` for each of so many clients, on connections of their own and at once; the
-/// jobs.
+/// Submits `request` for each of this many clients, on separate connections and at the same time;
+/// returns the jobs.
 fn submit_at_once(url: &str, clients: usize, request: &SubmitRequest) -> BTreeSet<String> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
     runtime.block_on(async {
@@ -79,9 +79,9 @@ fn two_hundred_submit_at_once_and_anothers_job_keeps_its_share() {
     });
     let [one, many] = [now[0] - begun[0], now[1] - begun[1]];
     println!("{one} realizations for one client, {many} for the crowd");
-    // Nothing holds the other way round: a job of ten realizations waits for the disk more than it
-    // computes, and what it leaves idle meanwhile is the other client's. That both shares are equal
-    // where nobody waits is shown in virtual time, in the tests of the reactor.
+    // The converse does not hold: a job of ten realizations waits for the disk longer than it
+    // computes, and the slots that it leaves idle meanwhile go to the other client. The tests of
+    // the reactor show in virtual time that both shares are equal if neither waits.
     assert!(one as f64 >= SHARE * many as f64, "{one} against {many}");
 
     let cancel = CancelRequest { job: other };
@@ -113,7 +113,7 @@ impl Story {
         Self { scratch, service, _workers: workers, api, job, file }
     }
 
-    /// The job ends as it must, and no worker was lost.
+    /// Checks that the job ends with its digest, and that no worker was lost.
     fn check_end(&mut self) {
         let digest = undisturbed("identify", &self.file);
         assert_eq!(self.api.end(&self.job).digest, digest);
@@ -164,7 +164,7 @@ fn garbage_on_the_port_disturbs_nobody() {
     for piece in pieces {
         let mut stream = TcpStream::connect(&address).unwrap();
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
-        // The coordinator may have hung up already.
+        // The coordinator may already have closed the connection.
         let _ = stream.write_all(&piece).and_then(|()| stream.shutdown(Shutdown::Write));
         let ended = stream.read_to_end(&mut Vec::new());
         let late = |error: &std::io::Error| {
@@ -183,9 +183,9 @@ fn messages_beyond_the_limit_are_refused_with_the_limit() {
         let endpoint = url.parse().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
-            // A client without the limit that ours has.
+            // A client without our client's limit.
             let mut client = JobsClient::new(connect(&endpoint, DEADLINE).await.unwrap());
-            // Tag and length of the one field take 5 bytes.
+            // Tag and length of the only field take 5 bytes.
             let request_id = "x".repeat(bytes - 5);
             let request = SubmitRequest { request_id, ..SubmitRequest::default() };
             client.submit(request).await.unwrap_err()
@@ -207,7 +207,7 @@ fn more_connections_than_files_wait_without_a_flood_in_the_log() {
     let service = Service::start_in(&scratch, &scratch.path("store"), &enter, &[]);
     assert!(service.log().contains("connections=32"), "{}", service.log());
     let address = service.url().trim_start_matches("http://");
-    // Those who say nothing are sent away after 10 s, and make room.
+    // Silent connections are closed after 10 s, which makes room.
     let crowd: Vec<_> = (0..50).map(|_| TcpStream::connect(address).unwrap()).collect();
     eventually("a client is served", || {
         run(&["jobs", "--coordinator", service.url()]).code == Some(0)

@@ -1,5 +1,5 @@
 //! Disks that are full, limited or read-only, and files that are damaged, foreign, newer, or in
-//! use: what a user reads, and that nothing is half-written.
+//! use: the messages to the user, and that no file is half-written.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,16 +13,16 @@ use crate::api::{Api, specification};
 use crate::service::{Service, undisturbed};
 use crate::support::{Finished, Owned, Scratch, job, run, text};
 
-/// A disk in memory that only those see who are started on it.
+/// A memory disk that is visible only to processes started on it.
 struct Disk {
     holder: Owned,
     directory: PathBuf,
-    /// Before the command of whoever is started on it.
+    /// Prefix of the command line that starts a process on the disk.
     enter: Vec<String>,
 }
 
 impl Disk {
-    /// With these options; `None` where this user may not mount any.
+    /// Mounts a disk with these options; `None` if this user may not mount any.
     fn mount(scratch: &Scratch, options: &str) -> Option<Self> {
         let directory = scratch.path("disk");
         fs::create_dir_all(&directory).unwrap();
@@ -46,13 +46,13 @@ impl Disk {
         None
     }
 
-    /// A file on it, as seen from outside.
+    /// Returns the path of a file on the disk, as seen from outside.
     fn path(&self, name: &str) -> PathBuf {
         let root = format!("/proc/{}/root{}", self.holder.id(), text(&self.directory));
         Path::new(&root).join(name)
     }
 
-    /// Leaves no room.
+    /// Fills the disk.
     fn fill(&self) {
         let mut filler = fs::File::create(self.path("filler")).unwrap();
         let mut size = 1 << 16;
@@ -67,7 +67,7 @@ impl Disk {
         fs::remove_file(self.path("filler")).unwrap();
     }
 
-    /// Runs a coordinator on it that is expected to end.
+    /// Runs a coordinator on the disk that is expected to fail.
     fn coordinator(&self) -> Finished {
         let mut command = Command::new(&self.enter[0]);
         command.args(&self.enter[1..]).arg(env!("CARGO_BIN_EXE_osteon"));
@@ -100,7 +100,7 @@ fn on_a_full_disk_jobs_wait_and_go_on_when_there_is_room() {
         assert!(refused.stderr.contains(part), "{part} in {refused:?}");
     }
 
-    // Killed on the full disk, it comes back with all that it had acknowledged.
+    // After a kill on the full disk, it comes back with everything that it had acknowledged.
     service.kill();
     let full = disk.coordinator();
     assert_eq!(full.code, Some(1), "{full:?}");
@@ -116,7 +116,7 @@ fn on_a_full_disk_jobs_wait_and_go_on_when_there_is_room() {
     assert_eq!(api.end(&id).digest, digest);
 }
 
-/// A limit of the size of files: SQLite meets an error in the middle of a write, as with a quota.
+/// With a limit on file sizes, SQLite gets an error in the middle of a write, as with a quota.
 #[test]
 fn where_the_quota_ends_jobs_wait_and_go_on_when_it_is_raised() {
     let scratch = Scratch::new();
@@ -138,7 +138,8 @@ fn where_the_quota_ends_jobs_wait_and_go_on_when_it_is_raised() {
     assert_eq!(api.end(&id).digest, digest);
 }
 
-/// What a coordinator says that does not start on `directory`; nothing there is changed.
+/// Checks the messages of a coordinator that does not start on `directory`, and that nothing there
+/// changes.
 fn refused_by(directory: &Path, expected: &[&str]) {
     let before = contents(directory);
     let arguments = ["coordinator", "--listen", "127.0.0.1:0", "--store", text(directory)];
@@ -150,7 +151,7 @@ fn refused_by(directory: &Path, expected: &[&str]) {
     assert_eq!(contents(directory), before, "{refused:?}");
 }
 
-/// The files of a directory, without the lock.
+/// Returns the files of a directory, without the lock.
 fn contents(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let Ok(entries) = fs::read_dir(directory) else { return BTreeMap::new() };
     let paths = entries.map(|entry| entry.unwrap().path());
@@ -158,7 +159,7 @@ fn contents(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect()
 }
 
-/// A store with an ended job, left in order.
+/// Creates a store with an ended job, shut down cleanly.
 fn store(scratch: &Scratch) -> PathBuf {
     let file = scratch.write("job.toml", &job(30, 3));
     let mut service = Service::start(scratch, &[]);
@@ -207,8 +208,8 @@ fn files_that_cannot_be_used_are_refused_and_left_as_they_are() {
     assert_eq!(Api::new(service.url()).jobs().unwrap().len(), 1);
 }
 
-/// SQLite takes a log that is cut for a shorter one: the jobs behind the cut would be gone without
-/// a word.
+/// SQLite regards a truncated log as a shorter one, so the jobs behind the cut would be lost
+/// without notice.
 #[test]
 fn a_coordinator_that_lost_accepted_jobs_says_so_and_does_not_start() {
     let scratch = Scratch::new();
@@ -222,7 +223,7 @@ fn a_coordinator_that_lost_accepted_jobs_says_so_and_does_not_start() {
     let directory = scratch.path("store");
     let log = directory.join("osteon.sqlite-wal");
     let whole = fs::read(&log).unwrap();
-    // One byte of the last page is enough: what was written last counts as never written.
+    // One byte of the last page suffices: what was written last then counts as never written.
     let mut damaged = whole.clone();
     *damaged.last_mut().unwrap() ^= 1;
     for bytes in [&whole[..whole.len() - 1], &damaged] {
@@ -231,13 +232,13 @@ fn a_coordinator_that_lost_accepted_jobs_says_so_and_does_not_start() {
     }
     fs::write(&log, &whole[..32]).unwrap();
     refused_by(&directory, &["has lost jobs 1 to 3,", "restore the store from a copy"]);
-    // The copy is the way back.
+    // Restoring the copy repairs the store.
     fs::write(&log, &whole).unwrap();
     service.start_again();
     assert_eq!(Api::new(service.url()).jobs().unwrap().len(), 3);
 }
 
-/// Who goes on without them does so once, and no number is given twice.
+/// Continuing without the lost jobs must be requested only once, and no number is given twice.
 #[test]
 fn lost_jobs_that_are_accepted_are_not_asked_about_again() {
     let scratch = Scratch::new();

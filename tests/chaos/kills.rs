@@ -1,7 +1,7 @@
 //! A storm: coordinator and workers are killed and stopped at random moments while jobs run.
 //!
-//! `OSTEON_CHAOS_KILLS=50` asks for that many kills of the coordinator, and as many of workers;
-//! `OSTEON_CHAOS_SEED` for another storm.
+//! `OSTEON_CHAOS_KILLS=50` sets the number of kills of the coordinator, and of workers;
+//! `OSTEON_CHAOS_SEED` selects another storm.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,15 +15,15 @@ use crate::random::Random;
 use crate::service::{Service, undisturbed};
 use crate::support::{Owned, Scratch, eventually, job};
 
-/// Kills of the coordinator, and as many of workers, unless the environment asks for others.
+/// Default number of kills of the coordinator, and of workers.
 const KILLS: usize = 50;
-/// Most realizations between two blows.
+/// Maximum number of realizations between two faults.
 const PAUSE_MAX: usize = 70;
-/// Workers, of one thread each.
+/// Number of workers, of one thread each.
 const WORKERS: usize = 3;
-/// Jobs that are under way at any time.
+/// Number of jobs that are active at any time.
 const BUSY: usize = 2;
-/// Submissions that are on their way when the coordinator is killed.
+/// Number of submissions in progress when the coordinator is killed.
 const SUBMITTERS: usize = 4;
 
 #[test]
@@ -58,17 +58,17 @@ fn killed_and_stopped_again_and_again_every_job_ends_with_its_digest() {
 #[derive(Debug, Clone, Copy)]
 enum Blow {
     KillCoordinator,
-    /// While clients wait for their jobs to be accepted.
+    /// Kills the coordinator while clients wait for the acceptance of their jobs.
     KillDuringSubmission,
     KillWorker,
-    /// Until its lease has ended; then it wakes.
+    /// Stops a worker until its lease has ended, then continues it.
     StopWorker,
-    /// In order, by SIGTERM.
+    /// Ends a worker cleanly by SIGTERM.
     EndWorker,
     EndCoordinator,
 }
 
-/// What jobs may be, and what their digests are.
+/// The kinds of jobs, with their digests.
 struct Kind {
     specification: JobSpecification,
     digest: String,
@@ -83,7 +83,7 @@ struct Storm<'a> {
     kinds: Vec<Kind>,
     /// Kind of each request, and the id of its job once that was acknowledged.
     requests: Vec<(usize, Option<String>)>,
-    /// Every job as it was seen last.
+    /// The last observed state of every job.
     seen: BTreeMap<String, JobSnapshot>,
     survived: Survived,
 }
@@ -113,7 +113,7 @@ impl<'a> Storm<'a> {
         Self { scratch, random, service, api, workers, kinds, requests, seen, survived }
     }
 
-    /// Lets the jobs go on for a random number of realizations.
+    /// Waits for a random number of realizations.
     fn pause(&mut self) {
         let pause = self.random.below(PAUSE_MAX) as u64;
         let mut begun = None;
@@ -123,7 +123,7 @@ impl<'a> Storm<'a> {
         });
     }
 
-    /// Looks at all jobs, and keeps enough of them under way; realizations so far.
+    /// Lists all jobs, and keeps enough of them active; returns the number of realizations so far.
     fn look(&mut self) -> Option<u64> {
         let jobs = self.api.jobs()?;
         let busy = jobs.iter().filter(|job| job.state() != JobState::Ended).count();
@@ -159,7 +159,7 @@ impl<'a> Storm<'a> {
             }
             Blow::EndWorker => {
                 let leaving = self.random.below(WORKERS);
-                // Before, it may not know the signal.
+                // Before that, it may not handle the signal yet.
                 self.until_attached();
                 self.workers[leaving].signal("TERM");
                 assert_eq!(self.workers[leaving].code(), Some(0));
@@ -170,8 +170,8 @@ impl<'a> Storm<'a> {
         }
     }
 
-    /// Waits until the coordinator knows these very processes: right after a kill it may still count
-    /// the worker that is gone in place of the one that is not there yet.
+    /// Waits until the coordinator lists exactly these processes: right after a kill it may still
+    /// count the worker that has gone instead of its replacement.
     fn until_attached(&mut self) {
         eventually("all workers are attached", || {
             let attached = self.api.attached_processes().unwrap_or_default();
@@ -190,7 +190,7 @@ impl<'a> Storm<'a> {
         self.survived.stops += 1;
     }
 
-    /// Starts the coordinator again, and looks whether anything is lost.
+    /// Restarts the coordinator, and checks that nothing is lost.
     fn rise(&mut self) {
         self.service.start_again();
         self.survived.restarts += 1;
@@ -228,7 +228,7 @@ impl<'a> Storm<'a> {
                 });
             }
             self.requests.extend(vec![(kind, None); SUBMITTERS]);
-            // The first has its answer: the others are on their way.
+            // The first is acknowledged while the others are still in progress.
             let (request, job) = acknowledged.recv().unwrap();
             self.requests[request].1 = job;
             self.service.kill();
@@ -261,7 +261,7 @@ impl<'a> Storm<'a> {
     }
 }
 
-/// What the jobs have survived.
+/// The faults that the jobs have survived.
 #[derive(Debug, Default)]
 struct Survived {
     coordinator_kills: usize,
@@ -269,7 +269,7 @@ struct Survived {
     worker_kills: usize,
     orderly_ends: usize,
     stops: usize,
-    /// Submissions that were cut off.
+    /// Number of submissions that were cut off.
     unanswered: usize,
     expirations: usize,
     retries: usize,

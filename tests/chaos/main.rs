@@ -1,9 +1,9 @@
-//! Coordinator, workers and clients under everything that goes wrong on a cluster, with real
-//! processes and real sockets. In each story the job ends with the digest of an undisturbed run,
-//! or whoever is concerned reads what is wrong and what to do.
+//! Coordinator, workers and clients under all faults of a cluster, with real processes and real
+//! sockets. In each test the job ends with the digest of an undisturbed run, or the user concerned
+//! gets a message that says what is wrong and what to do.
 //!
 //! Nothing here waits for a guessed time: faults come after observed progress, and states are
-//! looked for until a deadline. What is random is decided by a seed that is printed.
+//! polled until a deadline. Random choices are determined by a seed that is printed.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,5 +1,5 @@
-//! Networks that delay, cut, half-close, and go silent one way: a proxy of our own stands between
-//! coordinator, workers and client.
+//! Networks that delay, cut, half-close, and go silent in one direction, simulated by a proxy
+//! between coordinator, workers and client.
 
 use std::fs;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use crate::support::{Owned, Scratch, eventually, job, run, text};
 
 const SEED: u64 = 3;
 
-/// A coordinator behind a proxy for each of two workers.
+/// A coordinator with one proxy for each of two workers.
 struct Network {
     scratch: Scratch,
     service: Service,
@@ -47,7 +47,7 @@ impl Network {
         job
     }
 
-    /// How often workers have attached.
+    /// Returns how often workers have attached.
     fn attachments(&self) -> usize {
         let log = fs::read_to_string(self.scratch.path("workers.log")).unwrap();
         log.matches(" attached").count()
@@ -67,7 +67,7 @@ fn slow_and_cut_connections_change_nothing() {
     let found = std::thread::scope(|scope| {
         let client = scope.spawn(|| run(&[&arguments[..], &["--coordinator", &url]].concat()));
         let mut last = 0;
-        // Not the beginning, when the job is submitted, and not the end, when it is fetched.
+        // Avoids the beginning, when the job is submitted, and the end, when it is fetched.
         while last < 16 * 40 {
             let next = last + 1 + random.below(60) as u64;
             eventually("the job goes on", || {
@@ -106,7 +106,7 @@ fn connections_that_are_silent_one_way_are_given_up_and_made_anew() {
         let before = network.attachments();
         network.proxies[fault].stall(way);
         eventually("the worker attaches again", || network.attachments() > before);
-        // What was held back comes late: to a lease that is over.
+        // The delayed messages arrive after the lease has ended.
         network.proxies[fault].release(way);
     }
     assert!(network.service.expirations() > 0);

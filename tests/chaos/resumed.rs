@@ -1,4 +1,4 @@
-//! What a coordinator that was killed computes again.
+//! Recomputation after a coordinator was killed.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
@@ -19,13 +19,13 @@ const SEED: u64 = 5;
 const KILLS: usize = 8;
 const REALIZATIONS: u32 = 40;
 const EVALUATIONS: u32 = 10;
-/// Most batches between two kills; an evaluation is 8 to 12.
+/// Maximum number of batches between two kills; an evaluation has 8 to 12.
 const BATCHES: usize = 14;
 
-/// What was computed, each with the life of the coordinator that wanted it.
+/// The computed batches, each with the run of the coordinator that requested it.
 type Computed = Arc<Mutex<Vec<(usize, Work)>>>;
 
-/// Works for all lives of a coordinator, writes down what, and tells of each batch.
+/// Computes for all runs of a coordinator, records every batch, and reports it.
 async fn work(url: String, life: Arc<AtomicUsize>, computed: Computed, told: mpsc::Sender<()>) {
     loop {
         let Ok(mut peer) = Peer::attach(&url, hello(1)).await else { continue };
@@ -44,7 +44,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(REALIZATIONS, EVALUATIONS));
     let digest = undisturbed("identify", &file);
-    // What is computed ahead of the search is not on its path.
+    // Speculative evaluations are not on the path of the search.
     let mut service = Service::start(&scratch, &["--audit-fraction", "0", "--no-speculation"]);
     let mut api = Api::new(service.url());
     let id = api.submit(&specification(&file, JobKind::Identification), "").unwrap();
@@ -55,7 +55,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
     runtime.spawn(worker);
     let mut random = Random::new(SEED);
-    // How many evaluations were acknowledged before each kill.
+    // Number of evaluations acknowledged before each kill.
     let mut stored = Vec::new();
     while stored.len() < KILLS {
         for _ in 0..=random.below(BATCHES) {
@@ -67,7 +67,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
         service.kill();
         life.fetch_add(1, Ordering::SeqCst);
         service.start_again();
-        // Those of the life that is over do not count.
+        // Batches of the previous run do not count.
         while batches.try_recv().is_ok() {}
     }
     assert_eq!(api.end(&id).digest, digest);
@@ -75,7 +75,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
 
     let points: Vec<Option<ParameterValues>> =
         api.parts(&id).into_iter().flat_map(points).collect();
-    // Two more measure derivatives.
+    // Two more evaluations measure derivatives.
     let evaluations = EVALUATIONS + 2;
     assert_eq!(points.len(), evaluations as usize);
     let computed = computed.lock().unwrap();

@@ -1,4 +1,4 @@
-//! Processes that stand still (a suspended machine, a swapping one) and wake up again.
+//! Processes that are stopped (a suspended machine, a swapping one) and continue.
 
 use std::fs;
 use std::time::Duration;
@@ -34,7 +34,7 @@ impl Story {
         Self { scratch, service, workers, api, job, digest }
     }
 
-    /// How often the workers have logged this.
+    /// Returns how often the workers have logged this message.
     fn logged(&self, what: &str) -> usize {
         fs::read_to_string(self.scratch.path("workers.log")).unwrap().matches(what).count()
     }
@@ -60,7 +60,7 @@ fn a_worker_that_wakes_after_its_lease_changes_nothing() {
 fn a_coordinator_that_stands_still_for_less_than_a_lease_loses_no_worker() {
     let mut story = Story::begin("6");
     story.service.process().signal("STOP");
-    // Not a wait for a state: it is the length of the fault, a few missed signs of life.
+    // This does not wait for a state: it is the length of the fault, a few missed heartbeats.
     std::thread::sleep(Duration::from_secs(2));
     story.service.process().signal("CONT");
     story.check_end();

@@ -1,4 +1,4 @@
-//! The service of jobs as an outside client sees it, in calls that block.
+//! The jobs service as an external client uses it, with blocking calls.
 
 use std::path::Path;
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::support::eventually;
 /// Longest wait for one answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A client of one coordinator, over all its lives.
+/// A client of one coordinator, which survives its restarts.
 pub(crate) struct Api {
     runtime: Runtime,
     url: String,
@@ -39,7 +39,7 @@ impl Api {
         Self { runtime, url: url.to_owned(), client: None }
     }
 
-    /// One call; `Unavailable` when nobody answers.
+    /// Makes one call; `Unavailable` if there is no answer.
     pub(crate) fn call<T>(
         &mut self,
         call: impl AsyncFnOnce(&mut JobsClient<Channel>) -> Result<T, Status>,
@@ -61,13 +61,13 @@ impl Api {
         answer
     }
 
-    /// All jobs; `None` when nobody answers.
+    /// Returns all jobs; `None` if there is no answer.
     pub(crate) fn jobs(&mut self) -> Option<Vec<JobSnapshot>> {
         let listed = self.call(async |client| client.list(ListRequest::default()).await);
         listed.ok().map(|listed| listed.into_inner().jobs)
     }
 
-    /// Process ids of the attached workers; `None` when nobody answers.
+    /// Returns the process ids of the attached workers; `None` if there is no answer.
     pub(crate) fn attached_processes(&mut self) -> Option<Vec<u32>> {
         let request = ListWorkersRequest::default();
         let listed = self.call(async |client| client.list_workers(request).await);
@@ -86,14 +86,14 @@ impl Api {
         self.call(async |client| Ok(client.submit(request).await?.into_inner().job))
     }
 
-    /// One job.
+    /// Returns one job.
     pub(crate) fn job(&mut self, job: &str) -> JobSnapshot {
         let request = GetRequest { job: job.to_owned() };
         let got = self.call(async |client| client.get(request).await);
         got.unwrap().into_inner().snapshot.unwrap()
     }
 
-    /// Looks until a job is as `wanted`.
+    /// Polls until a job is as `wanted`.
     pub(crate) fn until(
         &mut self,
         what: &str,
@@ -108,13 +108,13 @@ impl Api {
         last.unwrap()
     }
 
-    /// Waits for the end of a job; its result.
+    /// Waits for the end of a job; returns its result.
     pub(crate) fn end(&mut self, job: &str) -> JobResult {
         self.until("the job ends", job, |seen| seen.state() == JobState::Ended);
         self.result(job)
     }
 
-    /// The result of an ended job.
+    /// Returns the result of an ended job.
     pub(crate) fn result(&mut self, job: &str) -> JobResult {
         let result = |part| match part {
             Part::Result(result) => Some(result),
@@ -123,7 +123,7 @@ impl Api {
         self.parts(job).into_iter().find_map(result).unwrap()
     }
 
-    /// All that an ended job left.
+    /// Returns all parts of an ended job's results.
     pub(crate) fn parts(&mut self, job: &str) -> Vec<Part> {
         let request = FetchRequest { job: job.to_owned() };
         let parts = self.call(async |client| {
@@ -138,19 +138,19 @@ impl Api {
     }
 }
 
-/// A client with a connection of its own.
+/// Returns a client with a separate connection.
 pub(crate) async fn client_of(url: &str) -> Result<JobsClient<Channel>, Status> {
     let endpoint = url.parse().unwrap();
     let channel = connect(&endpoint, TIMEOUT).await;
     channel.map(jobs_client).map_err(|error| Status::new(Code::Unavailable, error.to_string()))
 }
 
-/// The specification that a job file has.
+/// Returns the specification in a job file.
 pub(crate) fn specification(file: &Path, kind: JobKind) -> JobSpecification {
     specification::to_message(&job_file::read(file, kind).unwrap())
 }
 
-/// How many realizations of complete and current evaluations a job has.
+/// Returns the number of realizations of a job's complete and current evaluations.
 pub(crate) fn progress(job: &JobSnapshot) -> u64 {
     let current = if job.state() == JobState::Ended { 0 } else { job.realizations_done };
     job.evaluations * job.realizations + current

@@ -1,5 +1,5 @@
-//! What the tests with real processes share: running `osteon`, owning its services, waiting for
-//! states within a deadline.
+//! Common support of the tests with real processes: running `osteon`, owning its services, polling
+//! states until a deadline.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 /// Longest wait for any state.
 pub(crate) const DEADLINE: Duration = Duration::from_secs(120);
-/// Time between two looks at a state.
+/// Interval of polling.
 const POLL: Duration = Duration::from_millis(20);
 
 /// The seven parameters at the paper's optimum: name, value, lower and upper bound of a search.
@@ -43,7 +43,7 @@ pub(crate) fn job(realizations: u32, evaluations: u32) -> String {
     text
 }
 
-/// A directory of one test, removed at its end.
+/// The directory of one test, removed at its end.
 pub(crate) struct Scratch(tempfile::TempDir);
 
 impl Scratch {
@@ -55,7 +55,7 @@ impl Scratch {
         self.0.path().join(name)
     }
 
-    /// Writes a file; its path.
+    /// Writes a file; returns its path.
     pub(crate) fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -64,12 +64,12 @@ impl Scratch {
     }
 }
 
-/// A path as an argument.
+/// Returns a path as an argument.
 pub(crate) fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// The program under test, without the caller's settings.
+/// Returns a command for the program under test, without the caller's settings.
 pub(crate) fn osteon() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_osteon"));
     for name in [
@@ -118,13 +118,13 @@ impl Finished {
         }
     }
 
-    /// Asserts exit code 0; stdout.
+    /// Checks that the exit code is 0; returns stdout.
     pub(crate) fn succeeded(&self) -> &str {
         assert_eq!(self.code, Some(0), "{self:?}");
         &self.stdout
     }
 
-    /// Asserts exit code 0; stdout as JSON.
+    /// Checks that the exit code is 0; returns stdout as JSON.
     pub(crate) fn json(&self) -> Value {
         serde_json::from_str(self.succeeded()).unwrap()
     }
@@ -138,7 +138,7 @@ impl Owned {
         Self(command.stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap())
     }
 
-    /// As [`spawn`](Self::spawn), with stderr at the end of a file.
+    /// Same as [`spawn`](Self::spawn), with stderr appended to a file.
     pub(crate) fn spawn_logging(command: &mut Command, log: &Path) -> Self {
         let log = fs::OpenOptions::new().create(true).append(true).open(log).unwrap();
         Self(command.stdout(Stdio::piped()).stderr(log).spawn().unwrap())
@@ -148,7 +148,7 @@ impl Owned {
         self.0.id()
     }
 
-    /// SIGKILL, and wait until it is gone.
+    /// Sends SIGKILL, and waits until the process has ended.
     pub(crate) fn kill(&mut self) {
         self.0.kill().unwrap();
         self.0.wait().unwrap();
@@ -159,7 +159,7 @@ impl Owned {
         signal(self.id(), name);
     }
 
-    /// Waits for the end within the deadline; the exit code.
+    /// Waits for the end within the deadline; returns the exit code.
     pub(crate) fn code(&mut self) -> Option<i32> {
         let child = &mut self.0;
         let mut code = None;
@@ -170,15 +170,16 @@ impl Owned {
         code.and_then(|status| status.code())
     }
 
-    /// The exit code, if it has ended.
+    /// Returns the exit code, if the process has ended.
     pub(crate) fn ended(&mut self) -> Option<i32> {
         self.0.try_wait().unwrap().and_then(|status| status.code())
     }
 
-    /// The next line of stdout.
+    /// Returns the next line of stdout.
     pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();
-        // The reader may take more than the line: only the first line of a service is read so.
+        // The reader may consume more than the line, so this is used only for the first line of a
+        // service.
         BufReader::new(self.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
         line.trim_end().to_owned()
     }
@@ -197,7 +198,7 @@ pub(crate) fn signal(process: u32, name: &str) {
     assert!(status.success(), "kill -s {name} {process}");
 }
 
-/// Looks until `state` holds; panics with `what` at the deadline.
+/// Polls until `state` holds; panics with `what` at the deadline.
 pub(crate) fn eventually(what: &str, mut state: impl FnMut() -> bool) {
     let start = Instant::now();
     while !state() {
@@ -213,7 +214,7 @@ pub(crate) struct Coordinator {
 }
 
 impl Coordinator {
-    /// On a free port, with its store in `directory`.
+    /// Starts a coordinator on a free port, with its store in `directory`.
     pub(crate) fn start(directory: &Path) -> Self {
         let mut command = osteon();
         command.args(["coordinator", "--listen", "127.0.0.1:0", "--store"]).arg(directory);
@@ -223,7 +224,7 @@ impl Coordinator {
         Self { process, url }
     }
 
-    /// A worker of this coordinator.
+    /// Starts a worker of this coordinator.
     pub(crate) fn worker(&self, threads: u32) -> Owned {
         let mut command = osteon();
         command.args(["worker", "--coordinator", &self.url, "--threads", &threads.to_string()]);
@@ -236,13 +237,13 @@ impl Coordinator {
         Finished::of(output)
     }
 
-    /// Submits a job; its id.
+    /// Submits a job; returns its id.
     pub(crate) fn submit(&self, job: &Path) -> String {
         let submitted = self.client(&["submit", job.to_str().unwrap(), "--json"]).json();
         submitted["job"].as_str().unwrap().to_owned()
     }
 
-    /// The job as `jobs --json` has it.
+    /// Returns the job as in `jobs --json`.
     pub(crate) fn job(&self, id: &str) -> Value {
         let jobs = self.client(&["jobs", "--json"]).json();
         let found = jobs.as_array().unwrap().iter().find(|job| job["job"] == id);
@@ -250,13 +251,13 @@ impl Coordinator {
     }
 }
 
-/// Processes whose parent is `parent` (Linux).
+/// Returns the processes whose parent is `parent` (Linux).
 pub(crate) fn children(parent: u32) -> Vec<u32> {
     let mut children = Vec::new();
     for entry in fs::read_dir("/proc").unwrap().flatten() {
         let Ok(process) = entry.file_name().to_string_lossy().parse::<u32>() else { continue };
         let Ok(stat) = fs::read_to_string(entry.path().join("stat")) else { continue };
-        // The name in brackets may hold spaces: fields count from behind it.
+        // The name in brackets may contain spaces, so fields are counted after it.
         let Some((_, fields)) = stat.rsplit_once(')') else { continue };
         if fields.split_whitespace().nth(1) == Some(&parent.to_string()) {
             children.push(process);
@@ -265,13 +266,13 @@ pub(crate) fn children(parent: u32) -> Vec<u32> {
     children
 }
 
-/// The value of an option on a process's command line (Linux).
+/// Returns the value of an option on a process's command line (Linux).
 pub(crate) fn option(process: u32, name: &str) -> Option<String> {
     let line = fs::read_to_string(format!("/proc/{process}/cmdline")).ok()?;
     line.split('\0').skip_while(|&word| word != name).nth(1).map(str::to_owned)
 }
 
-/// Whether a process is there and no zombie (Linux).
+/// Returns whether a process exists and is not a zombie (Linux).
 pub(crate) fn is_alive(process: u32) -> bool {
     fs::read_to_string(format!("/proc/{process}/stat"))
         .ok()

@@ -1,4 +1,5 @@
-//! A worker in the test's own hands: it computes as the real ones do, and answers as it likes.
+//! A worker controlled by the test: it computes like real ones, and the test decides what it
+//! answers.
 
 use std::time::Duration;
 
@@ -17,13 +18,13 @@ use tonic::{Status, Streaming};
 
 use crate::support::DEADLINE;
 
-/// One stay of such a worker. It gives signs of life only while it waits for a batch.
+/// One attachment of such a worker. It sends heartbeats only while it waits for a batch.
 pub(crate) struct Peer {
     outbound: mpsc::Sender<AttachRequest>,
     stream: Streaming<AttachResponse>,
 }
 
-/// How a worker of this version introduces itself.
+/// Returns the hello of a worker of this version.
 pub(crate) fn hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: version::VERSION.to_owned(),
@@ -51,7 +52,7 @@ impl Peer {
         }
     }
 
-    /// The next message, within the deadline; the error is the end of the stay.
+    /// Returns the next message, within the deadline; the error is the end of the attachment.
     pub(crate) async fn message(&mut self) -> Result<Response, Status> {
         let message = tokio::time::timeout(DEADLINE, self.stream.message()).await.unwrap()?;
         message
@@ -59,7 +60,7 @@ impl Peer {
             .ok_or_else(|| Status::cancelled("the stream ended"))
     }
 
-    /// The next batch.
+    /// Returns the next batch.
     pub(crate) async fn batch(&mut self) -> Result<(u64, Work), Status> {
         loop {
             match self.message().await? {
@@ -78,12 +79,12 @@ impl Peer {
     }
 
     async fn send(&self, message: Request) {
-        // The stream may have ended: reading it tells.
+        // The stream may have ended; reading it shows that.
         let _ = self.outbound.send(AttachRequest { message: Some(message) }).await;
     }
 }
 
-/// All realizations of a batch, as every worker computes them.
+/// Computes all realizations of a batch, as every worker does.
 pub(crate) fn solve(work: &Work) -> Vec<Solved> {
     let solver = Solver::new(&work.setup);
     let mut workspace = Workspace::default();
@@ -105,7 +106,7 @@ pub(crate) fn solve(work: &Work) -> Vec<Solved> {
     indices.map(realization).collect()
 }
 
-/// The same with the last bit of the first velocity changed.
+/// Same as [`solve`], with the last bit of the first velocity changed.
 pub(crate) fn lie(work: &Work) -> Vec<Solved> {
     let mut solved = solve(work);
     if let Some(velocity) = solved.iter_mut().find_map(|solved| solved.outcome.as_mut().ok()) {

@@ -1,5 +1,5 @@
-//! A TCP proxy that does to connections what networks do: it delays, cuts, half-closes, and
-//! goes silent in one direction.
+//! A TCP proxy that simulates network faults: it delays, cuts, half-closes, and goes silent in one
+//! direction.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -8,15 +8,15 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two looks at a connection's faults.
+/// Interval at which a connection's faults are polled.
 const POLL: Duration = Duration::from_millis(5);
 
-/// Which way bytes go.
+/// Direction of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Way {
-    /// From whoever dialled to the coordinator.
+    /// From the client or worker to the coordinator.
     Up,
-    /// From the coordinator.
+    /// From the coordinator to the client or worker.
     Down,
 }
 
@@ -28,14 +28,14 @@ pub(crate) struct Proxy {
 
 struct Shared {
     coordinator: SocketAddr,
-    /// Wait before each piece is passed on, ms.
+    /// Delay before each piece is forwarded, ms.
     delay_ms: AtomicU64,
     over: AtomicBool,
     links: Mutex<Vec<Arc<Link>>>,
     rewritten: Mutex<Option<(Vec<u8>, Vec<u8>)>>,
 }
 
-/// One connection: who dialled, and the coordinator.
+/// One connection: its client side, and its coordinator side.
 struct Link {
     client: TcpStream,
     server: TcpStream,
@@ -44,7 +44,7 @@ struct Link {
 }
 
 impl Proxy {
-    /// In front of the coordinator at `url`.
+    /// Starts a proxy in front of the coordinator at `url`.
     pub(crate) fn start(url: &str) -> Self {
         let coordinator = url.trim_start_matches("http://").parse().unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -66,44 +66,45 @@ impl Proxy {
         format!("http://{}", self.address)
     }
 
-    /// Holds every piece back for so long.
+    /// Delays every piece by this time.
     pub(crate) fn delay(&self, delay: Duration) {
         let delay = u64::try_from(delay.as_millis()).unwrap();
         self.shared.delay_ms.store(delay, Ordering::Relaxed);
     }
 
-    /// Replaces bytes by as many others on the way to the coordinator.
+    /// Replaces bytes by the same number of others on the way to the coordinator.
     pub(crate) fn rewrite(&self, from: &[u8], to: &[u8]) {
         assert_eq!(from.len(), to.len());
         *self.shared.rewritten.lock().unwrap() = Some((from.to_vec(), to.to_vec()));
     }
 
-    /// Cuts all connections there are; how many.
+    /// Cuts all open connections; returns their number.
     pub(crate) fn cut(&self) -> usize {
         let links = std::mem::take(&mut *self.shared.links.lock().unwrap());
         links.iter().filter(|link| link.end()).count()
     }
 
-    /// Tells the receiving end of one way that nothing more comes; the other way stays open.
+    /// Closes one direction, so that its receiver sees the end of the stream; the other direction
+    /// stays open.
     pub(crate) fn half_close(&self, way: Way) {
         for link in self.shared.links.lock().unwrap().iter() {
             let receiver = match way {
                 Way::Up => &link.server,
                 Way::Down => &link.client,
             };
-            // It may be closed already.
+            // It may already be closed.
             let _ = receiver.shutdown(Shutdown::Write);
         }
     }
 
-    /// Passes nothing on any more one way, on the connections there are.
+    /// Stops forwarding in one direction, on the open connections.
     pub(crate) fn stall(&self, way: Way) {
         for link in self.shared.links.lock().unwrap().iter() {
             link.stalled[way as usize].store(true, Ordering::Relaxed);
         }
     }
 
-    /// Passes on what was held back.
+    /// Forwards the bytes that were held back.
     pub(crate) fn release(&self, way: Way) {
         for link in self.shared.links.lock().unwrap().iter() {
             link.stalled[way as usize].store(false, Ordering::Relaxed);
@@ -119,7 +120,7 @@ impl Drop for Proxy {
 }
 
 impl Link {
-    /// Ends both directions; whether it had not ended.
+    /// Ends both directions; returns whether the link was still open.
     fn end(&self) -> bool {
         self.over.store(true, Ordering::Relaxed);
         let open = self.client.shutdown(Shutdown::Both).is_ok();
@@ -133,7 +134,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             thread::sleep(POLL);
             continue;
         };
-        // Without a coordinator whoever dialled sees the connection end.
+        // Without a coordinator the client's connection is closed.
         let Ok(server) = TcpStream::connect(shared.coordinator) else { continue };
         for stream in [&client, &server] {
             stream.set_nonblocking(false).unwrap();
@@ -150,7 +151,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-/// Passes bytes on one way until the connection ends.
+/// Forwards bytes in one direction until the connection ends.
 fn pump(shared: &Shared, link: &Link, way: Way) {
     let (mut from, mut to) = match way {
         Way::Up => (&link.client, &link.server),
@@ -179,7 +180,7 @@ fn pump(shared: &Shared, link: &Link, way: Way) {
             break;
         }
     }
-    // What was sent before the end has been passed on; the other way may go on.
+    // Everything sent before the end has been forwarded; the other direction may continue.
     let _ = to.shutdown(Shutdown::Write);
 }
 

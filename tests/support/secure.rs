@@ -1,5 +1,5 @@
-//! A coordinator with TLS, as an operator would set it up: certificates by `osteon certs`, tokens
-//! by `osteon token`.
+//! A coordinator with TLS, set up as by an operator: certificates by `osteon certs`, tokens by
+//! `osteon token`.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
@@ -13,7 +13,7 @@ use super::support::{Finished, Owned, Scratch, osteon, run, text};
 /// The roles of tokens.
 pub(crate) const ROLES: [&str; 3] = ["read", "submit", "admin"];
 
-/// A coordinator with TLS and tokens, and everything it was set up with.
+/// A coordinator with TLS and tokens, and the files of its set-up.
 pub(crate) struct Secure {
     pub(crate) process: Owned,
     pub(crate) url: String,
@@ -21,7 +21,7 @@ pub(crate) struct Secure {
 }
 
 impl Secure {
-    /// Logs everything to `coordinator.log`.
+    /// Starts a coordinator that logs everything to `coordinator.log`.
     pub(crate) fn start() -> Self {
         let scratch = Scratch::new();
         set_up(&scratch);
@@ -29,7 +29,7 @@ impl Secure {
         Self { process, url, scratch }
     }
 
-    /// Options of TLS and the token of `role`.
+    /// Returns the TLS options and the token of `role`.
     pub(crate) fn options(&self, role: &str) -> Vec<String> {
         let token = self.scratch.path(&format!("{role}.token"));
         vec![
@@ -49,7 +49,7 @@ impl Secure {
         run(&all)
     }
 
-    /// A worker with the certificate `certs/NAME.pem`, which logs everything to a file.
+    /// Starts a worker with the certificate `certs/NAME.pem`, which logs everything to a file.
     pub(crate) fn worker(&self, name: &str, log: &str) -> Owned {
         let mut command = osteon();
         command.args(["worker", "--coordinator", &self.url, "--threads", "1", "--tls-ca"]);
@@ -59,13 +59,13 @@ impl Secure {
         Owned::spawn_logging(command.env("RUST_LOG", "trace"), &self.scratch.path(log))
     }
 
-    /// What a file holds.
+    /// Returns the content of a file.
     pub(crate) fn read(&self, name: &str) -> String {
         fs::read_to_string(self.scratch.path(name)).unwrap()
     }
 }
 
-/// Certificates in `certs`, a list of tokens in `tokens`, the tokens in `ROLE.token`.
+/// Creates certificates in `certs`, a list of tokens in `tokens`, and the tokens in `ROLE.token`.
 pub(crate) fn set_up(scratch: &Scratch) {
     run(&["certs", text(&scratch.path("certs"))]).succeeded();
     for role in ROLES {
@@ -77,7 +77,7 @@ pub(crate) fn set_up(scratch: &Scratch) {
     }
 }
 
-/// The options of a coordinator with the certificate `certs/NAME.pem`.
+/// Returns the options of a coordinator with the certificate `certs/NAME.pem`.
 pub(crate) fn door(scratch: &Scratch, name: &str) -> Vec<String> {
     let option =
         |option: &str, file: &str| [option.to_owned(), text(&scratch.path(file)).to_owned()];
@@ -91,7 +91,7 @@ pub(crate) fn door(scratch: &Scratch, name: &str) -> Vec<String> {
     .concat()
 }
 
-/// Starts a coordinator with the certificate `certs/NAME.pem`; the process and its URL.
+/// Starts a coordinator with the certificate `certs/NAME.pem`; returns the process and its URL.
 pub(crate) fn serve(scratch: &Scratch, name: &str) -> (Owned, String) {
     let mut command = osteon();
     command.args(["coordinator", "--listen", "127.0.0.1:0"]).args(door(scratch, name));
@@ -102,7 +102,7 @@ pub(crate) fn serve(scratch: &Scratch, name: &str) -> (Owned, String) {
     (process, url)
 }
 
-/// Whom a certificate that `osteon certs` does not make is for.
+/// Holder of a certificate that `osteon certs` cannot make.
 #[derive(Clone, Copy)]
 pub(crate) enum Made {
     /// A worker.

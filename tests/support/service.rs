@@ -1,5 +1,5 @@
-//! A coordinator that can be killed and started again on the same directory and port, with
-//! workers, and what their logs tell.
+//! A coordinator that can be killed and restarted on the same directory and port, with workers, and
+//! the evaluation of their logs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::support::{Owned, Scratch, eventually, osteon, text};
 pub(crate) struct Service {
     directory: PathBuf,
     log: PathBuf,
-    /// What starts it, before its own command.
+    /// Prefix of the command line that starts it.
     enter: Vec<String>,
     options: Vec<String>,
     url: String,
@@ -19,12 +19,12 @@ pub(crate) struct Service {
 }
 
 impl Service {
-    /// On a free port, with its store and its log in `scratch`.
+    /// Starts it on a free port, with its store and its log in `scratch`.
     pub(crate) fn start(scratch: &Scratch, options: &[&str]) -> Self {
         Self::start_in(scratch, &scratch.path("store"), &[], options)
     }
 
-    /// With its store in `directory`, started by the command `enter` that another one follows.
+    /// Starts it with its store in `directory`, by the command prefix `enter`.
     pub(crate) fn start_in(
         scratch: &Scratch,
         directory: &Path,
@@ -43,11 +43,11 @@ impl Service {
         service
     }
 
-    /// Starts it on the directory and the port it had.
+    /// Restarts it on the same directory and port.
     pub(crate) fn start_again(&mut self) {
         assert!(self.process.is_none(), "it runs");
         let listen = self.url.trim_start_matches("http://").to_owned();
-        // Somebody else's connection may hold the port for a moment.
+        // Another process's connection may occupy the port for a moment.
         eventually("the coordinator starts", || {
             let mut command = match self.enter.split_first() {
                 None => osteon(),
@@ -70,12 +70,12 @@ impl Service {
         });
     }
 
-    /// SIGKILL.
+    /// Sends SIGKILL.
     pub(crate) fn kill(&mut self) {
         self.process.take().unwrap().kill();
     }
 
-    /// SIGTERM, and its orderly end.
+    /// Sends SIGTERM, and waits for a clean shutdown.
     pub(crate) fn end(&mut self) {
         let mut process = self.process.take().unwrap();
         process.signal("TERM");
@@ -90,17 +90,17 @@ impl Service {
         self.process.as_mut().unwrap()
     }
 
-    /// What all its lives have logged.
+    /// Returns the log of all its runs.
     pub(crate) fn log(&self) -> String {
         fs::read_to_string(&self.log).unwrap()
     }
 
-    /// Leases that ended because nothing was heard of their workers.
+    /// Returns the number of leases that ended because their workers were silent.
     pub(crate) fn expirations(&self) -> usize {
         self.log().matches("no message came from this worker").count()
     }
 
-    /// Batches that were taken from lost workers and given to others.
+    /// Returns the number of batches that were reassigned from lost workers.
     pub(crate) fn retries(&self) -> usize {
         let log = self.log();
         let lost = log.lines().filter(|line| line.contains("worker lost"));
@@ -114,14 +114,14 @@ impl Service {
     }
 }
 
-/// A worker with one thread for the coordinator at `url`; it logs to `workers.log`.
+/// Starts a worker with one thread for the coordinator at `url`; it logs to `workers.log`.
 pub(crate) fn worker(scratch: &Scratch, url: &str) -> Owned {
     let mut command = osteon();
     command.args(["worker", "--coordinator", url, "--threads", "1"]).env("RUST_LOG", "info");
     Owned::spawn_logging(&mut command, &scratch.path("workers.log"))
 }
 
-/// The digest of the job in a file, computed without a disturbance in one embedded run.
+/// Returns the digest of the job in a file, computed without a disturbance in one embedded run.
 pub(crate) fn undisturbed(command: &str, job: &Path) -> String {
     let result = crate::support::run(&[command, text(job), "--json"]).json();
     result["digest"].as_str().unwrap().to_owned()

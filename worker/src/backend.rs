@@ -1,4 +1,4 @@
-//! What computes realizations for a worker: its cores, or another computing device.
+//! Interface of a computing device that computes realizations: the processor cores, or another one.
 
 use std::fmt;
 
@@ -7,51 +7,52 @@ use osteon_proto::batch::Work;
 
 use crate::error::PanickedCase;
 
-/// A computing device. Whatever it is, an outcome is a function of the work and the index alone, to
-/// the bit.
+/// A computing device. On every device, an outcome must be a function of the work and the index
+/// alone, to the bit.
 pub(crate) trait Backend: fmt::Debug + Send {
-    /// How many realizations it computes at the same time: the coordinator sizes batches by it.
+    /// Returns how many realizations it computes at the same time; the coordinator sizes batches by
+    /// it.
     fn slots(&self) -> u32;
 
-    /// Begins a batch without waiting for it, and calls `done` once with how it ended, on any
-    /// thread. Batches begin in the order of the calls.
+    /// Starts a batch without waiting for it. Calls `done` once with the result, on any thread.
+    /// Batches start in the order of the calls.
     fn start(&mut self, task: Task, work: Work, done: Done);
 
-    /// Nobody waits for a batch any more, because it has ended or was taken back. One that has not
-    /// ended ends soon, as [`Computed::Abandoned`].
+    /// Releases a batch that is no longer needed, because it has ended or was revoked. One that has
+    /// not ended is interrupted and soon ends as [`Computed::Abandoned`].
     fn forget(&mut self, task: Task);
 }
 
-/// What a backend calls at the end of a batch.
+/// Callback at the end of a batch.
 pub(crate) type Done = Box<dyn FnOnce(Computed) + Send>;
 
-/// One batch of one attachment. Batch numbers are unique for one life of a coordinator only, so
-/// an answer is told from a late one by the number of the attachment.
+/// One batch of one attachment. Batch numbers are unique only within one run of a coordinator, so
+/// the number of the attachment distinguishes a current result from a late one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Task {
-    /// Number of the attachment, grows with every one.
+    /// Number of the attachment, which increases with each attachment.
     pub(crate) attachment: u64,
     /// Number of the batch.
     pub(crate) batch: u64,
 }
 
-/// How the computation of a batch ended.
+/// Result of the computation of a batch.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Computed {
-    /// All realizations, in index order.
+    /// All realizations are computed, in index order.
     Complete {
         /// The realizations.
         solved: Vec<Solved>,
-        /// Wall time, s.
+        /// Wall time of the computation, s.
         elapsed_s: f64,
     },
-    /// Given up before its end, as was asked for.
+    /// The computation was interrupted because the batch was released.
     Abandoned,
     /// The computation panicked.
     Panicked {
-        /// On this realization.
+        /// The realization at which it panicked.
         case: Box<PanickedCase>,
-        /// With this message.
+        /// The panic's message.
         message: String,
     },
 }

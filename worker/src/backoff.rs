@@ -1,29 +1,29 @@
-//! How long to wait before the next attempt to reach the coordinator.
+//! Waiting times between attempts to reach the coordinator.
 
 use std::time::Duration;
 
 use osteon_proto::identity::random_number;
 
-/// Wait after the first failure, ms, before jitter.
+/// Wait after the first failure before jitter, ms.
 const FIRST_MS: u64 = 100;
-/// Longest wait, ms, before jitter.
+/// Longest wait before jitter, ms.
 const LONGEST_MS: u64 = 5000;
 
-/// Exponential backoff: each wait is twice the one before, up to a bound, and shortened by up to
-/// half at random so that the workers of a cluster do not come back all at once.
+/// Exponential backoff: each wait is twice the previous one, up to a limit, and shortened at random
+/// by up to half, so that the workers of a cluster do not reconnect all at once.
 #[derive(Debug, Default)]
 pub(crate) struct Backoff {
     failures: u32,
 }
 
 impl Backoff {
-    /// The next wait.
+    /// Returns the next wait.
     pub(crate) fn next(&mut self) -> Duration {
-        // Without random numbers the wait is only shorter.
+        // Without random numbers the wait is merely shorter.
         self.next_with(random_number().unwrap_or_default())
     }
 
-    /// Begins again with the shortest wait.
+    /// Resets to the shortest wait.
     pub(crate) fn reset(&mut self) {
         self.failures = 0;
     }

@@ -1,9 +1,10 @@
-//! The cores of this worker as a [`Backend`].
+//! The processor cores of this worker as a [`Backend`].
 //!
 //! Realization i of a batch is drawn by [`Ensemble`] from (point, germs, i), and solved by
-//! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or what was
-//! computed before. A drawn tensor that is not positive definite in floating point, or a point
-//! from which nothing can be drawn, is the failure `not_finite` of each realization concerned.
+//! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or earlier
+//! computations. If a drawn tensor is not positive definite in floating point, or if no realization
+//! can be drawn at the point, the outcome of each realization concerned is the failure
+//! `not_finite`.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
@@ -22,8 +23,9 @@ use rayon::prelude::*;
 use crate::backend::{Backend, Computed, Done, Task};
 use crate::error::{PanickedCase, WorkerError};
 
-/// Most solvers, each with up to 20 MB of tables, that a worker keeps. Where the jobs that take turns
-/// have more setups than that, tables are made again, which is a small part of a batch's time.
+/// Maximum number of solvers that a worker keeps, each with up to 20 MB of tables. If the jobs that
+/// take turns have more setups than that, tables are rebuilt, which takes a small part of a batch's
+/// time.
 const SOLVERS_MAX: usize = 2;
 
 thread_local! {
@@ -31,16 +33,16 @@ thread_local! {
     static WORKSPACE: RefCell<Workspace> = RefCell::new(Workspace::default());
 }
 
-/// The cores of a worker.
+/// The processor cores of a worker.
 #[derive(Debug)]
 pub(crate) struct Cores {
     pool: rayon::ThreadPool,
     solvers: Arc<Solvers>,
-    /// Batches that somebody waits for, and how to stop them.
+    /// Stop flags of the unfinished batches that are still needed.
     stops: BTreeMap<Task, StopFlag>,
 }
 
-/// Tells a computation to stop; looked at between realizations.
+/// Requests that a computation stop; checked between realizations.
 #[derive(Debug, Clone, Default)]
 struct StopFlag(Arc<AtomicBool>);
 
@@ -56,10 +58,10 @@ impl StopFlag {
 }
 
 impl Cores {
-    /// A pool of `threads` threads that compute on `isa`.
+    /// Creates a pool of `threads` threads that compute on `isa`.
     ///
     /// # Errors
-    /// When the operating system gives none.
+    /// If the operating system cannot create the threads.
     pub(crate) fn new(threads: u32, isa: Isa) -> Result<Self, WorkerError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads as usize)
@@ -72,7 +74,7 @@ impl Cores {
 
 impl Backend for Cores {
     fn slots(&self) -> u32 {
-        // Made from a `u32`.
+        // This cannot fail: the pool was created with a `u32` number of threads.
         u32::try_from(self.pool.current_num_threads()).unwrap_or(u32::MAX)
     }
 
@@ -101,13 +103,13 @@ impl Backend for Cores {
     }
 }
 
-/// Why there is no answer.
+/// Reason why a batch was not completed.
 enum Interrupted {
     Stopped,
     Panicked { case: Box<PanickedCase>, message: String },
 }
 
-/// The realizations in index order.
+/// Computes the realizations of a batch, in index order.
 fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved>, Interrupted> {
     if stop.is_raised() {
         return Err(Interrupted::Stopped);
@@ -154,7 +156,7 @@ fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
     text.unwrap_or("no message").to_owned()
 }
 
-/// The solvers of the last few setups, the one used last in front.
+/// The solvers of the last few setups, the most recently used first.
 #[derive(Debug)]
 struct Solvers {
     isa: Isa,
@@ -166,9 +168,10 @@ impl Solvers {
         Self { isa, kept: Mutex::default() }
     }
 
-    /// The solver of `setup`; made once, even if several batches ask at a time.
+    /// Returns the solver of `setup`, which is created once even if several batches request it at
+    /// the same time.
     fn get(&self, setup: &Setup) -> Arc<Solver> {
-        // A panic while the lock is held leaves the queue as it was: no half-made entry.
+        // A panic while the lock is held leaves no half-finished entry in the queue.
         let mut solvers = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = solvers.iter().position(|solver| solver.setup() == setup);
         let solver = match known.and_then(|position| solvers.remove(position)) {

@@ -1,4 +1,4 @@
-//! Why a worker ends before it is told to.
+//! Errors that end a worker.
 
 use std::fmt;
 
@@ -11,82 +11,83 @@ use osteon_proto::tls_failure::TlsFailure;
 use thiserror::Error;
 use tonic::Code;
 
-/// Why a worker ends before it is told to.
+/// An error that ends a worker.
 #[derive(Debug, Error)]
 pub enum WorkerError {
-    /// The number of threads is not allowed.
+    /// The number of threads is out of range.
     #[error("a worker cannot have {threads} threads; give 1 to {max}")]
     Threads {
-        /// What was asked for.
+        /// Number of threads requested.
         threads: u32,
-        /// Most threads of a worker.
+        /// Maximum number of threads of a worker.
         max: u32,
     },
-    /// The operating system gives no threads.
+    /// The operating system cannot create the threads.
     #[error("cannot start {threads} threads: {source}")]
     Pool {
-        /// What was asked for.
+        /// Number of threads requested.
         threads: u32,
         /// The thread pool's error.
         source: rayon::ThreadPoolBuildError,
     },
-    /// Nothing would tell it from other workers.
+    /// The operating system provides no random numbers, so the worker has no unique instance
+    /// number.
     #[error(transparent)]
     NoRandomness(#[from] NoRandomness),
-    /// The coordinator does not take this worker; trying again would change nothing.
+    /// The coordinator refused this worker; trying again would change nothing.
     #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
     Refused {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// The status.
+        /// The gRPC status code.
         code: Code,
-        /// What the coordinator says.
+        /// The coordinator's explanation.
         reason: String,
     },
-    /// There is no trust between coordinator and worker.
+    /// Coordinator and worker do not trust each other's certificates, or cannot establish TLS.
     #[error("no trust between this worker and the coordinator at {endpoint}: {failure}")]
     Distrust {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// Why.
+        /// The TLS failure.
         failure: TlsFailure,
     },
-    /// No coordinator for longer than was asked for.
+    /// No coordinator was reached within the allowed time.
     #[error("gave up after {seconds} s without the coordinator at {endpoint}; last: {last}")]
     GaveUp {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// Seconds without it.
+        /// Time without a coordinator, s.
         seconds: f64,
-        /// What the last attempt met.
+        /// Error of the last attempt.
         last: String,
     },
-    /// A batch that cannot be read; guessing would give wrong numbers.
+    /// A batch cannot be read; a guess could give wrong numbers.
     #[error("the coordinator at {endpoint} sent a batch that cannot be read: {source}")]
     Malformed {
-        /// Address of the coordinator.
+        /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// What is wrong with it.
+        /// The defect of the batch.
         source: Malformed,
     },
-    /// The solver panicked: a mistake in the program, never an outcome.
+    /// The solver panicked: a bug in the program, never an outcome.
     #[error(
         "the solver panicked ({message}) on {case}; this is a mistake in osteon, please report it with this line"
     )]
     Panicked {
-        /// The realization.
+        /// The realization at which it panicked.
         case: Box<PanickedCase>,
         /// The panic's message.
         message: String,
     },
 }
 
-/// What is needed to reproduce a realization.
+/// The data needed to reproduce a realization.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PanickedCase {
     /// Index of the realization.
     pub index: u64,
-    /// Where the germs come from.
+    /// Source of the germs.
     pub germs: GermSource,
     /// The point (a, δ).
     pub point: Point,

@@ -1,12 +1,14 @@
-//! Attaches to an osteon coordinator, runs batches of realizations on its cores, answers.
+//! Attaches to an osteon coordinator, runs batches of realizations on its cores, and returns the
+//! outcomes.
 //!
-//! - `state`: what the worker knows, and what it does on each event; no clock, no socket, no await;
-//! - `backend`: what computes a batch, as the two others see it;
-//! - `compute`: the backend that there is, the cores; never on the async runtime;
-//! - `run`: the one async file, which moves bytes between the two and the coordinator.
+//! - `state`: state machine of the worker, with its reaction to each event; no clock, no socket, no
+//!   await;
+//! - `backend`: the interface of a computing device, as `state` and `run` see it;
+//! - `compute`: the only backend, the processor cores; it never runs on the async runtime;
+//! - `run`: the only async file, which moves bytes between state, backend and coordinator.
 //!
-//! A worker holds nothing that is worth keeping: when it dies its batches are computed elsewhere,
-//! to the same bits.
+//! A worker holds nothing worth keeping: if it dies, its batches are computed elsewhere, to the
+//! same bits.
 
 mod backend;
 mod backoff;

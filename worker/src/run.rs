@@ -1,4 +1,5 @@
-//! The one async file of the worker: moves bytes between coordinator, state and backend.
+//! The event loop of the worker and its only async file: moves bytes between coordinator, state and
+//! backend.
 
 use std::future::Future;
 use std::pin::{Pin, pin};
@@ -24,36 +25,38 @@ use crate::compute::Cores;
 use crate::error::WorkerError;
 use crate::state::{BATCHES_HELD_MAX, Detached, Effect, Event, Failure, Identity, State};
 
-/// Longest wait for a connection and for the answer to hello, s.
+/// Longest wait for a connection, and for the answer to the hello, s.
 const ATTACH_S_MAX: u64 = 10;
-/// How often the state looks at the time, ms.
+/// Interval of the ticks, ms.
 const TICK_MS: u64 = 100;
-/// Most messages that wait to be sent: an answer to every batch, and heartbeats between.
+/// Maximum number of messages waiting to be sent: an answer to every batch, and heartbeats.
 const OUTBOX_MAX: usize = 2 * BATCHES_HELD_MAX;
 
-/// What a worker is told at its start.
+/// Configuration of a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// Address of the coordinator.
+    /// Returns the address of the coordinator.
     pub endpoint: Endpoint,
-    /// What the worker shows to the coordinator, and whom it believes.
+    /// Certificates and token for the coordinator, and the authorities that are trusted.
     pub credentials: Credentials,
-    /// Threads to compute on, 1 to [`WORKER_THREADS_MAX`].
+    /// Number of threads to compute on, 1 to [`WORKER_THREADS_MAX`].
     pub threads: u32,
-    /// The instruction set to compute on; results do not depend on it.
+    /// Instruction set to compute on; results do not depend on it.
     pub isa: Isa,
-    /// Ends the worker after this long without a coordinator; by default it tries without end.
+    /// Time without a coordinator after which the worker gives up; `None` to retry without limit.
     pub give_up_after: Option<Duration>,
-    /// Drains and ends the worker after this long, e.g. shortly before a batch system would.
+    /// Time after which the worker drains and ends, e.g. shortly before a batch system would kill
+    /// it.
     pub time_limit: Option<Duration>,
 }
 
-/// Serves a coordinator until `shutdown` completes or the time limit is over; then finishes or
-/// hands back what it holds. Losing the coordinator is no error: the worker attaches anew.
+/// Serves a coordinator until `shutdown` completes or the time limit has passed; then finishes or
+/// returns the batches that it holds. Losing the coordinator is not an error: the worker attaches
+/// again.
 ///
 /// # Errors
-/// When the coordinator refuses the worker, is away for longer than allowed, sends what cannot be
-/// read, or the solver panics.
+/// If the coordinator refuses the worker, is away for longer than allowed or sends a batch that
+/// cannot be read, or if the solver panics.
 pub async fn run(
     config: WorkerConfig,
     shutdown: impl Future<Output = ()>,
@@ -71,7 +74,7 @@ pub async fn run(
     run_on(backend, config, shutdown).await
 }
 
-/// As [`run`], on a device that is there already.
+/// Same as [`run`], on a given device.
 async fn run_on(
     backend: Box<dyn Backend>,
     config: WorkerConfig,
@@ -113,20 +116,20 @@ struct Worker {
     finished_sender: mpsc::Sender<(Task, Computed)>,
     finished: mpsc::Receiver<(Task, Computed)>,
     started: Instant,
-    /// The last moment with a lease, or the start.
+    /// Time at which the worker last had a lease, or its start.
     last_attached: Instant,
     ever_attached: bool,
-    /// Whether a call was ever answered, be it with a refusal.
+    /// Whether any call was ever answered, even by a refusal.
     ever_answered: bool,
     endpoint: Endpoint,
     credentials: Credentials,
 }
 
-/// How an attachment ended.
+/// Outcome of an attachment.
 enum End {
-    /// The worker's work is done.
+    /// The worker has left as intended.
     Left,
-    /// Try again.
+    /// The connection was lost, for this reason: retry.
     Lost(String),
 }
 
@@ -160,7 +163,7 @@ impl Worker {
         }
     }
 
-    /// One attachment, from the connection to its end.
+    /// Runs one attachment, from the connection to its end.
     async fn attachment(
         &mut self,
         mut leave: Pin<&mut impl Future<Output = ()>>,
@@ -193,7 +196,7 @@ impl Worker {
                 self.last_attached = Instant::now();
             }
             let event = tokio::select! {
-                // In this order: what is finished is sent before anything else happens.
+                // The order matters: finished batches are sent before anything else is handled.
                 biased;
                 Some((task, computed)) = self.finished.recv() => Event::Computed(task, computed),
                 message = responses.message() => match message {
@@ -230,7 +233,7 @@ impl Worker {
         }
     }
 
-    /// Lets the state react to `event` and carries out what it wants.
+    /// Passes `event` to the state and carries out its effects.
     fn apply(
         &mut self,
         event: Event,
@@ -252,7 +255,7 @@ impl Worker {
                 Effect::Compute(task, work) => {
                     let sender = self.finished_sender.clone();
                     let done = move |computed| {
-                        // Fails only when the worker has ended and nobody waits.
+                        // Fails only if the worker has ended; the result is then not needed.
                         drop(sender.blocking_send((task, computed)));
                     };
                     self.backend.start(task, *work, Box::new(done));
@@ -266,9 +269,9 @@ impl Worker {
         Ok(end)
     }
 
-    /// What a status means: a refusal is final, everything else is a loss.
+    /// Interprets a status: some codes are a final refusal, all others a lost connection.
     fn ended_with(&mut self, status: &Status) -> Result<End, WorkerError> {
-        // Only an error of the transport has a source.
+        // Only errors of the transport have a source, so one without was sent by a coordinator.
         self.ever_answered |= std::error::Error::source(status).is_none();
         if let Some(failure) = TlsFailure::of(status) {
             return self.distrusted(failure);
@@ -287,8 +290,8 @@ impl Worker {
         }
     }
 
-    /// A worker that was taken before waits for certificates to be put right; one that never was
-    /// has the wrong ones.
+    /// Handles a TLS failure. A worker that was attached before waits until the certificates are
+    /// repaired; one that never was has the wrong ones and ends.
     fn distrusted(&self, failure: TlsFailure) -> Result<End, WorkerError> {
         let endpoint = self.endpoint.clone();
         if self.ever_attached {
@@ -307,14 +310,14 @@ impl Worker {
     }
 }
 
-/// Why there is no stream.
+/// Reason why no stream was opened.
 enum NotOpened {
     Unreachable(String),
     Distrust(TlsFailure),
     Status(Status),
 }
 
-/// Connects and says hello.
+/// Connects and sends the hello.
 async fn open(
     endpoint: &Endpoint,
     credentials: &Credentials,
@@ -329,7 +332,7 @@ async fn open(
         other => NotOpened::Unreachable(other.to_string()),
     })?;
     let unanswered = || NotOpened::Unreachable("the coordinator does not answer".to_owned());
-    // The outbox is empty: the hello always fits.
+    // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
     let mut client = endpoint::workers_client(channel);
     match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
@@ -339,7 +342,8 @@ async fn open(
     }
 }
 
-/// Ends the stream after what was sent has gone: the coordinator closes its side in answer.
+/// Ends the stream after all sent messages have gone out: the coordinator closes its side in
+/// response.
 async fn close(outbox: mpsc::Sender<AttachRequest>, responses: &mut Streaming<AttachResponse>) {
     drop(outbox);
     let drained = async { while let Ok(Some(_)) = responses.message().await {} };
@@ -354,7 +358,7 @@ fn detached(why: Detached) -> &'static str {
     }
 }
 
-/// Name of this host, for people.
+/// Returns the name of this host, for display only.
 fn host_name() -> String {
     let name = identity::host_name().unwrap_or_else(|| "unknown".to_owned());
     name.chars().take(NAME_BYTES_MAX / 4).collect()

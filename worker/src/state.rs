@@ -1,6 +1,6 @@
-//! What a worker knows, and what it does on each event.
+//! State of a worker, and its reaction to each event.
 //!
-//! Time is handed in as the span since the worker started; nothing here waits or reads a clock.
+//! Times are passed in as the time since the worker started; nothing here waits or reads a clock.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -15,27 +15,29 @@ use osteon_proto::v1::attach_response::Message as Response;
 use crate::backend::{Computed, Task};
 use crate::error::PanickedCase;
 
-/// Most batches that a worker holds; a coordinator that sends more has lost count.
+/// Maximum number of batches that a worker holds; a coordinator that sends more is faulty.
 pub(crate) const BATCHES_HELD_MAX: usize = 1024;
-/// Longest wait for the batches in hand after the wish to leave; then they go back with the lease.
+/// Longest time to finish the held batches while draining, s. After it, the worker leaves and the
+/// coordinator reassigns them.
 pub(crate) const DRAIN_S_MAX: f64 = 10.0;
-/// Bounds of the spans a coordinator may ask for, s.
+/// Limits of the intervals that a coordinator may set, s.
 const SPAN_S: (f64, f64) = (0.01, 3600.0);
 
-/// Who this worker is.
+/// Identity of this worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Identity {
-    /// Realizations that it computes at the same time.
+    /// Number of realizations that it computes at the same time.
     pub(crate) slots: u32,
-    /// Host name, for people.
+    /// Host name, for display only.
     pub(crate) host: String,
-    /// Process id, for people.
+    /// Process id, for display only.
     pub(crate) process: u32,
-    /// Tells this process from one with the same host name and process id, in another container.
+    /// Random number that distinguishes this process from one with the same host name and process
+    /// id in another container.
     pub(crate) instance: u64,
 }
 
-/// Everything that can happen to a worker.
+/// All events that a worker reacts to.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Event {
     /// The coordinator sent a message.
@@ -44,50 +46,50 @@ pub(crate) enum Event {
     Computed(Task, Computed),
     /// The stream of the attachment ended.
     Lost,
-    /// The worker shall leave, as its user wants.
+    /// The worker must drain: its user asked it to, or its time limit has passed.
     Drain,
-    /// Time has passed.
+    /// Time has passed; sent at regular intervals.
     Tick,
 }
 
-/// What is to be done about it.
+/// An action that the event loop must carry out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Effect {
-    /// Send to the coordinator.
+    /// Send this message to the coordinator.
     Send(Request),
-    /// Begin a computation.
+    /// Start a computation.
     Compute(Task, Box<Work>),
     /// Stop a computation.
     Abandon(Task),
-    /// Close the stream and attach anew.
+    /// Close the stream and attach again.
     Detach(Detached),
-    /// End: nothing is left to do.
+    /// End the worker: nothing is left to do.
     Leave,
-    /// End: something is wrong with the program.
+    /// End the worker with an error: a batch is malformed, or the solver panicked.
     Fail(Failure),
 }
 
-/// Why the worker closes a stream by itself.
+/// Reason why the worker closes a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Detached {
     /// The coordinator was silent for too long.
     Silence,
-    /// More batches than [`BATCHES_HELD_MAX`], or one number twice.
+    /// The coordinator sent more than [`BATCHES_HELD_MAX`] batches, or a batch number twice.
     Overrun,
-    /// A message that may not come at this time.
+    /// The coordinator sent a message that is not allowed in this state.
     Protocol,
 }
 
-/// What no new attempt would mend.
+/// An error that attaching again would not cure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Failure {
-    /// A batch that cannot be read.
+    /// The coordinator sent a batch that cannot be read.
     Malformed(Malformed),
     /// The solver panicked.
     Panicked {
-        /// On this realization.
+        /// The realization at which it panicked.
         case: Box<PanickedCase>,
-        /// With this message.
+        /// The panic's message.
         message: String,
     },
 }
@@ -97,18 +99,18 @@ pub(crate) enum Failure {
 pub(crate) struct State {
     identity: Identity,
     attachments: u64,
-    /// The number that the coordinator gave it last.
+    /// The number most recently assigned by the coordinator.
     number: u64,
     link: Link,
     held: BTreeSet<u64>,
-    /// When the wish to leave came.
+    /// Time at which draining began.
     draining_since: Option<Duration>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Link {
     Down,
-    /// Hello is sent, welcome has not come.
+    /// The hello has been sent, the welcome has not arrived.
     Greeting,
     Attached {
         heartbeat: Duration,
@@ -119,7 +121,7 @@ enum Link {
 }
 
 impl State {
-    /// A worker without a coordinator.
+    /// Creates a worker without a coordinator.
     pub(crate) fn new(identity: Identity) -> Self {
         Self {
             identity,
@@ -131,14 +133,14 @@ impl State {
         }
     }
 
-    /// Begins an attachment: the first message to send.
+    /// Begins an attachment. Returns the first message to send.
     pub(crate) fn attach(&mut self) -> Request {
         self.attachments += 1;
         self.link = Link::Greeting;
         Request::Hello(v1::WorkerHello {
             version: version::VERSION.to_owned(),
             fingerprint: version::fingerprint(),
-            // The field is named for the one kind of slots that there was at first.
+            // The field has this name because threads were at first the only kind of slots.
             threads: self.identity.slots,
             host: self.identity.host.clone(),
             process: self.identity.process,
@@ -146,22 +148,22 @@ impl State {
         })
     }
 
-    /// Whether the coordinator has taken this worker.
+    /// Returns whether the coordinator has accepted this worker.
     pub(crate) fn is_attached(&self) -> bool {
         matches!(self.link, Link::Attached { .. })
     }
 
-    /// The number that the coordinator has given it, by which its log names it.
+    /// Returns the number assigned by the coordinator, which identifies this worker in its log.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Whether it leaves when it has answered what it holds.
+    /// Returns whether the worker leaves once its held batches are answered.
     pub(crate) fn is_draining(&self) -> bool {
         self.draining_since.is_some()
     }
 
-    /// What to do about `event`, which happens at `now`.
+    /// Returns the effects of `event`, which happens at `now`.
     pub(crate) fn react(&mut self, now: Duration, event: Event) -> Vec<Effect> {
         let mut effects = match event {
             Event::Message(message) => self.on_message(now, *message),
@@ -207,7 +209,7 @@ impl State {
     fn on_welcome(&mut self, now: Duration, welcome: &v1::WorkerWelcome) -> Vec<Effect> {
         self.number = welcome.worker;
         let span = |seconds: f64| {
-            // A NaN becomes the lower bound.
+            // `max` turns a NaN into the lower limit.
             Duration::from_secs_f64(seconds.max(SPAN_S.0).min(SPAN_S.1))
         };
         self.link = Link::Attached {
@@ -238,7 +240,7 @@ impl State {
             return vec![Effect::Fail(Failure::Panicked { case, message })];
         }
         if task.attachment != self.attachments || !self.held.contains(&task.batch) {
-            // Revoked, or of a lease that is over: nobody waits for it.
+            // The batch was revoked, or its lease has ended: the result is not needed.
             return Vec::new();
         }
         let Computed::Complete { solved, elapsed_s } = computed else { return Vec::new() };
@@ -282,7 +284,7 @@ impl State {
             {
                 vec![Effect::Detach(Detached::Silence)]
             }
-            // Half of what was asked for leaves room for a late tick.
+            // Half the requested interval leaves room for a late tick.
             Link::Attached { heartbeat, last_sent, .. }
                 if now.saturating_sub(last_sent) >= heartbeat / 2 =>
             {

@@ -1,16 +1,16 @@
-//! The storm of kills of `tests/chaos`, as long as one likes.
+//! `cargo xtask` command that runs the storm of kills of `tests/chaos` for any number of kills.
 
 use anyhow::{Context as _, Result, bail};
 
 use crate::{cargo, cargo_command};
 
 const USAGE: &str = "usage: cargo xtask chaos [--kills N] [--seed S]";
-/// Kills of the coordinator, and as many of workers.
+/// Default number of kills of the coordinator, and of workers.
 const KILLS: u64 = 200;
-/// The test.
+/// Name of the test.
 const STORM: &str = "kills::killed_and_stopped_again_and_again_every_job_ends_with_its_digest";
 
-/// Runs the storm with the kills and the seed of `words`.
+/// Runs the storm with the number of kills and the seed in `words`.
 pub(crate) fn storm(words: &[String]) -> Result<()> {
     let (mut kills, mut seed) = (KILLS, 1);
     let mut words = words.iter();

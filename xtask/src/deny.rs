@@ -1,5 +1,5 @@
-//! Checks the crates that osteon is built from by cargo-deny: licences, versions, sources and, where
-//! the database of advisories can be had, known faults. The rules stand in `deny.toml`.
+//! Checks the crates that osteon is built from with cargo-deny: licences, versions, sources and, if
+//! the advisory database can be fetched, known vulnerabilities. The rules are in `deny.toml`.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -10,11 +10,11 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::{announce, cargo, cargo_command, programs, root};
 
-/// The version of cargo-deny that the rules are written for.
+/// The version of cargo-deny for which the rules are written.
 const VERSION: &str = "0.20.2";
-/// Longest wait for the database of advisories.
+/// Longest wait for the advisory database.
 const FETCH_MAX: Duration = Duration::from_secs(60);
-/// Time between two looks at the process that fetches it.
+/// Interval at which the fetching process is polled.
 const POLL: Duration = Duration::from_millis(100);
 
 /// `cargo xtask deny`.
@@ -36,7 +36,7 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Where cargo-deny is, which is installed below the target directory at the first call.
+/// Returns the path of cargo-deny, which is installed below the target directory at the first call.
 fn program() -> Result<PathBuf> {
     let tools = programs()?.with_file_name("tools");
     let program = tools.join("bin/cargo-deny");
@@ -52,7 +52,7 @@ fn program() -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Whether the database of advisories could be fetched in time.
+/// Returns whether the advisory database could be fetched in time.
 fn is_fetched(command: &mut Command) -> Result<bool> {
     announce(command);
     let mut child =

@@ -1,4 +1,5 @@
-//! The digest of a batch: the same on every instruction set of this machine, in every build.
+//! Checks that the digest of a batch is the same on every instruction set of this machine, in every
+//! build.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
@@ -18,7 +19,7 @@ const AARCH64: &str = "aarch64-unknown-linux-gnu";
 struct Build {
     name: &'static str,
     arguments: &'static [&'static str],
-    /// For the compiler, in place of the user's own; such a build has a directory of its own.
+    /// Compiler flags that replace the user's own; such a build has its own target directory.
     flags: Option<&'static str>,
 }
 
@@ -32,8 +33,8 @@ const BUILDS: [Build; 3] = [
     },
 ];
 
-/// Prints the digests of every build, and fails unless each batch has one only; `words` go to the
-/// study, e.g. `--realizations 100`.
+/// Prints the digests of every build, and fails unless each batch has only one; `words` are passed
+/// to the study, e.g. `--realizations 100`.
 pub(crate) fn compare(words: &[String]) -> Result<()> {
     let mut batches: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for build in BUILDS {
@@ -64,7 +65,8 @@ pub(crate) fn compare(words: &[String]) -> Result<()> {
     check_aarch64()
 }
 
-/// Batch and digest of each row of a table whose columns end in instruction set and digest.
+/// Returns batch and digest of each row of a table whose last columns are instruction set and
+/// digest.
 fn digests(text: &str) -> Vec<(String, String)> {
     let rows = text.lines().filter_map(|line| {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
@@ -77,7 +79,7 @@ fn digests(text: &str) -> Vec<(String, String)> {
     rows.collect()
 }
 
-/// Type-checks the solver for AArch64, where the target is installed.
+/// Type-checks the solver for AArch64, if the target is installed.
 fn check_aarch64() -> Result<()> {
     let listed = Command::new("rustup").args(["target", "list", "--installed"]).output();
     let installed = listed.is_ok_and(|output| {

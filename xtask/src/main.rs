@@ -1,4 +1,4 @@
-//! Every developer command in one place: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
+//! All developer commands: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
 mod chaos;
 mod deny;
@@ -17,11 +17,11 @@ use anyhow::{Context as _, Result, bail};
 /// A cargo invocation.
 type Cargo = &'static [&'static str];
 
-/// What a command does.
+/// Action of a command.
 enum Action {
     /// Runs cargo.
     Cargo(&'static [Cargo]),
-    /// Runs a function, which may take more words.
+    /// Runs a function, which may take further words.
     Function(fn(&[String]) -> Result<()>),
     /// Runs other commands, by name.
     Commands(&'static [&'static str]),
@@ -40,7 +40,7 @@ const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon", "--bench", "dispatch"],
 ];
 
-/// Name, what it does, and how.
+/// Name, description and action.
 const TASKS: &[(&str, &str, Action)] = &[
     ("format", "format the code", Action::Cargo(&[&["fmt", "--all"]])),
     (
@@ -105,7 +105,7 @@ fn run() -> Result<()> {
     perform(name, words)
 }
 
-/// What is wrong with form, code or documentation, without running any of it.
+/// Checks formatting, code and documentation, without running any of it.
 fn lint(words: &[String]) -> Result<()> {
     if !words.is_empty() {
         bail!("usage: cargo xtask lint");
@@ -116,7 +116,7 @@ fn lint(words: &[String]) -> Result<()> {
     cargo(cargo_command(DOCS).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Does what the command `name` does.
+/// Executes the command `name`.
 fn perform(name: &str, words: &[String]) -> Result<()> {
     let action = TASKS.iter().find(|(task, _, _)| *task == name).map(|(_, _, action)| action);
     match (action, words) {
@@ -133,14 +133,14 @@ fn list() -> String {
     TASKS.iter().map(|(name, what, _)| format!("  {name:8} {what}\n")).collect()
 }
 
-/// Cargo with these arguments, at the root of the workspace.
+/// Creates a cargo command with these arguments, at the root of the workspace.
 fn cargo_command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO"));
     command.args(arguments).current_dir(root());
     command
 }
 
-/// Runs a program, and fails if it does.
+/// Runs a program, and fails if it fails.
 fn cargo(command: &mut Command) -> Result<()> {
     announce(command);
     let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
@@ -150,7 +150,7 @@ fn cargo(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// What it prints.
+/// Runs a program and returns its output.
 fn output(command: &mut Command) -> Result<String> {
     announce(command);
     let output = command
@@ -168,18 +168,19 @@ fn announce(command: &Command) {
     eprintln!("+ {} {}", command.get_program().to_string_lossy(), words.join(" "));
 }
 
-/// A line on stdout.
+/// Prints a line on stdout.
 fn say(text: &str) -> Result<()> {
     writeln!(io::stdout(), "{text}").context("cannot write to stdout")
 }
 
-/// The directory where cargo puts programs, this one among them; the target directory is above.
+/// Returns the directory where cargo puts programs, including this one; its parent is the target
+/// directory.
 fn programs() -> Result<PathBuf> {
     let here = env::current_exe().context("cannot tell where xtask is")?;
     Ok(here.parent().context("xtask has no directory")?.to_owned())
 }
 
-/// The root of the workspace.
+/// Returns the root of the workspace.
 fn root() -> &'static Path {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here)

@@ -1,4 +1,5 @@
-//! The gRPC API from outside: a client in Python, which `tests/python/run.py` makes and tests.
+//! Tests of the gRPC API with an external Python client, generated and run by
+//! `tests/python/run.py`.
 
 use std::env;
 use std::ffi::OsString;
@@ -8,8 +9,8 @@ use anyhow::{Context as _, Result};
 
 use crate::{cargo, cargo_command, programs, root};
 
-/// Builds the program and runs the tests of `tests/python`, or those in `words`. The Python is
-/// `python3`, or what the variable `PYTHON` names; without one this fails.
+/// Builds the program and runs the tests of `tests/python`, or those in `words`. Uses `python3`, or
+/// the interpreter named by the variable `PYTHON`; fails if there is none.
 pub(crate) fn test(words: &[String]) -> Result<()> {
     cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
     let programs = programs()?;

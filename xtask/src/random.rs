@@ -1,4 +1,4 @@
-//! The tests of properties, on new random cases for as long as one likes.
+//! Runs the property tests on new random cases for any length of time.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -7,26 +7,26 @@ use anyhow::{Context as _, Result, bail};
 use crate::{cargo, cargo_command, say};
 
 const USAGE: &str = "usage: cargo xtask random [--minutes M] [--seed S]";
-/// How long it goes on, minutes.
+/// Default duration, minutes.
 const MINUTES: u64 = 10;
-/// All of them, by the name that `properties!` of `osteon-fuzz` gives them.
+/// Selects all property tests, by the name that `properties!` of `osteon-fuzz` gives them.
 const TESTS: [&str; 5] = ["test", "--workspace", "--tests", "--", "on_random_cases"];
-/// The variable that gives them their seed.
+/// The environment variable that sets their seed.
 const SEED_VARIABLE: &str = "OSTEON_TEST_SEED";
 
-/// What `words` ask for.
+/// The request in `words`.
 #[derive(Debug, PartialEq)]
 struct Request {
     duration: Duration,
-    /// Of the first round; the next ones count up.
+    /// Seed of the first round; later rounds count up from it.
     seed: Option<u64>,
 }
 
-/// Runs rounds, each with its own seed, until the time of `words` is up or one fails.
+/// Runs rounds, each with its own seed, until the time in `words` has passed or one fails.
 pub(crate) fn rounds(words: &[String]) -> Result<()> {
     let Request { duration, seed } = request(words)?;
     let mut seed = seed.unwrap_or_else(fresh_seed);
-    // Building takes none of the time.
+    // Building is not included in the time.
     cargo(&mut cargo_command(&["test", "--workspace", "--tests", "--no-run"]))?;
     let begin = Instant::now();
     let mut round = 1;
@@ -56,14 +56,14 @@ fn request(words: &[String]) -> Result<Request> {
     Ok(Request { duration: Duration::from_secs(minutes.saturating_mul(60)), seed })
 }
 
-/// One that was not there before: from the clock.
+/// Returns a new seed, made from the clock.
 fn fresh_seed() -> u64 {
     let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    // Rounds count up by one: those of two runs have seconds between them.
+    // Rounds count up by one, while the seeds of two runs are seconds apart.
     time.as_secs() << 20
 }
 
-/// What repeats a round.
+/// Returns the command that repeats a round.
 fn command(seed: u64) -> String {
     format!("{SEED_VARIABLE}={seed} cargo {}", TESTS.join(" "))
 }

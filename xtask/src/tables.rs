@@ -1,6 +1,7 @@
-//! Makes the tables of docs/validation.md again.
+//! Regenerates the tables of docs/validation.md.
 //!
-//! A table stands between two comments, of which the first has the arguments of `osteon-study` that make it:
+//! A table is placed between two comments, of which the first contains the arguments of
+//! `osteon-study` that produce it:
 //!
 //! ```text
 //! <!-- table: failures --realizations 100000 -->
@@ -19,8 +20,8 @@ const START: &str = "<!-- table: ";
 const START_END: &str = " -->\n";
 const END: &str = "<!-- end -->";
 
-/// Replaces the tables made by the studies `named`; without names, all. The page is written after
-/// each, so that nothing is lost when a long one is interrupted.
+/// Replaces the tables made by the studies `named`, or all if none is named. The page is written
+/// after each table, so that nothing is lost if a long one is interrupted.
 pub(crate) fn rewrite(named: &[String]) -> Result<()> {
     let path = root().join(PAGE);
     let read = || fs::read_to_string(&path).with_context(|| format!("cannot read {PAGE}"));
@@ -42,7 +43,7 @@ pub(crate) fn rewrite(named: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The commands of all tables of a page.
+/// Returns the commands of all tables of a page.
 fn commands(page: &str) -> Result<Vec<String>> {
     let blocks = page.split(START).skip(1);
     blocks
@@ -53,7 +54,7 @@ fn commands(page: &str) -> Result<Vec<String>> {
         .collect()
 }
 
-/// The page with another table by `command`.
+/// Returns the page with the table of `command` replaced.
 fn replaced(page: &str, command: &str, table: &str) -> Result<String> {
     let start = format!("{START}{command}{START_END}");
     let split = page.split_once(&start).and_then(|(before, rest)| {

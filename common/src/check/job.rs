@@ -30,29 +30,29 @@ pub(crate) const SCRAMBLES: WholeRange = WholeRange::new(1, limits::SCRAMBLES_MA
 pub(crate) const EVALUATIONS: WholeRange = WholeRange::new(1, limits::EVALUATIONS_MAX);
 /// Range of `search.starts`.
 pub(crate) const STARTS: WholeRange = WholeRange::new(1, limits::STARTS_MAX);
-/// What a measured velocity accepts.
+/// Accepted values of a measured velocity.
 pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");
-/// What the data's coefficient of variation accepts.
+/// Accepted values of the data's coefficient of variation.
 const VARIATION: Interval = Interval::above(0.0, "");
 const MOMENTS_NEED: &str = "a coefficient of variation above 0 needs";
-/// Fewest velocities that have a coefficient of variation.
+/// Minimum number of velocities that have a coefficient of variation.
 pub(crate) const VELOCITIES_MIN: usize = 2;
-/// How `[data]` may be given.
+/// The forms in which `[data]` may be given.
 pub(crate) const DATA_FORMS: &str =
     "give either velocities, or groups, or mean and coefficient_of_variation";
 
-/// Most velocities that are refused one by one.
+/// Maximum number of velocities that are refused individually.
 const REFUSED_MAX: usize = 10;
 
-/// Records everything that is wrong with `specification`.
+/// Records all violations of `specification`.
 ///
-/// What `violations` already holds about a field is not said again, so that a front end can
-/// first record what it could not read at all.
+/// Fields that already have an entry in `violations` are not reported again, so that a front end
+/// can first record the fields that it could not read at all.
 pub fn job(specification: &JobSpecification, violations: &mut Violations) {
     job_from(specification, None, violations);
 }
 
-/// The same for a job whose measured velocities stand in the file `origin`.
+/// Same as [`job`], for a job whose measured velocities are in the file `origin`.
 pub(crate) fn job_from(
     specification: &JobSpecification,
     origin: Option<&Origin>,
@@ -83,12 +83,12 @@ pub(crate) fn job_from(
     within_reach(specification, violations);
 }
 
-/// The message for an identification without data.
+/// Returns the message for an identification without data.
 pub(crate) fn no_data() -> String {
     format!("is missing; an identification needs it: {DATA_FORMS}")
 }
 
-/// Records everything that is wrong with measured `data`.
+/// Records all violations of measured `data`.
 pub fn data(data: &Data, violations: &mut Violations) {
     data_from(data, None, violations);
 }
@@ -117,7 +117,7 @@ fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut Violations) 
     }
 }
 
-/// The message that refuses what is no velocity of any sound in bone.
+/// Returns the message that refuses a number which cannot be a velocity of sound in bone.
 fn no_velocity(value: f64) -> Option<String> {
     let (from, to) = plausible::VELOCITY.possible();
     plausible::VELOCITY.is_impossible(value).then(|| {
@@ -161,7 +161,7 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
             violations.add(&field, "is the name of two groups");
         }
         match group.no_variation() {
-            // The job is run for the others.
+            // A group that cannot be searched is accepted: the job is run for the others.
             Some(_) if !each_velocity(&field, measured, violations) => {}
             Some(_) => impossible(&field, measured, (origin, set), violations),
             None => velocities(&field, measured, (origin, set), violations),
@@ -175,7 +175,7 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
     }
 }
 
-/// Checks velocities one by one, and how many there are. Whether nothing is wrong with them.
+/// Checks velocities individually, and their number. Returns whether all are valid.
 fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> bool {
     if known_wrong(field, violations) {
         return false;
@@ -198,7 +198,7 @@ fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> 
     !violations.touches(field)
 }
 
-/// Checks the velocities of one set, which has a number in the file that they come from.
+/// Checks the velocities of one set, given its number in the file that they come from.
 fn velocities(
     field: &str,
     measured: &[f64],
@@ -226,7 +226,7 @@ fn velocities(
         return;
     }
     if let Some(moments) = statistics::moments(measured) {
-        // Extreme numbers overflow or vanish when they are squared.
+        // Extreme numbers overflow or underflow when they are squared.
         let variation = moments.coefficient_of_variation;
         if !VARIATION.contains(variation) {
             let message =
@@ -236,7 +236,7 @@ fn velocities(
     }
 }
 
-/// Refuses velocities that are in another unit, all of them or some.
+/// Refuses velocities that are in another unit, either all of them or some.
 fn impossible(
     field: &str,
     measured: &[f64],
@@ -316,7 +316,8 @@ fn bounds(
     }
 }
 
-/// The mean model of the first point is admissible, when each of its constants is by itself.
+/// Checks that the mean model of the first point is admissible, if each of its constants is valid
+/// by itself.
 fn admissible_start(specification: &JobSpecification, violations: &mut Violations) {
     let wrong = |&parameter: &Parameter| {
         let key = match specification.range(parameter) {
@@ -338,7 +339,8 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     }
 }
 
-/// Data that no point within the bounds can come near to, by the closed form of √(c1111/ρ) and δ.
+/// Refuses data that no point within the bounds can approach, by the closed form of √(c1111/ρ) and
+/// δ.
 fn within_reach(specification: &JobSpecification, violations: &mut Violations) {
     let fields = ["data", "parameters", "layers", "probe"];
     if fields.iter().any(|field| known_wrong(field, violations)) {
@@ -399,7 +401,7 @@ fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
     }
 }
 
-/// All searches of a job together.
+/// Checks the number of evaluations of all searches of a job together.
 fn evaluations(specification: &JobSpecification, violations: &mut Violations) {
     let fields = ["search.max_evaluations", "search.starts", "data"];
     if fields.iter().any(|field| known_wrong(field, violations)) {
@@ -419,7 +421,8 @@ fn evaluations(specification: &JobSpecification, violations: &mut Violations) {
     }
 }
 
-/// One velocity has the coefficient of variation 0, which has no logarithm.
+/// Checks that there are two velocities: a single one has the coefficient of variation 0, which has
+/// no logarithm.
 fn enough_for_the_method(specification: &JobSpecification, violations: &mut Violations) {
     let realizations = specification.monte_carlo.realizations;
     if specification.kind == JobKind::Identification
@@ -435,7 +438,7 @@ fn enough_for_the_method(specification: &JobSpecification, violations: &mut Viol
     }
 }
 
-/// What a likelihood needs of the rest of an identification.
+/// Checks the requirements of a likelihood on the rest of an identification.
 fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
     const FIELD: &str = "objective.kind";
     let asked = specification.kind == JobKind::Identification
@@ -504,7 +507,7 @@ fn priors(specification: &JobSpecification, violations: &mut Violations) {
 
 fn search(search: &Search, violations: &mut Violations) {
     whole("search.max_evaluations", search.max_evaluations, EVALUATIONS, violations);
-    // A step of at most half the box fits in from any start, up or down.
+    // A step of at most half the box fits from any start, upwards or downwards.
     whole("search.starts", search.starts, STARTS, violations);
     for (key, value, accepted) in [
         ("cost_tolerance", search.cost_tolerance, Interval::from(0.0, "")),

@@ -16,7 +16,7 @@ use super::{known_wrong, number, quantity, whole};
 pub(crate) const RECEIVERS: WholeRange =
     WholeRange::new(limits::RECEIVERS_MIN as u64, limits::RECEIVERS_MAX as u64);
 
-/// Records everything that is wrong with `setup`.
+/// Records all violations of `setup`.
 pub fn setup(setup: &Setup, violations: &mut Violations) {
     layers(&setup.layers, violations);
     probe(&setup.probe, violations);
@@ -79,7 +79,7 @@ fn probe(probe: &Probe, violations: &mut Violations) {
     whole("probe.receivers.count", receivers.count.into(), RECEIVERS, violations);
 }
 
-/// Source and receivers lie inside fluid 1: 0 < x3 < h1.
+/// Checks that source and receivers lie inside fluid 1: 0 < x3 < h1.
 fn heights(setup: &Setup, violations: &mut Violations) {
     let top = setup.layers.coupling.thickness;
     let accepted = if known_wrong("layers.coupling.thickness", violations) {
@@ -92,8 +92,8 @@ fn heights(setup: &Setup, violations: &mut Violations) {
     quantity("probe.receivers.x3", receivers, accepted, &plausible::HEIGHT, violations);
 }
 
-/// The receivers are not metres away. Only differences count along the bone, so it is the distance
-/// that tells the unit.
+/// Checks that the receivers are not metres away. Along the bone only differences matter, so the
+/// unit is recognized by the distance.
 fn distance(probe: &Probe, violations: &mut Violations) {
     const FIELD: &str = "probe.receivers.first_x1";
     if known_wrong(FIELD, violations) || known_wrong("probe.source.x1", violations) {
@@ -115,7 +115,8 @@ fn distance(probe: &Probe, violations: &mut Violations) {
     }
 }
 
-/// All receivers lie on one side of the source, at a distance, and apart from each other.
+/// Checks that all receivers lie on one side of the source, at a distance, and apart from each
+/// other.
 fn one_side(probe: &Probe, violations: &mut Violations) {
     let receivers = &probe.receivers;
     let fields = ["receivers.first_x1", "receivers.pitch", "receivers.count", "source.x1"];
@@ -141,7 +142,7 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
     }
 }
 
-/// The exact method's sampling of frequencies and wavenumbers stays within its bound.
+/// Checks that the exact method's sampling of frequencies and wavenumbers stays within its limit.
 fn sampling(setup: &Setup, violations: &mut Violations) {
     if setup.solver.method != Method::Exact {
         return;

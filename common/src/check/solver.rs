@@ -15,7 +15,7 @@ pub(crate) const ELEMENT_ORDER: WholeRange =
 /// Keys of `[solver]` that only the hybrid method has.
 pub const HYBRID_KEYS: [&str; 3] = ["element_size", "element_order", "time_step"];
 
-/// The message that refuses one of [`HYBRID_KEYS`] under another method.
+/// Returns the message that refuses one of [`HYBRID_KEYS`] with another method.
 pub fn of_hybrid_only(method: Method) -> String {
     let (given, hybrid) = (method.name(), Method::Hybrid.name());
     format!(
@@ -24,7 +24,7 @@ pub fn of_hybrid_only(method: Method) -> String {
     )
 }
 
-/// Records everything that is wrong with `solver`.
+/// Records all violations of `solver`.
 pub(super) fn solver(solver: &SolverSettings, violations: &mut Violations) {
     let refinement = Interval::from_to(limits::REFINEMENT_MIN, limits::REFINEMENT_MAX, "");
     number("solver.refinement", solver.refinement, refinement, violations);
@@ -45,7 +45,7 @@ fn hybrid(solver: &SolverSettings, violations: &mut Violations) {
     }
 }
 
-/// What belongs to the hybrid method has its default.
+/// Checks that settings of the hybrid method have their defaults with another method.
 fn without_hybrid(solver: &SolverSettings, violations: &mut Violations) {
     let default = SolverSettings::default();
     let given = [

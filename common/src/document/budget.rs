@@ -1,19 +1,19 @@
-//! How much a document may hold: a tree takes many times the memory of the text it is made of.
+//! Limits on the content of a document, because a tree takes many times the memory of its text.
 
 use std::fmt;
 
 use crate::limits::{DOCUMENT_KEYS_MAX, DOCUMENT_VALUES_MAX, TOML_TOKENS_MAX};
 
-/// The bound that a document exceeds.
+/// The limit that a document exceeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Excess {
-    /// Brackets that are open.
+    /// Number of open brackets.
     Nesting,
-    /// Values.
+    /// Number of values.
     Values,
-    /// Keys, tables and lists.
+    /// Number of keys, tables and lists.
     Keys,
-    /// Words, marks, spaces, comments and line ends.
+    /// Number of words, punctuation marks, spaces, comments and line ends.
     Tokens,
 }
 
@@ -38,7 +38,7 @@ impl fmt::Display for Excess {
     }
 }
 
-/// The values, keys, tables and lists that a document may still have.
+/// The number of values, keys, tables and lists that a document may still have.
 #[derive(Debug)]
 pub(super) struct Budget {
     values: usize,
@@ -46,15 +46,15 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// Nothing used.
+    /// Creates the full budget.
     pub(super) fn new() -> Self {
         Self { values: DOCUMENT_VALUES_MAX, keys: DOCUMENT_KEYS_MAX }
     }
 
-    /// One more value.
+    /// Takes one value off the budget.
     ///
     /// # Errors
-    /// When it is one too many.
+    /// If there is no more room.
     pub(super) fn value(&mut self) -> Result<(), Excess> {
         self.values = self.values.checked_sub(1).ok_or(Excess::Values)?;
         Ok(())
@@ -63,7 +63,7 @@ impl Budget {
     /// Takes `count` keys, tables or lists off the budget.
     ///
     /// # Errors
-    /// When they are too many.
+    /// If there is not enough room.
     pub(super) fn keys(&mut self, count: usize) -> Result<(), Excess> {
         self.keys = self.keys.checked_sub(count).ok_or(Excess::Keys)?;
         Ok(())

@@ -1,5 +1,5 @@
-//! JSON text to a tree. Unlike `serde_json::Value`, it refuses a key that is given twice, and a text
-//! that holds more than a file needs.
+//! Parses JSON text into a tree. Unlike `serde_json::Value`, it refuses duplicate keys, and a text
+//! with more content than a file needs.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -9,7 +9,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 use super::budget::Budget;
 use super::node::{Format, Malformed, Node, Value, quoted};
 
-/// The tree of a JSON text.
+/// Parses a JSON text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
     let mut deserializer = serde_json::Deserializer::from_str(text);
     let root = Tree { budget: &mut Budget::new() }.deserialize(&mut deserializer);

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::visible;
 
-/// How a file is written.
+/// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// TOML 1.
@@ -17,7 +17,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that the extension of `path` stands for; `None` if it is neither `toml` nor
+    /// Returns the format that the extension of `path` denotes; `None` if it is neither `toml` nor
     /// `json`.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?;
@@ -30,7 +30,7 @@ impl Format {
         }
     }
 
-    /// Name in messages.
+    /// Returns the name for messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Toml => "TOML",
@@ -39,30 +39,30 @@ impl Format {
     }
 }
 
-/// A text that is not of its format.
+/// Syntax error of a text.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
 pub struct Malformed {
-    /// The format it should have.
+    /// The expected format.
     pub format: Format,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What the parser says.
+    /// The parser's message.
     pub message: String,
 }
 
-/// A value with the line it stands on (for a table's entry: the line of its key).
+/// A value with its line number (for a table's entry: the line of its key).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Node {
-    /// Line, from 1, where the format tells.
+    /// Line, from 1, if the format provides it.
     pub(crate) line: Option<usize>,
     /// The value.
     pub(crate) value: Value,
 }
 
-/// What can stand in a file.
+/// The values that a file may contain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Value {
     /// JSON's null.
@@ -84,9 +84,10 @@ pub(crate) enum Value {
 }
 
 impl Node {
-    /// Line of the field with this path, or else of the innermost table around it that has one.
+    /// Returns the line of the field with this path, or else of the innermost table around it that
+    /// has one.
     ///
-    /// Paths are those of [`entry_path`] and [`element_path`].
+    /// Paths have the form of [`entry_path`] and [`element_path`].
     pub(crate) fn line_of(&self, path: &str) -> Option<usize> {
         let mut node = self;
         let mut rest = path;
@@ -99,7 +100,7 @@ impl Node {
         line
     }
 
-    /// Whether this is a table that no line of the file opens by itself, as `parameters` in
+    /// Returns whether this is a table that no line of the file opens by itself, as `parameters` in
     /// `[parameters.density]`: the parser gives it the line of its first entry.
     fn is_implied(&self) -> bool {
         let Value::Table(entries) = &self.value else { return false };
@@ -107,7 +108,7 @@ impl Node {
         first.is_some_and(|node| node.line == self.line && matches!(node.value, Value::Table(_)))
     }
 
-    /// The child that the first segment of `path` names, and the rest of the path.
+    /// Returns the child that the first segment of `path` names, and the rest of the path.
     fn child_on<'a, 'p>(&'a self, path: &'p str) -> Option<(&'a Node, &'p str)> {
         match &self.value {
             Value::Table(entries) => entries.iter().find_map(|(key, node)| {
@@ -124,18 +125,18 @@ impl Node {
     }
 }
 
-/// Path of the entry `key` of the table at `table`; the root's path is empty.
+/// Returns the path of the entry `key` of the table at `table`; the root's path is empty.
 pub(crate) fn entry_path(table: &str, key: &str) -> String {
     let key = shown_key(key);
     if table.is_empty() { key } else { format!("{table}.{key}") }
 }
 
-/// Path of element `index` (from 0) of the list at `list`.
+/// Returns the path of element `index` (from 0) of the list at `list`.
 pub(crate) fn element_path(list: &str, index: usize) -> String {
     format!("{list}[{index}]")
 }
 
-/// A key as it must be written in TOML, shortened when it is long.
+/// Returns a key as it must be written in TOML, shortened if it is long.
 fn shown_key(key: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !key.is_empty() && key.len() <= SHOWN_CHARACTERS_MAX && key.chars().all(bare) {
@@ -145,7 +146,7 @@ fn shown_key(key: &str) -> String {
     }
 }
 
-/// `text` in quotes, with control characters escaped, shortened when it is long.
+/// Returns `text` in quotes, with control characters escaped, shortened if it is long.
 pub(crate) fn quoted(text: &str) -> String {
     let mut shown: String = text.chars().take(SHOWN_CHARACTERS_MAX).collect();
     if shown.len() < text.len() {
@@ -154,11 +155,11 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("{shown:?}")
 }
 
-/// Longest piece of a user's text that a message repeats.
+/// Longest part of a user's text that is quoted in a message.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
 impl fmt::Display for Value {
-    /// The value in a message, after "is" or "found".
+    /// Formats the value for a message, after "is" or "found".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Null => f.write_str("null"),
@@ -176,7 +177,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// Line and column, both from 1, of a byte offset.
+/// Returns line and column, both from 1, of a byte offset.
 pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
     let before = text.get(..offset).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |at| at + 1);

@@ -1,4 +1,4 @@
-//! TOML text to a tree, with the line of every key and element.
+//! Parses TOML text into a tree, with the line of every key and element.
 
 mod extent;
 
@@ -7,7 +7,7 @@ use toml::de::{DeInteger, DeTable, DeValue};
 
 use super::node::{Format, Malformed, Node, Value, position};
 
-/// The tree of a TOML text.
+/// Parses a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
     if let Err((offset, excess)) = extent::check(text) {
         let (line, column) = position(text, offset);
@@ -44,7 +44,7 @@ impl Lines {
 
     fn table(&self, table: &DeTable<'_>) -> Value {
         let mut entries: Vec<_> = table.iter().collect();
-        // The parser sorts by name; a reader wants the order of the file.
+        // The parser sorts by name; restore the order of the file.
         entries.sort_by_key(|(key, _)| key.span().start);
         Value::Table(
             entries
@@ -76,7 +76,7 @@ impl Lines {
     }
 }
 
-/// An integer of any size: one beyond 128 bits can only be meant as a number.
+/// Parses an integer of any size: one beyond 128 bits becomes a floating-point number.
 fn integer(digits: &DeInteger<'_>) -> Value {
     match i128::from_str_radix(digits.as_str(), digits.radix()) {
         Ok(value) => Value::Integer(value),

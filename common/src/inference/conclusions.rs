@@ -1,4 +1,4 @@
-//! All that is concluded from one set of data, as results carry it.
+//! All conclusions from one set of data, as they are contained in results.
 
 use super::{first_below_noise, inference, profiles, solutions, spread};
 use crate::conclusions::{Conclusions, Profile, Solutions};
@@ -7,8 +7,9 @@ use crate::parameters::Point;
 use crate::results::{BestPoint, Evaluation, PointMeaning};
 
 impl Conclusions {
-    /// From set number `set` of the data, given the best evaluation of its search, if one was feasible,
-    /// and all evaluations of the job. Nothing of a propagation.
+    /// Draws the conclusions from set number `set` of the data, given the best evaluation of its
+    /// search, if one was feasible, and all evaluations of the job. For a propagation there are
+    /// none.
     pub fn of(
         specification: &JobSpecification,
         set: usize,
@@ -27,7 +28,8 @@ impl Conclusions {
     }
 }
 
-/// The profiles of a cost that is of the moments alone; those of others would be another matter.
+/// Returns the profiles, if the cost depends on the moments alone; they do not apply to other
+/// costs.
 fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
     match (best.velocity, &specification.data) {
         (Some(velocity), Some(data)) if is_of_moments(specification) => {
@@ -51,7 +53,7 @@ fn all_starts(
     Solutions { points, matching: matching.len() as u64, spread: spread(&matching) }
 }
 
-/// What the best point of a search with this cost is.
+/// Returns the meaning of the best point of a search with this cost.
 pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
     match specification.search.method {
         _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
@@ -62,7 +64,7 @@ pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
     }
 }
 
-/// [`first_below_noise`] of a cost that is of the moments alone.
+/// Returns [`first_below_noise`] if the cost depends on the moments alone.
 pub fn below_noise_from(
     specification: &JobSpecification,
     set: usize,
@@ -76,7 +78,7 @@ fn is_of_moments(specification: &JobSpecification) -> bool {
     specification.objective == Objective::Moments && !specification.has_priors()
 }
 
-/// The cost that is low enough; a likelihood has none.
+/// Returns the cost that is low enough to stop; `None` for a likelihood.
 fn tolerance(specification: &JobSpecification) -> Option<f64> {
     let by_moments = specification.objective == Objective::Moments;
     by_moments.then_some(specification.search.cost_tolerance)

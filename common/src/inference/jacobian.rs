@@ -10,11 +10,12 @@ use crate::results::{BestPoint, Evaluation, Moments};
 pub struct Jacobian {
     /// The free parameters.
     pub free: Vec<Parameter>,
-    /// Their columns: derivatives of ln v and of ln Δ.
+    /// Their columns: derivatives of ln v and ln Δ.
     pub columns: Vec<[f64; 2]>,
 }
 
-/// The Jacobian at the best point of set number `set`: `None` where a derivative was not measured.
+/// Returns the Jacobian at the best point of set number `set`; `None` if a derivative was not
+/// measured.
 pub fn jacobian(
     specification: &JobSpecification,
     set: usize,
@@ -43,7 +44,7 @@ pub fn jacobian(
 }
 
 impl Jacobian {
-    /// The derivatives for relative changes of the parameters.
+    /// Returns the derivatives for relative changes of the parameters.
     pub fn sensitivities(&self, at: &Point, specification: &JobSpecification) -> Vec<Sensitivity> {
         let of = |(&parameter, column): (&Parameter, &[f64; 2])| {
             let relative = at.get(parameter) / specification.range(parameter).edge();
@@ -54,7 +55,7 @@ impl Jacobian {
     }
 }
 
-/// ln of both moments over others.
+/// Returns the logarithms of the ratios of both moments to those of `base`.
 pub(super) fn log_ratios(moments: Moments, base: Moments) -> [f64; 2] {
     [
         libm::log(moments.mean / base.mean),

@@ -1,32 +1,32 @@
-//! The singular value decomposition of a Jacobian of two rows, and what follows from it.
+//! Singular value decomposition of a Jacobian with two rows, and its consequences.
 
 use super::jacobian::Jacobian;
 use crate::conclusions::Direction;
 
-/// A singular value below this part of the largest is one of rounding.
+/// A singular value below this fraction of the largest counts as rounding error.
 const RANK: f64 = 1e-6;
-/// A remainder of a unit vector shorter than this is one of rounding.
+/// A remainder of a unit vector shorter than this counts as rounding error.
 const REMAINDER: f64 = 1e-6;
 
-/// Directions of the box that two moments fix, and those that they leave free.
+/// Directions of the box that two moments determine, and those that they leave free.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Linear {
-    /// Right singular vectors with their values, the largest first.
+    /// Right singular vectors with their values, in decreasing order.
     pub(super) fixed: Vec<Direction>,
-    /// For each the left singular vector.
+    /// The left singular vector of each.
     left: Vec<[f64; 2]>,
     /// An orthonormal basis of the null space.
     pub(super) undetermined: Vec<Vec<f64>>,
 }
 
-/// What noise does to a quantity.
+/// Effect of noise on a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Response {
     /// Standard deviation.
     pub(super) deviation: f64,
-    /// By how much it moves with each of the two logarithms.
+    /// Change of the quantity with each of the two logarithms.
     pub(super) transfer: [f64; 2],
-    /// Share of its gradient in the null space.
+    /// Fraction of its gradient in the null space.
     pub(super) free_share: f64,
 }
 
@@ -51,8 +51,8 @@ impl Linear {
         linear
     }
 
-    /// Of a quantity with this gradient, where the logarithms of the moments have this covariance;
-    /// `None` if the data say nothing of it.
+    /// Returns the response of a quantity with this gradient, if the logarithms of the moments have
+    /// this covariance; `None` if the data do not determine it at all.
     pub(super) fn response(
         &self,
         gradient: &[f64],
@@ -77,20 +77,20 @@ impl Linear {
     }
 }
 
-/// Eigenvalues, the larger first, and unit eigenvectors of [[a, b], [b, d]].
+/// Returns eigenvalues, the larger first, and unit eigenvectors of [[a, b], [b, d]].
 fn symmetric(a: f64, b: f64, d: f64) -> [(f64, [f64; 2]); 2] {
     let half = 0.5 * (a - d);
     let radius = (half * half + b * b).sqrt();
     let mean = 0.5 * (a + d);
-    // The longer of two forms of the same vector: nothing cancels.
+    // Uses the longer of two forms of the same vector, in which nothing cancels.
     let (x, y) = if half >= 0.0 { (half + radius, b) } else { (b, radius - half) };
     let length = (x * x + y * y).sqrt();
     let [x, y] = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
     [(mean + radius, [x, y]), (mean - radius, [-y, x])]
 }
 
-/// An orthonormal basis of what is orthogonal to `fixed`: axes of the box less their share in it,
-/// that with the most left first.
+/// Returns an orthonormal basis of the complement of `fixed`: the axes of the box minus their
+/// components in it, starting with the axis that has the largest remainder.
 fn complement(fixed: &[Direction], dimensions: usize) -> Vec<Vec<f64>> {
     let mut known: Vec<Vec<f64>> = fixed.iter().map(|one| one.components.clone()).collect();
     let mut basis = Vec::new();
@@ -107,11 +107,12 @@ fn complement(fixed: &[Direction], dimensions: usize) -> Vec<Vec<f64>> {
     basis
 }
 
-/// What is left of an axis, with its length, when its share in orthonormal vectors is taken away.
+/// Returns the remainder of an axis, with its length, after its components along orthonormal
+/// vectors are subtracted.
 fn remainder(axis: usize, dimensions: usize, known: &[Vec<f64>]) -> (f64, Vec<f64>) {
     let mut vector: Vec<f64> =
         (0..dimensions).map(|other| if other == axis { 1.0 } else { 0.0 }).collect();
-    // Twice: once leaves what rounding makes of it.
+    // Done twice, because one subtraction leaves rounding errors.
     for direction in known.iter().chain(known) {
         let share = dot(&vector, direction);
         vector.iter_mut().zip(direction).for_each(|(x, d)| *x -= share * d);

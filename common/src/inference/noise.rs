@@ -1,4 +1,4 @@
-//! Errors of the logarithms of both moments, of the data's and of the model's.
+//! Errors of the logarithms of both moments, for the data and for the model.
 
 use crate::conclusions::NoiseErrors;
 #[cfg(doc)]
@@ -13,14 +13,14 @@ const NORMAL: f64 = 1.959_963_984_540_054;
 /// Covariances of (ln v, ln Δ).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Of the data's moments, with the number of their velocities; `None` where only the moments
-    /// are known, and nobody can say how well.
+    /// Covariance of the data's moments, with the number of velocities; `None` if only the moments
+    /// are known, since their uncertainty is then unknown.
     pub data: Option<([[f64; 2]; 2], usize)>,
-    /// Of the model's: by sampling, on the diagonal.
+    /// Variances of the model's moments by sampling.
     pub model: [f64; 2],
 }
 
-/// The noise of set number `set` of the data, and of a model's estimate.
+/// Returns the noise of set number `set` of the data, and of a model's estimate.
 pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
     let velocities = data.velocities(set);
     let covariance = velocities.and_then(statistics::covariance_of_logarithms);
@@ -31,7 +31,7 @@ pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
 }
 
 impl Noise {
-    /// Of both together.
+    /// Returns the covariance of both together.
     pub fn covariance(&self) -> [[f64; 2]; 2] {
         let mut sum = self.data.map_or([[0.0; 2]; 2], |(covariance, _)| covariance);
         for (axis, variance) in self.model.into_iter().enumerate() {
@@ -40,7 +40,7 @@ impl Noise {
         sum
     }
 
-    /// The standard errors.
+    /// Returns the standard errors.
     pub fn errors(&self) -> NoiseErrors {
         let errors = |variances: [f64; 2]| {
             let [mean, coefficient_of_variation] = variances.map(f64::sqrt);
@@ -50,15 +50,15 @@ impl Noise {
         NoiseErrors { data, sampling: errors(self.model) }
     }
 
-    /// How many standard errors an interval reaches to each side.
+    /// Returns how many standard errors an interval extends to each side.
     pub fn quantile(&self) -> f64 {
         self.data.map_or(NORMAL, |(_, count)| quantile(count))
     }
 }
 
-/// Quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 for a sample of `count`: the first terms of its
-/// expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5), right to 1e-3 from six
-/// degrees of freedom on, too small below three.
+/// Returns the quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 for a sample of `count`: the
+/// first terms of its expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5),
+/// accurate to 1e-3 from six degrees of freedom on, too small below three.
 pub(super) fn quantile(count: usize) -> f64 {
     let freedom = count.saturating_sub(1).max(1) as f64;
     let square = NORMAL * NORMAL;

@@ -1,18 +1,19 @@
-//! Profiles of the cost: what it is at best with one parameter held at a value.
+//! Profiles of the cost: the lowest cost with one parameter held at a value.
 //!
-//! They cost no evaluation: the mean velocity is taken to be √(c1111/ρ), and the coefficient of
-//! variation δ, each times its factor at the best point. Over the whole box that holds to about one
-//! per cent, so a profile says where the data can be matched, and not by how little they are missed.
+//! They require no evaluation: the mean velocity is approximated by √(c1111/ρ), and the coefficient
+//! of variation by δ, each times its factor at the best point. Over the whole box that holds to
+//! about one per cent, so a profile shows where the data can be matched, but not small differences
+//! from them.
 
 use crate::conclusions::Profile;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
 use crate::results::Moments;
 
-/// Points of a profile, from bound to bound.
+/// Number of points of a profile, from bound to bound.
 pub const PROFILE_POINTS: usize = 11;
 
-/// The profile of each free parameter, given the best point and its moments.
+/// Returns the profile of each free parameter, given the best point and its moments.
 pub fn profiles(
     specification: &JobSpecification,
     best: &Point,
@@ -39,7 +40,7 @@ pub fn profiles(
     Parameter::ALL.into_iter().filter(free).map(profile).collect()
 }
 
-/// The lowest cost over the box of these ranges.
+/// Returns the lowest cost over the box of these ranges.
 fn lowest_cost(ranges: &[Range; 7], best: &Point, model: Moments, data: Moments) -> f64 {
     let Some(here) = squared_velocities(&best.0.map(Range::Fixed)).map(|[only, _]| only) else {
         return f64::INFINITY;
@@ -63,11 +64,12 @@ fn relative_square(ratio: f64) -> f64 {
     (1.0 - ratio) * (1.0 - ratio)
 }
 
-/// Smallest and largest c1111/ρ of the admissible points of the box; `None` if there is none.
+/// Returns the smallest and largest c1111/ρ of the admissible points of the box; `None` if there is
+/// none.
 ///
-/// c1111 = e_L / (1 - r) with r = 2 e_T ν_L² / (e_L (1 - ν_T)) grows with e_T, with ν_T and with |ν_L|,
-/// and has its minimum over e_L at r = ½; it grows without bound where r comes to 1, the edge of
-/// what is admissible.
+/// c1111 = e_L / (1 - r) with r = 2 e_T ν_L² / (e_L (1 - ν_T)) grows with e_T, with ν_T and with
+/// |ν_L|, and has its minimum over e_L at r = ½; it grows without bound as r approaches 1, the edge
+/// of admissibility.
 fn squared_velocities(ranges: &[Range; 7]) -> Option<[f64; 2]> {
     let of = |parameter: Parameter| ends(ranges[parameter as usize]);
     let density = of(Parameter::Density);
@@ -79,7 +81,7 @@ fn squared_velocities(ranges: &[Range; 7]) -> Option<[f64; 2]> {
     ];
     let transverse = of(Parameter::TransverseYoungModulus);
     let ratio = of(Parameter::TransversePoissonRatio);
-    // 2 e_T ν_L² / (1 - ν_T): the part of r that e_L is not in.
+    // 2 e_T ν_L² / (1 - ν_T): the factor of r that does not contain e_L.
     let part = [0, 1].map(|end| 2.0 * transverse[end] * ratio_squares[end] / (1.0 - ratio[end]));
     let stiffness = |young: f64, part: f64| young / (1.0 - part / young);
     if young[1] <= part[0] {

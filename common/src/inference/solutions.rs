@@ -1,11 +1,12 @@
-//! The answers of searches from several starts: a sample of what matches the data equally well.
+//! Solutions of searches from several starts: a sample of the points that match the data equally
+//! well.
 
 use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::{Parameter, Point};
 use crate::results::Evaluation;
 
-/// The best point of each start of set number `set` that found a feasible one.
+/// Returns the best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
     for row in history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none()) {
@@ -23,7 +24,7 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     solutions
 }
 
-/// The spreads over points; `None` of none.
+/// Returns the spreads over points; `None` if there are none.
 pub fn spread(points: &[Point]) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
@@ -39,7 +40,7 @@ pub fn spread(points: &[Point]) -> Option<Spreads> {
     }
     let parameters =
         Parameter::ALL.map(|parameter| of(&mut points.iter().map(|point| point.get(parameter))));
-    // Points that were evaluated are admissible.
+    // Points that were evaluated are always admissible.
     let matrices: Vec<Elasticity> =
         points.iter().filter_map(|point| point.constants().elasticity().ok()).collect();
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));

@@ -1,4 +1,4 @@
-//! What the data say, of models whose answer is known.
+//! Tests of the inference with models whose solution is known.
 
 use super::noise::quantile;
 use super::*;
@@ -51,7 +51,7 @@ fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
     }
 }
 
-/// The optimum as the best point.
+/// Returns the optimum as the best point.
 fn best(cost: f64, standard_error: Moments) -> BestPoint {
     BestPoint {
         point: OPTIMUM,
@@ -69,7 +69,8 @@ fn best(cost: f64, standard_error: Moments) -> BestPoint {
     }
 }
 
-/// What is found at the optimum, with relative standard errors of the model's moments.
+/// Returns the inference at the optimum, with these relative standard errors of the model's
+/// moments.
 fn found(specification: &JobSpecification, errors: [f64; 2]) -> Inference {
     let moments = model(&OPTIMUM);
     let standard_error = Moments {
@@ -102,7 +103,7 @@ fn of_seven_free_parameters_two_combinations_are_identified() {
     close(known.standard_error / 0.1029, 2e-2, 1e-4);
     let half = libm::log(known.interval[1] / known.interval[0]) / 2.0;
     close(half, 1.96 * 2e-2, 1e-3);
-    // No single parameter is known.
+    // No single parameter is determined.
     assert!(found.parameters.iter().all(|(_, quantity)| quantity.known.is_none()));
 }
 
@@ -117,7 +118,7 @@ fn directions_are_orthonormal_and_change_what_they_say() {
             assert!((product - f64::from(i == j)).abs() < 1e-9, "{i} {j}: {product}");
         }
     }
-    // A small step along each: the moments change by the singular value, or by nothing.
+    // A small step along each direction changes the moments by the singular value, or not at all.
     let values: Vec<f64> = found.fixed.iter().map(|direction| direction.singular_value).collect();
     for (i, direction) in all.iter().enumerate() {
         let mut moved = OPTIMUM;
@@ -135,8 +136,8 @@ fn directions_are_orthonormal_and_change_what_they_say() {
     }
 }
 
-/// c1111 ∝ e_L to the power 0.5848 at the optimum: the standard error of e_L is that of v over half
-/// of it.
+/// c1111 ∝ e_L to the power 0.5848 at the optimum, so the standard error of e_L is that of v
+/// divided by half of it.
 #[test]
 fn of_two_free_parameters_both_are_known() {
     let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
@@ -153,7 +154,7 @@ fn of_two_free_parameters_both_are_known() {
 #[test]
 fn noise_of_the_data_counts() {
     let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
-    // Two values: the influence on ln Δ is that of the mean alone.
+    // With two different values the influence on ln Δ is that of the mean alone.
     let velocities: Vec<f64> = (0..100)
         .map(|k| mean * (1.0 + coefficient_of_variation * if k % 2 == 0 { 1.0 } else { -1.0 }))
         .collect();
@@ -170,8 +171,8 @@ fn noise_of_the_data_counts() {
     );
 }
 
-/// A search that was stopped a standard error before the end, in both moments: its intervals reach as
-/// far beyond the usual as the answer would have moved.
+/// A search is stopped one standard error before the end, in both moments: its intervals are longer
+/// by the distance by which the solution would have moved.
 #[test]
 fn what_the_search_has_left_lengthens_the_intervals() {
     let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
@@ -210,12 +211,12 @@ fn nothing_is_known_where_the_model_does_not_match() {
     let best = best(0.6, standard_error);
     let found = inference(&specification, 0, &best, &rows).unwrap();
     assert!(!found.matched && found.bulk_velocity.known.is_none());
-    // Without one of the differences nothing is said at all.
+    // If one of the differences is missing, there is no inference.
     rows.pop();
     assert_eq!(inference(&specification, 0, &best, &rows), None);
 }
 
-/// Quantiles of tables.
+/// Compares with tabulated quantiles.
 #[test]
 fn quantiles_are_students() {
     for (count, expected) in [(7, 2.4469), (11, 2.2281), (31, 2.0423), (101, 1.9840)] {
@@ -224,7 +225,7 @@ fn quantiles_are_students() {
     close(quantile(1_000_000), 1.95996, 1e-5);
 }
 
-/// Against a fine grid over the box.
+/// Compares with a fine grid over the box.
 #[test]
 fn a_profile_is_the_lowest_cost() {
     let free = [
@@ -234,7 +235,7 @@ fn a_profile_is_the_lowest_cost() {
         Parameter::Dispersion,
     ];
     let mut specification = specification(&free, None);
-    // So fast that no light bone within the bounds is.
+    // No bone within the bounds is light enough for this velocity.
     let data = Moments { mean: 1.2 * model(&OPTIMUM).mean, ..model(&OPTIMUM) };
     specification.data = None;
     let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data);

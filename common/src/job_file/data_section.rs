@@ -11,8 +11,9 @@ use crate::velocities::{self, Measured};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
-/// The measured data, or `None` with the reason recorded, and the file that they stand in, if any.
-/// Always `None` for a propagation, whose `[data]` is checked as far as that needs no other file.
+/// Returns the measured data, or `None` after recording the violation, and their file, if any. For
+/// a propagation it is always `None`, and `[data]` is checked as far as possible without another
+/// file.
 pub(super) fn read(
     reader: &mut Reader,
     root: &Table<'_>,
@@ -28,7 +29,8 @@ pub(super) fn read(
     (data, origin)
 }
 
-/// The measured data, those of a file by `from_file` with its name and the column of groups.
+/// Returns the measured data; those in a file are read by `from_file`, given its name and the
+/// column of groups.
 fn given(
     reader: &mut Reader,
     root: &Table<'_>,
@@ -87,7 +89,7 @@ fn moments(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
     Some(Data::Moments { mean: mean?, coefficient_of_variation: variation? })
 }
 
-/// The table `groups`: a list of velocities for each name.
+/// Reads the table `groups`: a list of velocities for each name.
 fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
     let path = table.path("groups");
     let expected = "a table with a list of velocities (m/s) for each group";
@@ -152,7 +154,7 @@ fn velocities(
     }
 }
 
-/// Name of the column of groups.
+/// Returns the name of the column of groups.
 fn column<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<&'a str> {
     match &table.get("group")?.value {
         Value::Text(column) => Some(column),

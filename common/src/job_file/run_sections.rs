@@ -5,7 +5,7 @@ use crate::job::{MonteCarlo, Objective, Prior, Sampling, Search, SearchMethod};
 use crate::parameters::Parameter;
 use crate::reader::{Choice, Reader, Table};
 
-/// The Monte Carlo loop, with defaults where `root` is silent or wrong.
+/// Reads the Monte Carlo settings; missing or wrong values are replaced by defaults.
 pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
     let default = MonteCarlo::default();
     let keys =
@@ -13,7 +13,8 @@ pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
     let table = reader.table(root, "monte_carlo", &keys);
     let sampling = Choice { all: &Sampling::ALL, name: Sampling::name, reserved: &[] };
     let scrambles = reader.whole(&table, "scrambles", SCRAMBLES).unwrap_or(default.scrambles);
-    // What they must agree with is not known: that it is misspelt is all there is to say.
+    // If these are misspelt, the scrambles cannot be checked against them, and only the misspelling
+    // is reported.
     let alone = ["realizations", "sampling"].iter().any(|key| reader.is_misspelt(&table, key));
     MonteCarlo {
         realizations: reader
@@ -29,14 +30,14 @@ pub(super) fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
     }
 }
 
-/// The objective, with its default where `root` is silent or wrong.
+/// Reads the objective; a missing or wrong value is replaced by the default.
 pub(super) fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
     let table = reader.table(root, "objective", &["kind"]);
     let kind = Choice { all: &Objective::ALL, name: Objective::name, reserved: &[] };
     reader.choice(&table, "kind", &kind).unwrap_or_default()
 }
 
-/// The search loop, with defaults where `root` is silent or wrong.
+/// Reads the search settings; missing or wrong values are replaced by defaults.
 pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
     let keys = [
         "method",
@@ -66,8 +67,8 @@ pub(super) fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
     }
 }
 
-/// A table `{ value, weight }` for each parameter that has one; numbers that could not be read are
-/// NaN, and recorded.
+/// Reads a table `{ value, weight }` for each parameter that has one; numbers that cannot be read
+/// are recorded and become NaN.
 fn priors(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; 7] {
     let table = reader.table(search, "priors", &Parameter::ALL.map(Parameter::name));
     Parameter::ALL.map(|parameter| {

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What is asked about a refused value, or `None` where it is not refused.
+/// Checks the question asked about a refused value; `None` if it is not refused.
 fn check(kind: &Quantity, values: &[f64], expected: Option<&str>) {
     let question = kind.question(values, Interval::finite(kind.unit));
     assert_eq!(question.as_deref(), expected, "{values:?} {}", kind.unit);
@@ -37,7 +37,7 @@ fn another_unit_that_explains_a_number_is_named() {
     check(&MODULUS, &[12.0, 25.0], Some("did you mean 12 and 25 GPa (12e9 and 25e9)?"));
 }
 
-/// The softest, heaviest, thinnest and so on that anybody may mean, and what no unit explains.
+/// The softest, heaviest, thinnest (and so on) meaningful values, and values that no unit explains.
 #[test]
 fn whatever_can_be_meant_is_not_asked_about() {
     for (kind, values) in [
@@ -59,7 +59,7 @@ fn whatever_can_be_meant_is_not_asked_about() {
     ] {
         values.iter().for_each(|&value| check(&kind, &[value], None));
     }
-    // One end of wide bounds may be anything.
+    // If the bounds are wide, one end may have any value.
     check(&MODULUS, &[1.0, 100e9], None);
     for kind in [VELOCITY, MODULUS, BONE_THICKNESS] {
         for value in [f64::NAN, f64::INFINITY, -1.0, 0.0] {

@@ -1,4 +1,4 @@
-//! What is worth a warning before anything is computed.
+//! Warnings about unusual values before anything is computed.
 
 use std::fmt;
 
@@ -13,19 +13,19 @@ use crate::settings::Method;
 
 use super::{Quantity, short};
 
-/// A velocity farther from the median than this factor is no scatter.
+/// A velocity that differs from the median by more than this factor is an outlier.
 const OUTLIER: f64 = 3.0;
-/// Most such velocities that are listed of one set.
+/// Maximum number of outliers that are listed for one set.
 const OUTLIERS_LISTED_MAX: usize = 5;
-/// Most groups that are warned of one by one.
+/// Maximum number of groups with individual warnings.
 const GROUPS_LISTED_MAX: usize = 5;
 
-/// Something unusual that can be computed with.
+/// Warning about a value that is unusual but accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
     /// Path of the field in the user's file.
     pub field: String,
-    /// What was found, what is usual, and what may be meant.
+    /// The value found, the usual range, and the probable meaning.
     pub message: String,
 }
 
@@ -35,7 +35,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// What is unusual about a case that has passed its checks.
+/// Returns the warnings about a case that has passed its checks.
 pub fn case_warnings(case: &Case) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&case.setup);
@@ -48,12 +48,12 @@ pub fn case_warnings(case: &Case) -> Vec<Warning> {
     warnings.0
 }
 
-/// What is unusual about a job that has passed its checks.
+/// Returns the warnings about a job that has passed its checks.
 pub fn job_warnings(specification: &JobSpecification) -> Vec<Warning> {
     job_warnings_from(specification, None)
 }
 
-/// The same of a job whose measured velocities stand in the file `origin`.
+/// Same as [`job_warnings`], for a job whose measured velocities are in the file `origin`.
 pub(crate) fn job_warnings_from(
     specification: &JobSpecification,
     origin: Option<&Origin>,
@@ -107,7 +107,7 @@ impl Warnings {
         self.number(&format!("{path}.sound_speed"), fluid.sound_speed, &super::SOUND_SPEED);
     }
 
-    /// Bounds may be as wide as they like; what is fixed, or begun with, is meant.
+    /// Checks only a fixed value or the start: bounds may be arbitrarily wide.
     fn parameter(&mut self, parameter: Parameter, range: Range) {
         let key = match range {
             Range::Fixed(_) => "fixed",
@@ -146,7 +146,7 @@ impl Warnings {
         }
     }
 
-    /// The median and the scatter of a set, and velocities that belong to no scatter.
+    /// Checks the median and the scatter of a set, and lists outliers.
     fn velocities(
         &mut self,
         field: &str,

@@ -1,39 +1,40 @@
-//! Frequencies thinned out towards the top of the band.
+//! Thinning of frequencies towards the top of the band.
 //!
-//! The sum over n is the trapezoidal rule of an integral over ω; a coarser step is a shorter
-//! period. Low in the band the period must take in every large wave. High in the band only the
-//! tail of the pulse's kink is left, of which a wave that comes τ later and wraps round keeps
-//! exp(-α τ): little for the large late ones, and what comes soon is small itself. So the step
-//! doubles a few times on the way up. Between a doubling's two frequencies every second sample fades
-//! out while its neighbours fade in: the sum of the weights stays the integral's.
+//! The sum over n is the trapezoidal rule of an integral over ω; a coarser step means a shorter
+//! period. Low in the band the period must include every large wave. High in the band only the tail
+//! of the pulse's kink remains. A wave that arrives τ later and wraps round keeps a fraction exp(-α
+//! τ) of it, which is little for the large late waves; the early ones are small themselves.
+//! Therefore the step doubles a few times on the way up. Between a doubling's two frequencies every
+//! second sample fades out while its neighbours fade in, so that the sum of the weights remains
+//! that of the integral.
 
 use crate::sampling::Sampling;
 
-/// Frequencies, over the centre frequency, between which the step doubles.
+/// Frequencies, as multiples of the centre frequency, between which the step doubles.
 const DOUBLINGS: [(f64, f64); 4] = [(2.0, 2.75), (3.25, 4.0), (7.0, 8.5), (12.0, 14.0)];
 
-/// Frequencies of a run.
+/// Number of frequencies of a run.
 pub const RUN: usize = 8;
 
 /// Eight equidistant frequencies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
-    /// Number of the first.
+    /// Number of its first frequency.
     pub first: usize,
     /// Distance of neighbours, a power of two.
     pub stride: usize,
 }
 
 impl Run {
-    /// Numbers of its frequencies.
+    /// Returns the numbers of its frequencies.
     pub fn frequencies(self) -> impl Iterator<Item = usize> {
         (0..RUN).map(move |i| self.first + i * self.stride)
     }
 }
 
 impl Sampling {
-    /// The frequencies of the whole band, in runs; [`Sampling::is_within`] says which frequencies of a
-    /// run are not needed.
+    /// Returns the frequencies of the whole band, in runs; [`Sampling::is_within`] tells which
+    /// frequencies of a run are not needed.
     pub fn runs(&self) -> Vec<Run> {
         let (mut first, mut stride) = (0, 1);
         let mut doublings = DOUBLINGS.into_iter().peekable();
@@ -52,7 +53,7 @@ impl Sampling {
         runs
     }
 
-    /// Weight of frequency `n` in the sum: 1 where none is left out.
+    /// Returns the weight of frequency `n` in the sum: 1 where none is left out.
     pub fn share(&self, n: usize) -> f64 {
         let mut share = 1.0;
         let mut stride = 1;
@@ -73,7 +74,7 @@ impl Sampling {
     }
 }
 
-/// 0 up to x = 0, 1 from x = 1 on, infinitely smooth.
+/// Returns 0 up to x = 0 and 1 from x = 1 on, infinitely smooth.
 pub fn smooth_step(x: f64) -> f64 {
     if x <= 0.0 {
         0.0

@@ -1,9 +1,9 @@
 //! Standard errors of means over scrambled Sobol' points.
 //!
-//! Each power-of-two block of consecutive points of one scramble is an evenly spread set itself, and
-//! different scrambles are independent. What parts of the sample add to a moment, to first order,
-//! is therefore summed part by part, and the scatter of the sums tells the moment's error. Failed
-//! realizations add nothing to their part.
+//! Each power-of-two block of consecutive points of one scramble is an evenly distributed set
+//! itself, and different scrambles are independent. Therefore the contributions to a moment, to
+//! first order, are summed for each part of the sample, and the error of the moment is estimated
+//! from the scatter of these sums. Failed realizations contribute nothing to their part.
 
 use super::sum::Sum;
 use crate::job::MonteCarlo;
@@ -11,28 +11,29 @@ use crate::results::Moments;
 
 /// Errors are extrapolated from blocks of which one scramble has at least 2 to this power.
 const BLOCKS_DIGITS: usize = 3;
-/// Points of one scramble, at least, for extrapolation.
+/// Minimum number of points of one scramble for extrapolation.
 const POINTS_MIN: u64 = 16;
 
-/// What doubling a block beyond measured ones does to the variance of its sum, for the mean and for
-/// the coefficient of variation: 1 where the error of the mean over n points falls as 1/n, 2^(2-2p) as
-/// 1/nᵖ.
+/// Factor by which doubling a block beyond the measured ones changes the variance of its sum, for
+/// the mean and for the coefficient of variation: 1 if the error of the mean over n points falls as
+/// 1/n, 2^(2-2p) if as 1/nᵖ.
 ///
 /// Measured over 64 seeds each at dispersions from 0.05 to 0.3 and 256 to 4096 points: p is 1.1 for
-/// the plain mean, most of which is a smooth function of one germ, and 1 for what is left of it by the
-/// control variate, and for both coefficients of variation. `osteon-study variance` shows what it comes to.
+/// the plain mean, most of which is a smooth function of one germ, and 1 for its remainder after
+/// the control variate, and for both coefficients of variation. `osteon-study variance` shows the
+/// resulting errors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Doubled([f64; 2]);
 
 impl Doubled {
-    /// Of the velocities.
+    /// Factors for the velocities.
     pub(super) const PLAIN: Self = Self([0.87, 1.0]);
-    /// Of what the control variate leaves of them.
+    /// Factors for the remainder after the control variate.
     pub(super) const CONTROLLED: Self = Self([1.0, 1.0]);
 }
 
-/// Standard errors of both moments, given what each realization adds to N times them in index
-/// order, and the number N of successes.
+/// Returns the standard errors of both moments, given the contribution of each realization to N
+/// times the moments, in index order, and the number N of successes.
 pub(super) fn standard_error(
     influences: impl Iterator<Item = [f64; 2]>,
     doubled: Doubled,
@@ -49,7 +50,7 @@ pub(super) fn standard_error(
     Moments { mean, coefficient_of_variation }
 }
 
-/// Variances of the sums over all scrambles, of so many points each.
+/// Returns the variances of the sums over all scrambles, which have this many points each.
 fn of_scrambles(influences: impl Iterator<Item = [f64; 2]>, points: u64) -> [f64; 2] {
     let mut scatter = Scatter::default();
     let mut sums = [Sum::default(); 2];
@@ -68,12 +69,13 @@ fn of_scrambles(influences: impl Iterator<Item = [f64; 2]>, points: u64) -> [f64
     scatter.variances().map(|variance| variance * scatter.count)
 }
 
-/// Variances of the sums over all points of one scramble.
+/// Returns the variances of the sums over all points of one scramble.
 ///
-/// A sum over n points is one over blocks that are added and taken away, by the fewest digits 1 and
+/// A sum over n points is one over blocks that are added and subtracted, by the fewest digits 1 and
 /// -1 that write n in base 2 (G. W. Reitwiesner, Advances in Computers 1 (1960)); these blocks are
-/// taken for independent. Small ones have the scatter of their like, larger ones that of the
-/// largest of which there are enough, averaged with the next smaller and the next larger.
+/// treated as independent. Small ones have the scatter of blocks of their size. Larger ones have
+/// that of the largest blocks of which there are enough, averaged with the next smaller and the
+/// next larger.
 fn of_blocks(influences: impl Iterator<Item = [f64; 2]>, doubled: Doubled) -> [f64; 2] {
     let levels = Levels::of(influences);
     if levels.count < POINTS_MIN {
@@ -97,8 +99,8 @@ fn of_blocks(influences: impl Iterator<Item = [f64; 2]>, doubled: Doubled) -> [f
     total
 }
 
-/// The places, from the lowest, of the digits that are not 0 in the signed binary form of a number
-/// with the fewest of them.
+/// Returns the positions, from the lowest, of the nonzero digits in the signed binary form of a
+/// number that has the fewest of them.
 fn signed_digits(number: u64) -> impl Iterator<Item = usize> {
     let mut rest = u128::from(number);
     (0..)
@@ -125,7 +127,7 @@ struct Levels {
 impl Levels {
     fn of(influences: impl Iterator<Item = [f64; 2]>) -> Self {
         let mut levels = Self::default();
-        // Of each level the first of two blocks that make one of the next.
+        // For each level, the first of two blocks that make one of the next level.
         let mut firsts: Vec<Option<[f64; 2]>> = Vec::new();
         for influence in influences {
             levels.count += 1;
@@ -148,7 +150,7 @@ impl Levels {
         levels
     }
 
-    /// Of sums over blocks of 2 to the power `level`.
+    /// Returns the variances of sums over blocks of 2 to the power `level`.
     fn variances(&self, level: usize) -> [f64; 2] {
         self.scatters.get(level).map_or([f64::NAN; 2], Scatter::variances)
     }
@@ -171,8 +173,8 @@ impl Scatter {
         }
     }
 
-    /// With division by one less than their number; NaN for fewer than two. The means are near 0,
-    /// so that hardly anything cancels.
+    /// Returns the variances with division by one less than the number of pairs; NaN for fewer than
+    /// two. The means are near 0, so that hardly anything cancels.
     fn variances(&self) -> [f64; 2] {
         [0, 1].map(|i| {
             let sum = self.sums[i].total();
@@ -223,14 +225,15 @@ mod tests {
 
     #[test]
     fn errors_of_scrambles_are_those_of_their_sums() {
-        // Sums 3, -1, -2 of two points each: variance 7, of the sum of three 21.
+        // Sums 3, -1, -2 of two points each have the variance 7, and that of the sum of three is
+        // 21.
         let values: [f64; 6] = [1.0, 2.0, -4.0, 3.0, 0.0, -2.0];
         let mean = 21.0_f64.sqrt() / 6.0;
         close(errors(&values, 3), [mean, 2.0 * mean]);
-        // Each point its own scramble: as independent ones.
+        // With one point per scramble the points count as independent.
         let scatter = (values.iter().map(|x| x * x).sum::<f64>() / 5.0 / 6.0).sqrt();
         close(errors(&values, 6), [scatter, 2.0 * scatter]);
-        // Too few to extrapolate: the same.
+        // Too few points to extrapolate: the same error.
         close(errors(&values, 1), [scatter, 2.0 * scatter]);
     }
 

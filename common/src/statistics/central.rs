@@ -1,11 +1,11 @@
-//! Mean and central moments of a set, and what follows for independent values.
+//! Mean and central moments of a set, and standard errors for independent values.
 
 use super::sum::Sum;
 use crate::results::Moments;
 
 /// Mean and central moments of a set.
 pub(super) struct Central {
-    /// How many.
+    /// Number of values.
     pub(super) count: f64,
     mean: f64,
     /// m₂, m₃, m₄ with m_p = (1/N) Σ (V_k - v)^p.
@@ -19,12 +19,13 @@ impl Central {
         Moments { mean: self.mean, coefficient_of_variation: self.m2.sqrt() / self.mean }
     }
 
-    /// Whether there are different values.
+    /// Returns whether there are different values.
     pub(super) fn scatters(&self) -> bool {
         self.m2 > 0.0
     }
 
-    /// What one value adds to N times mean and coefficient of variation, to first order.
+    /// Returns the influence of one value on N times mean and coefficient of variation, to first
+    /// order.
     pub(super) fn influence(&self, value: f64) -> [f64; 2] {
         let deviation = value - self.mean;
         let variation = self.m2.sqrt() / self.mean;
@@ -32,7 +33,7 @@ impl Central {
         [deviation, variation * relative]
     }
 
-    /// The standard errors of independent values.
+    /// Returns the standard errors for independent values.
     pub(super) fn standard_error(&self) -> Moments {
         let n = self.count;
         if n < 2.0 {
@@ -44,7 +45,7 @@ impl Central {
         let variation = self.m2.sqrt() / self.mean;
         let skewness = self.m3 / (self.m2 * self.m2.sqrt());
         let kurtosis = self.m4 / (self.m2 * self.m2);
-        // Of a quadratic form that is never negative; rounding can make it so.
+        // The quadratic form is never negative, except for rounding errors.
         let relative =
             ((kurtosis - 1.0) / 4.0 - variation * skewness + variation * variation).max(0.0).sqrt();
         Moments {
@@ -54,7 +55,7 @@ impl Central {
     }
 }
 
-/// Those of a set, or `None` if it is empty.
+/// Returns mean and central moments of a set, or `None` if it is empty.
 pub(super) fn central(velocities: impl Iterator<Item = f64> + Clone) -> Option<Central> {
     let count = velocities.clone().count();
     if count == 0 {

@@ -1,14 +1,14 @@
 //! Moments by regression on a control variate.
 //!
-//! W = √(c1111/ρ) of the realization's own tensor explains nearly all of its velocity V, and its law
-//! has mean and variance in closed form. With β the slope of the regression of V on W over the sample
-//! and R the residuals,
+//! W = √(c1111/ρ) of the realization's own tensor explains nearly all of its velocity V, and its
+//! law has mean and variance in closed form. With β the slope of the regression of V on W over the
+//! sample and R the residuals,
 //!
 //! v = V̄ + β (E W - W̄),        variance = β² Var W + (1/N) Σ R²
 //!
-//! (S. Asmussen and P. W. Glynn, "Stochastic Simulation" (2007), Sec. V.2; the variance is the law of
-//! total variance of the linear prediction). β itself comes from the sample: that is of second order
-//! in v, and counted in the error of the variance.
+//! (S. Asmussen and P. W. Glynn, "Stochastic Simulation" (2007), Sec. V.2; the variance is the law
+//! of total variance of the linear prediction). β itself is estimated from the sample: that is of
+//! second order in v, and included in the error of the variance.
 
 use super::sum::Sum;
 use crate::job::MonteCarlo;
@@ -17,9 +17,9 @@ use crate::parameters::Point;
 use crate::realization::Ensemble;
 use crate::results::Moments;
 
-/// Fewest realizations of a regression that leaves something over.
+/// Minimum number of realizations of a regression with residuals.
 const REALIZATIONS_MIN: usize = 3;
-/// Numbers that the regression takes from the sample.
+/// Number of parameters that the regression estimates from the sample.
 const FITTED: f64 = 2.0;
 
 /// A sample with its regression.
@@ -39,13 +39,13 @@ pub(super) struct Controlled {
     residual: f64,
     /// β² Var W + (1/N) Σ R², m²/s².
     variance: f64,
-    /// 2 β Var W over the sample's variance of W.
+    /// 2 β Var W divided by the sample's variance of W.
     gain: f64,
 }
 
 impl Controlled {
-    /// The regression, if one is asked for and can be made: it takes every realization, as the
-    /// moments of W over those that succeed are not known.
+    /// Returns the regression, if it is requested and possible. It requires every realization, as
+    /// the moments of W over the successes alone are not known.
     pub(super) fn of(
         monte_carlo: &MonteCarlo,
         point: &Point,
@@ -61,8 +61,7 @@ impl Controlled {
         Self::fit(velocities, speeds, ensemble.longitudinal_speed_moments())
     }
 
-    /// The regression, given mean and variance of W under its law; `None` for a W that is always
-    /// the same.
+    /// Returns the regression, given mean and variance of W under its law; `None` if W is constant.
     fn fit(velocities: Vec<f64>, speeds: Vec<f64>, law: (f64, f64)) -> Option<Self> {
         let count = velocities.len() as f64;
         let mean_of = |values: &mut dyn Iterator<Item = f64>| {
@@ -83,7 +82,7 @@ impl Controlled {
         let variance = slope * slope * law_variance + residual;
         let moments = Moments { mean, coefficient_of_variation: variance.sqrt() / mean };
         let gain = 2.0 * slope * law_variance / square;
-        // Of equal speeds, or numbers out of all proportion.
+        // Not sound if all speeds are equal, or if numbers are out of scale.
         let sound = variance > 0.0 && gain.is_finite() && moments.coefficient_of_variation > 0.0;
         sound.then_some(Self {
             moments,
@@ -98,8 +97,8 @@ impl Controlled {
         })
     }
 
-    /// What each realization adds to N times mean and coefficient of variation, to first order, in
-    /// index order.
+    /// Returns the influence of each realization on N times mean and coefficient of variation, to
+    /// first order, in index order.
     pub(super) fn influences(&self) -> impl Iterator<Item = [f64; 2]> {
         let Moments { mean, coefficient_of_variation: variation } = self.moments;
         self.velocities.iter().zip(&self.speeds).map(move |(velocity, speed)| {
@@ -110,7 +109,7 @@ impl Controlled {
         })
     }
 
-    /// The standard errors of independent realizations.
+    /// Returns the standard errors for independent realizations.
     pub(super) fn standard_error(&self) -> Moments {
         let mut squares = [Sum::default(); 2];
         for influence in self.influences() {
@@ -142,7 +141,7 @@ mod tests {
         Ensemble::drawn(&OPTIMUM, asked(seed).germs()).unwrap()
     }
 
-    /// A velocity that the speed explains up to noise of 3 m/s, bent by the speed's square.
+    /// Velocities that the speed explains up to noise of 3 m/s, with a term in the speed's square.
     fn outcomes(seed: u64, count: u64) -> Vec<Outcome> {
         let ensemble = ensemble(seed);
         let (mean, _) = ensemble.longitudinal_speed_moments();
@@ -170,8 +169,8 @@ mod tests {
         assert!(found.standard_error.coefficient_of_variation < 1e-12, "{found:?}");
     }
 
-    /// Over 400 samples: gains of the order that theory gives, right errors, and no bias above the
-    /// scatter of the average.
+    /// Over 400 samples: the gains have the order of magnitude of the theory, the errors are right,
+    /// and there is no bias above the scatter of the average.
     #[test]
     fn moments_scatter_less_and_errors_are_right() {
         let (samples, size) = (400, 300);
@@ -195,7 +194,7 @@ mod tests {
             let moments = moments(values).unwrap();
             moments.mean * moments.coefficient_of_variation
         };
-        // One sample as large as all of them.
+        // One sample as large as all of them together.
         let exact = estimate(&asked(1), &OPTIMUM, &outcomes(1, size * samples)).unwrap().moments;
         let exact = [exact.mean, exact.coefficient_of_variation];
         for i in 0..2 {

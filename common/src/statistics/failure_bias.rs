@@ -1,10 +1,11 @@
-//! What failed realizations may have done to the moments.
+//! Estimate of the bias that failed realizations may have caused in the moments.
 //!
-//! A failed realization has no velocity V, but W = √(c1111/ρ) of its tensor is known from its germs, and
-//! W explains nearly all of V. So each failed one is given the velocity that the regression of V on W and
-//! W², over the successes, has at its own W. What the moments of all, given and computed, differ by from
-//! those of the successes is the size of the possible bias: only its size, since a bone whose first arrival
-//! cannot be found need not have the velocity of its neighbours.
+//! A failed realization has no velocity V, but W = √(c1111/ρ) of its tensor is known from its
+//! germs, and W explains nearly all of V. Therefore each failed one is given the velocity that the
+//! regression of V on W and W², over the successes, has at its own W. The difference between the
+//! moments of all velocities, including the estimated ones, and those of the successes is the size
+//! of the possible bias. It is only an indication of the size, since a bone whose first arrival
+//! cannot be found need not have the velocity of similar bones.
 
 use super::central::central;
 use super::sum::Sum;
@@ -14,12 +15,12 @@ use crate::parameters::Point;
 use crate::realization::Ensemble;
 use crate::results::Moments;
 
-/// Fewest successes of which a parabola is more than their noise.
+/// Minimum number of successes for a parabola that is more than a fit of their noise.
 const SUCCESSES_MIN: usize = 10;
 
-/// Moments that all realizations would have, by the regression of the velocity on √(c1111/ρ), less those of
-/// the successes; 0 where none failed, `None` where it cannot be known: of fewer than ten successes, or of
-/// speeds that are all the same.
+/// Returns the moments that all realizations would have, by the regression of the velocity on
+/// √(c1111/ρ), minus those of the successes; 0 if none failed, `None` if it is unknown: for fewer
+/// than ten successes, or if all speeds are equal.
 pub fn failure_bias(
     monte_carlo: &MonteCarlo,
     point: &Point,
@@ -80,7 +81,7 @@ impl Parabola {
         let coefficients = [0, 1, 2].map(|k| {
             let product = average(pairs().map(|(velocity, speed)| velocity * basis(speed)[k]));
             let square = average(pairs().map(|(_, speed)| basis(speed)[k] * basis(speed)[k]));
-            // Of two different speeds t² is a straight line.
+            // For two different speeds t² is a linear function of t.
             if square > 1e-9 { product / square } else { 0.0 }
         });
         fit.coefficients = coefficients;
@@ -101,8 +102,8 @@ impl Parabola {
         terms.map(|(basis, coefficient)| basis * coefficient).sum()
     }
 
-    /// Moments of all realizations, failed ones with what the parabola gives them and its residuals'
-    /// scatter.
+    /// Returns the moments of all realizations, where failed ones have the parabola's velocity and
+    /// the scatter of its residuals.
     fn completed(&self, outcomes: &[Outcome], speeds: &[f64]) -> Moments {
         let all = || {
             outcomes.iter().zip(speeds).map(|(outcome, &speed)| match outcome {
@@ -136,7 +137,7 @@ mod tests {
 
     const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
 
-    /// Velocities that are a parabola of the speed, those of a speed below `least` failed.
+    /// Velocities that are a parabola of the speed; realizations with a speed below `least` failed.
     fn outcomes(count: u64, least: f64) -> (Vec<f64>, Vec<Outcome>) {
         let ensemble = Ensemble::drawn(&POINT, MonteCarlo::default().germs()).unwrap();
         let velocity = |speed: f64| 100.0 + 0.9 * speed + 1e-5 * speed * speed;

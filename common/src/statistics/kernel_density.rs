@@ -1,11 +1,12 @@
-//! Kernel density of a sample, on a grid: the work is proportional to the number of values, not to its
-//! product with the number of places where the density is asked for.
+//! Kernel density of a sample, on a grid: the work is proportional to the number of values, not to
+//! its product with the number of positions at which the density is evaluated.
 //!
-//! Values are spread over the nodes of a grid by cubic B-splines, smoothed there by a Gaussian of discrete
-//! steps, and read off by cubic B-splines again. What acts between a value and a place is the convolution
-//! of the three: smooth, never negative, with integral 1 and, as the splines' variances (a third of a step's
-//! square each) are taken off the Gaussian's, with the variance that is asked for. With a quarter of the
-//! width as step it differs from a Gaussian by an excess kurtosis of -3e-4.
+//! Values are distributed over the nodes of a grid by cubic B-splines, smoothed there by a Gaussian
+//! of discrete steps, and interpolated by cubic B-splines again. The effective kernel is the
+//! convolution of the three: smooth, never negative, with integral 1. The splines' variances (a
+//! third of a step's square each) are subtracted from the Gaussian's, so the kernel has the
+//! requested variance. With a quarter of the width as step it differs from a Gaussian by an excess
+//! kurtosis of -3e-4.
 
 /// Steps of the grid in one width of the kernel.
 const STEPS: f64 = 4.0;
@@ -14,16 +15,16 @@ const TAPS: usize = 32;
 /// Nodes beyond the values on both sides: the Gaussian's and those of both splines.
 const MARGIN: f64 = TAPS as f64 + 4.0;
 
-/// A density.
+/// A density on a grid.
 pub(super) struct KernelDensity {
     grid: Grid,
-    /// At the nodes; their B-splines interpolate.
+    /// Values at the nodes, interpolated by B-splines.
     density: Vec<f64>,
 }
 
 impl KernelDensity {
-    /// That of `values` with a kernel of this standard deviation, above 0, which is in the unit of the values;
-    /// all are finite, and there is one at least.
+    /// Computes the density of `values` with a kernel of this standard deviation, above 0, in the
+    /// unit of the values; there is at least one value, and all are finite.
     pub(super) fn of(values: &[f64], width: f64) -> Self {
         let grid = Grid::around(values, width);
         let share = 1.0 / (values.len() as f64 * grid.step);
@@ -31,14 +32,15 @@ impl KernelDensity {
         Self { grid, density }
     }
 
-    /// The density at `place` and its derivative.
+    /// Returns the density at `place` and its derivative.
     pub(super) fn at(&self, place: f64) -> (f64, f64) {
         let Some(spline) = self.grid.spline(place) else { return (0.0, 0.0) };
         let slope = spline.read(&self.density, &spline.slopes()) / self.grid.step;
         (spline.read(&self.density, &spline.weights()), slope)
     }
 
-    /// Σ w_j K(x_j - y) as a function of y for pairs (x_j, w_j), K the kernel with integral 1.
+    /// Returns Σ w_j K(x_j - y) as a function of y for pairs (x_j, w_j), where K is the kernel with
+    /// integral 1.
     pub(super) fn reversed(
         &self,
         weighted: impl Iterator<Item = (f64, f64)>,
@@ -61,7 +63,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// With room for the kernel around each value.
+    /// Creates a grid with room for the kernel around each value.
     fn around(values: &[f64], width: f64) -> Self {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -70,7 +72,7 @@ impl Grid {
         Self { first: least - MARGIN * step, step, nodes: nodes as usize }
     }
 
-    /// The splines at `place`; `None` outside the grid.
+    /// Returns the splines at `place`; `None` outside the grid.
     fn spline(&self, place: f64) -> Option<Spline> {
         let position = (place - self.first) / self.step;
         let inside = position >= 1.0 && position < self.nodes as f64 - 2.0;
@@ -80,7 +82,8 @@ impl Grid {
         })
     }
 
-    /// Weights at places, spread over the nodes and smoothed; those outside the grid are left out.
+    /// Distributes the weights over the nodes and smooths them; those outside the grid are left
+    /// out.
     fn smoothed(&self, weighted: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {
         let mut spread = vec![0.0; self.nodes];
         for (place, weight) in weighted {
@@ -102,7 +105,7 @@ impl Grid {
     }
 }
 
-/// The smoothing weights by distance in steps; both sides together add up to 1.
+/// Returns the smoothing weights by distance in steps; both sides together add up to 1.
 fn gaussian() -> [f64; TAPS + 1] {
     let variance = STEPS * STEPS - 2.0 / 3.0;
     let mut weights = [0.0; TAPS + 1];
@@ -114,10 +117,10 @@ fn gaussian() -> [f64; TAPS + 1] {
     weights.map(|weight| weight / all)
 }
 
-/// The four cubic B-splines that are not 0 at a place.
+/// The four cubic B-splines that are not 0 at a position.
 struct Spline {
     first: usize,
-    /// Of a step, from the second of their nodes.
+    /// Position in units of a step, from the second of their nodes.
     fraction: f64,
 }
 
@@ -133,7 +136,7 @@ impl Spline {
         ]
     }
 
-    /// Derivatives of the weights by the place in steps.
+    /// Returns the derivatives of the weights by the position in steps.
     fn slopes(&self) -> [f64; 4] {
         let u = self.fraction;
         let rest = 1.0 - u;
@@ -153,7 +156,7 @@ mod tests {
         libm::exp(-0.5 * x * x / (width * width)) / (width * (2.0 * std::f64::consts::PI).sqrt())
     }
 
-    /// Against the sum over Gaussians; the kurtosis of the kernel is the difference.
+    /// Compares with the sum over Gaussians; the difference is the kurtosis of the kernel.
     #[test]
     fn it_is_the_sum_over_gaussians() {
         let values = [-1.0, 0.3, 0.31, 2.0, 7.77];

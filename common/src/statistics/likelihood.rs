@@ -26,19 +26,20 @@ use crate::parameters::Point;
 use crate::quantile::quantile;
 use crate::results::Moments;
 
-/// Weight ε of the floor: it passes a normal law at 4.4 standard deviations, and biases a standard
-/// deviation by less than 1e-4 of it.
+/// Weight ε of the floor: it exceeds a normal law from 4.4 standard deviations on, and biases a
+/// standard deviation by less than 1e-4 of it.
 const FLOOR: f64 = 1e-4;
 /// The bandwidth in units of the smaller measure of scale, times N^(1/5): twice Silverman's.
 const RULE: f64 = 1.8;
 /// Interquartile range of a normal law in standard deviations, as the rule rounds it.
 const NORMAL_RANGE: f64 = 1.34;
-/// A bandwidth is at least this part of that by the standard deviation, however narrow the middle half is
-/// against the tails: a bound on the grid.
+/// A bandwidth is at least this fraction of the one by the standard deviation, however narrow the
+/// middle half is compared to the tails; this limits the size of the grid.
 const NARROWEST: f64 = 0.1;
 
-/// Minus the mean log likelihood of `measured` velocities (m/s) at a point, nats; infinite at an infeasible
-/// point, and where the model's velocities are all the same. Failed realizations are not in the model's law.
+/// Returns minus the mean log likelihood of `measured` velocities (m/s) at a point, nats; infinite
+/// at an infeasible point, and if all velocities of the model are equal. Failed realizations are
+/// not part of the model's law.
 pub fn likelihood_cost(
     verdict: &Verdict,
     monte_carlo: &MonteCarlo,
@@ -50,18 +51,19 @@ pub fn likelihood_cost(
     law.map_or(f64::INFINITY, |law| law.cost(measured))
 }
 
-/// Standard error of [`likelihood_cost`] by the sampling noise of the model's velocities, the measured ones
-/// as they are. `None` where the model has no law.
+/// Returns the standard error of [`likelihood_cost`] due to the sampling noise of the model's
+/// velocities, for fixed measured velocities. `None` if the model has no law.
 ///
-/// To first order it comes from how much each velocity of the model moves the cost, the bandwidth in units of
-/// the deviation held. That vanishes where the likelihood is largest; what is left there is added, the scatter
-/// of half the mean square of the density's relative noise,
+/// To first order it is the influence of each velocity of the model on the cost, with the bandwidth
+/// in units of the standard deviation held constant. That vanishes where the likelihood is largest;
+/// the second-order error is therefore added, the scatter of half the mean square of the density's
+/// relative noise,
 ///
 /// κ √(½ √(2π) β L),     κ = 1/(2 √π N β),     L = (1/n) Σ min(k(x_j) / (σ f(x_j)²), 1/κ),
 ///
-/// β = c b the kernel's standard deviation in units of σ, k the kernels' part of f: relative noise has the
-/// variance κ k/(σ f²) and the correlation exp(-d²/(4β²)) over the distance d. Of Sobol' points it is
-/// smaller, if anything.
+/// β = c b the kernel's standard deviation in units of σ, k the kernels' part of f: relative noise
+/// has the variance κ k/(σ f²) and the correlation exp(-d²/(4β²)) over the distance d. For Sobol'
+/// points it is equal or smaller.
 pub fn likelihood_error(
     monte_carlo: &MonteCarlo,
     point: &Point,
@@ -102,13 +104,14 @@ struct Law<'a> {
     density: KernelDensity,
 }
 
-/// ln f's share of the kernels and of the floor, both times σ, with their derivatives by (x - v)/σ.
+/// The contributions of the kernels and of the floor to f, both times σ, with their derivatives by
+/// (x - v)/σ.
 struct Parts {
     kernels: (f64, f64),
     floor: (f64, f64),
 }
 
-/// How the cost changes with v, per m/s, and with ln σ.
+/// Derivatives of the cost with respect to v, per m/s, and to ln σ.
 #[derive(Clone, Copy, Default)]
 struct Gradient {
     mean: Sum,
@@ -144,7 +147,7 @@ impl<'a> Law<'a> {
         libm::log(self.deviation) - sum.total() / measured.len() as f64
     }
 
-    /// (x - v)/σ of a velocity.
+    /// Returns (x - v)/σ of a velocity.
     fn score(&self, velocity: f64) -> f64 {
         (velocity - self.mean) / self.deviation
     }
@@ -159,10 +162,11 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// N times what each realization adds to the cost, to first order, in index order; 0 of failures.
+    /// Returns N times the influence of each realization on the cost, to first order, in index
+    /// order; 0 for failures.
     ///
-    /// A realization that counts a little more raises the density around itself, and moves v, σ, V̄ and s. The
-    /// density of scores keeps its kernels, of which V̄ and s move the places only.
+    /// A larger weight of a realization raises the density around itself, and moves v, σ, V̄ and s.
+    /// The density of scores keeps its kernels; V̄ and s only move their positions.
     fn influences(&self, outcomes: &[Outcome], measured: &[f64]) -> Vec<f64> {
         let count = measured.len() as f64;
         let [of_kernels, of_floor] = self.gradients(measured);
@@ -187,7 +191,7 @@ impl<'a> Law<'a> {
             .zip(of_moments)
             .map(|(outcome, moments)| outcome.map_or(0.0, |velocity| of(velocity, moments)))
             .collect();
-        // Weights add up to 1: more of one is less of all.
+        // Weights add up to 1: more of one means less of all others.
         let mut sum = Sum::default();
         influences.iter().for_each(|&influence| sum.add(influence));
         let average = sum.total() / self.sample.central.count;
@@ -197,7 +201,8 @@ impl<'a> Law<'a> {
         influences
     }
 
-    /// What the density's noise leaves of the error where the influences vanish.
+    /// Returns the second-order error due to the noise of the density, which remains where the
+    /// influences vanish.
     fn second_order_error(&self, measured: &[f64]) -> f64 {
         use std::f64::consts::PI;
         let noise = 1.0 / (2.0 * PI.sqrt() * self.sample.central.count * self.width);
@@ -205,14 +210,14 @@ impl<'a> Law<'a> {
         for &velocity in measured {
             let parts = self.parts(self.score(velocity));
             let density = parts.density();
-            // Where less than one kernel counts the expansion says nothing.
+            // The expansion is not valid where less than one kernel contributes.
             sum.add((parts.kernels.0 / (density * density)).min(1.0 / noise));
         }
         let extent = sum.total() / measured.len() as f64;
         noise * (0.5 * (2.0 * PI).sqrt() * self.width * extent).sqrt()
     }
 
-    /// Those of the kernels' part and of the floor's.
+    /// Returns the gradients of the kernels' part and of the floor's part.
     fn gradients(&self, measured: &[f64]) -> [Gradient; 2] {
         let count = measured.len() as f64;
         let mut gradients = [Gradient::default(); 2];
@@ -237,13 +242,13 @@ impl Parts {
 }
 
 impl Gradient {
-    /// The change with v by `mean` and ln σ by `deviation`.
+    /// Returns the change with v by `mean` and ln σ by `deviation`.
     fn along(&self, mean: f64, deviation: f64) -> f64 {
         self.mean.total() * mean + self.deviation.total() * deviation
     }
 }
 
-/// b of standardised values.
+/// Returns b of standardised values.
 fn bandwidth(scores: &[f64]) -> Option<f64> {
     let mut ascending = scores.to_vec();
     ascending.sort_unstable_by(f64::total_cmp);

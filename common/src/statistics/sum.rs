@@ -1,4 +1,4 @@
-//! Sums that lose nothing.
+//! Compensated summation.
 
 /// Neumaier's compensated sum.
 #[derive(Clone, Copy, Default)]

@@ -22,7 +22,7 @@ impl Place {
         path
     }
 
-    /// A certificate with its key, valid from one year to another.
+    /// Creates a certificate with its key, valid between these two years.
     fn pair(&self, name: &str, from: i32, to: i32) -> (PathBuf, PathBuf) {
         let key = KeyPair::generate().unwrap();
         let mut params = CertificateParams::default();
@@ -41,7 +41,7 @@ fn a_certificate_and_its_key_are_read() {
     let place = Place::new();
     let (certificate, key) = place.pair("good", 2000, 4000);
     assert_eq!(identity(&certificate, &key).unwrap().chain.len(), 1);
-    // As services get their secrets mounted.
+    // The permissions of mounted secrets.
     fs::set_permissions(&key, fs::Permissions::from_mode(0o440)).unwrap();
     assert!(identity(&certificate, &key).is_ok());
 }
@@ -115,7 +115,7 @@ fn a_token_is_read_or_refused_without_being_told() {
     }
 }
 
-/// As a shell gives it: `--token-file <(pass show osteon)`.
+/// Like a shell's process substitution: `--token-file <(pass show osteon)`.
 #[test]
 fn what_comes_through_a_pipe_is_read_once() {
     let place = Place::new();
@@ -129,7 +129,7 @@ fn what_comes_through_a_pipe_is_read_once() {
     assert!(matches!(again, CredentialError::EmptyPipe { .. }), "{again}");
     assert!(again.to_string().contains("name a file"), "{again}");
 
-    // Certificates and keys, and pipes that have a name.
+    // Certificates, keys, and named pipes.
     let (certificate, key) = place.pair("good", 2000, 4000);
     let named = place.0.path().join("named");
     assert!(std::process::Command::new("mkfifo").arg(&named).status().unwrap().success());

@@ -31,7 +31,7 @@ fn files_that_do_not_fit_the_address_are_refused_unread() {
         ("unix:a", "key", "--tls-key is for TLS"),
         ("http://a:1", "token", "not sent to http://a:1 in the clear"),
         ("http://10.0.0.1:1", "token", "in the clear"),
-        // These are read.
+        // These combinations are accepted, so the files are read.
         ("http://127.0.0.1:1", "token", "cannot read /nonexistent/token"),
         ("http://localhost:1", "token", "cannot read /nonexistent/token"),
         ("unix:a", "token", "cannot read /nonexistent/token"),

@@ -1,4 +1,4 @@
-//! Results over the wire.
+//! Tests of the conversion of results to and from messages.
 
 use osteon_fuzz::properties;
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{JobFailure, PointMeaning, Status};
 
-/// Any number, with both zeros, infinite ones and numbers that are too small to be normal.
+/// Any number, including both zeros, infinities and subnormal numbers.
 fn number() -> impl Strategy<Value = f64> {
     use proptest::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE
@@ -114,7 +114,7 @@ prop_compose! {
     }
 }
 
-/// One of the seven in their order, each as likely as not, but at least one.
+/// A subset of the seven parameters in their order, each with probability ½, but at least one.
 fn free() -> impl Strategy<Value = Vec<Parameter>> {
     proptest::sample::subsequence(Parameter::ALL.to_vec(), 1..=7)
 }
@@ -268,7 +268,7 @@ properties! {
         let outcomes = result.best.as_ref().map(|best| best.outcomes.clone());
         let message = to_message(&result);
         let read = from_message(&message, outcomes.unwrap_or_default(), result.groups.clone());
-        // Zeros keep their signs, too.
+        // The debug format also compares the signs of zeros.
         prop_assert_eq!(format!("{:?}", read.as_ref().ok()), format!("{:?}", Some(&result)));
         prop_assert_eq!(read, Ok(result));
     }
@@ -320,7 +320,7 @@ fn what_no_coordinator_writes_is_refused() {
     );
 }
 
-/// A result of an identification with everything there can be.
+/// A result of an identification in which every field is set.
 fn complete() -> v1::JobResult {
     let spread = Spread { smallest: 1.0, largest: 3.0, mean: 2.0 };
     let quantity = Quantity {
@@ -405,7 +405,7 @@ fn conclusions_with_a_part_missing_are_refused() {
     assert_eq!(refused(|m| m.failure = 99), "failure");
     assert_eq!(refused(|m| m.sensitivities[0].mean = None), "mean");
     assert_eq!(refused(|m| m.sensitivities[0].parameter = 0), "parameter");
-    // A component of a parameter that nothing else says is free.
+    // A component for a parameter that no other field declares to be free.
     assert_eq!(refused(|m| m.sensitivities[0].parameter = 7), "dispersion");
     assert_eq!(refused(|m| identified(m).bulk_velocity = None), "bulk_velocity");
     assert_eq!(refused(|m| identified(m).sampling_noise = None), "sampling_noise");

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// The paper's box, all parameters free.
+/// The paper's search box, with all parameters free.
 const RANGES: [(f64, f64, f64); 7] = [
     (1700.0, 1500.0, 2000.0),
     (18e9, 12e9, 25e9),
@@ -27,7 +27,7 @@ fn parameters() -> impl Strategy<Value = [Range; 7]> {
             let (start, lower, upper) = RANGES[i];
             let (fixed, shift) = choices[i];
             let value = start + 0.01 * shift * (upper - lower);
-            // An identification needs something to search.
+            // An identification needs at least one free parameter.
             if fixed && i < 6 {
                 Range::Fixed(value)
             } else {
@@ -39,7 +39,7 @@ fn parameters() -> impl Strategy<Value = [Range; 7]> {
 
 fn data() -> impl Strategy<Value = Data> {
     prop_oneof![
-        // The first keeps the others from being all equal.
+        // The fixed first value keeps the velocities from being all equal.
         proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
             velocities.insert(0, 1999.0);
             Data::Velocities(velocities)
@@ -175,7 +175,7 @@ fn the_default_tolerance_is_that_of_the_method() {
     assert_eq!(specification.search.cost_tolerance, 1e-12);
 }
 
-/// The fields at fault after `change`, in the order they are reported.
+/// Returns the fields at fault after `change`, in the order in which they are reported.
 fn faults(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     let mut message = message();
     change(&mut message);
@@ -183,7 +183,7 @@ fn faults(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     violations.iter().map(|violation| violation.field.clone()).collect()
 }
 
-/// Gives everything that belongs to the hybrid method.
+/// Switches to the hybrid method and sets everything that belongs to it.
 fn of_hybrid(
     message: &mut v1::JobSpecification,
     method: i32,
@@ -237,7 +237,7 @@ fn each_fault_is_named_by_its_path() {
     }
 }
 
-/// All that is said about a message after `change`.
+/// Returns all messages about a specification after `change`.
 fn refusal(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     let mut message = message();
     change(&mut message);
@@ -245,7 +245,7 @@ fn refusal(change: impl FnOnce(&mut v1::JobSpecification)) -> Vec<String> {
     violations.iter().map(ToString::to_string).collect()
 }
 
-/// Gives other data.
+/// Replaces the data by these moments.
 fn moments(message: &mut v1::JobSpecification, mean: f64, variation: f64) {
     message.data = Some(v1::Data {
         mean: Some(mean),
@@ -254,7 +254,7 @@ fn moments(message: &mut v1::JobSpecification, mean: f64, variation: f64) {
     });
 }
 
-/// Gives another range of e_L.
+/// Replaces the range of e_L.
 fn modulus(message: &mut v1::JobSpecification, start: f64, lower: f64, upper: f64) {
     let range = v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper });
     let range = Some(v1::ParameterRange { range: Some(range) });
@@ -359,13 +359,13 @@ fn a_message_names_the_fields_that_it_has() {
     assert!(unknown.contains("PARAMETER_DENSITY or "), "{unknown}");
 }
 
-/// What a job file and a message say that say no more than they must, the methods aside.
+/// Returns the minimal specification, read from a job file and from a message, with these methods.
 fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecification; 2] {
     let free = |parameter| kind == JobKind::Identification && parameter == Parameter::Dispersion;
     let mut text = String::new();
     let mut message =
         v1::JobSpecification { kind: JOB_KIND.number(kind), ..v1::JobSpecification::default() };
-    // What is the default, too, is not said.
+    // The default method is left out.
     if search != SearchMethod::default() {
         text.push_str(&format!("[search]\nmethod = \"{}\"\n", search.name()));
         let method = SEARCH_METHOD.number(search);
@@ -399,7 +399,7 @@ fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecifica
     [of_file, from_message(&message).unwrap()]
 }
 
-/// The whole specifications are compared, so that no key is left out, whichever comes.
+/// Compares whole specifications, so that no key is forgotten, including keys added later.
 #[test]
 fn what_is_left_out_of_a_message_is_what_is_left_out_of_a_file() {
     for kind in [JobKind::Identification, JobKind::Propagation] {

@@ -1,4 +1,4 @@
-//! A job in one call against its search, driven by hand.
+//! Compares a job in one call with its search, driven step by step.
 
 use std::convert::Infallible;
 
@@ -28,7 +28,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
 
 const MOMENTS: Data = Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 };
 
-/// The speed of the bulk wave in place of the solver's velocity.
+/// Uses the speed of the bulk wave instead of the solver's velocity.
 fn speeds(realizations: &Realizations) -> Vec<Solved> {
     let speed = |index| {
         let bone = realizations.ensemble.bone(index).unwrap();
@@ -102,7 +102,7 @@ fn a_propagation_is_one_evaluation() {
     assert_eq!(result.best.unwrap().point, specification.start());
 }
 
-/// What comes of `change` to the realizations of evaluation 2.
+/// Returns the error after `change` to the realizations of evaluation 2.
 fn refused(change: impl Fn(Vec<Solved>) -> Result<Vec<Solved>, &'static str>) -> String {
     let mut number = 0;
     let evaluate = |realizations: &Realizations| {

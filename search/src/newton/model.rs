@@ -1,13 +1,13 @@
-//! What a search believes of the moments: the closed form, corrected by what was evaluated.
+//! The model of the moments: the closed form, corrected by the evaluations.
 //!
-//! The believed logarithms of mean velocity and coefficient of variation at x are
+//! The model's logarithms of mean velocity and coefficient of variation at x are
 //!
-//! y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ),
+//!     y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ),
 //!
-//! with the offset e such that y is right at the evaluated point x_k, and the slopes E learnt from
-//! other evaluations. The Jacobian is that of s plus E: structured Broyden (Dennis and Walker,
+//! where the offset e makes y exact at the evaluated point x_k, and the slopes E are learnt from
+//! the other evaluations. The Jacobian is that of s plus E: structured Broyden (Dennis and Walker,
 //! SIAM J. Numer. Anal. 18, 1981), which for E alone is Broyden's own update (Math. Comp. 19,
-//! 1965). What is strongly curved is in s and known; the rest is nearly constant.
+//! 1965). The strongly curved part is s, which is known; the rest is nearly constant.
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
@@ -19,38 +19,43 @@ use super::nearest::{Rows, dot, nearest, norm};
 /// Logarithms of mean velocity (m/s) and coefficient of variation.
 pub(super) type Logarithms = [f64; 2];
 
-/// Most linearisations of the closed form on the way to its solution; four to eight are usual, where
-/// the points that match are strongly curved a hundred.
+/// Maximum number of linearisations of the closed form on the way to its solution. Four to eight
+/// are usual; where the matching points are strongly curved, a hundred.
 const LINEARISATIONS_MAX: usize = 300;
-/// Most to come to rest among the points that match, once there: where these bend nearly as the
-/// sphere around the start does, it takes a thousand.
+/// Maximum number of linearisations to converge among the matching points once they are reached.
+/// Where these bend nearly as much as the sphere around the start, convergence takes a thousand.
 const SLOW_LINEARISATIONS_MAX: usize = 3000;
-/// Descents besides the one from the evaluated point. Of 8000 starts in the box of the paper's
-/// example that one alone missed the nearest point 27 times, with these it was never missed; of
-/// 2400 problems in other boxes, up to six times as wide, 50 times alone and 5 times with these.
+/// Number of descents besides the one from the evaluated point. Of 8000 starts in the box of the
+/// paper's example, the latter alone missed the nearest point 27 times, and with these it was never
+/// missed; of 2400 problems in other boxes, up to six times as wide, 50 times alone and 5 times
+/// with these.
 const DESCENTS: u64 = 32;
-/// The points where they begin are uniform in the box: germs of this seed, the same in each search.
+/// Seed of the descents' starting points, which are uniform in the box and the same in every
+/// search.
 const DESCENTS_SEED: u64 = 1;
-/// Most linearisations of each of them. With 300 they found no more.
+/// Maximum number of linearisations of each of them. With 300 they found nothing more.
 const DESCENT_LINEARISATIONS_MAX: usize = 60;
-/// A descent that comes this near to an end, in edges of the box, goes there too.
+/// A descent that comes this near to the end of an earlier one, in edges of the box, would end
+/// there too.
 const SAME_END: f64 = 1e-3;
-/// The end of another descent is taken when it is nearer to the start by this, in edges of the box.
+/// The end of another descent is preferred if it is nearer to the start by at least this, in edges
+/// of the box.
 const NEARER_MIN: f64 = 1e-6;
-/// Steps that turn back, and are longer than this share of the one before, are too long.
+/// A step that reverses direction and is longer than this fraction of the one before is too long.
 const TURNED_BACK: f64 = 0.3;
-/// Smallest share of a step that is taken for that reason.
+/// Smallest fraction to which such a step is shortened.
 const SHARE_MIN: f64 = 1.0 / 64.0;
-/// A step this small, in units of the box, changes nothing.
+/// Steps this small, in units of the box, count as zero.
 const STEP_MIN: f64 = 1e-12;
-/// Equations met to this are solved.
+/// Equations count as solved if their residuals are at most this.
 const SOLVED: f64 = 1e-8;
-/// Most halvings of a step that leaves the admissible points.
+/// Maximum number of halvings of a step that leaves the admissible points.
 const HALVINGS_MAX: usize = 40;
-/// A shorter move says nothing about slopes: velocities jump by 1e-9 where the solver's sampling changes.
+/// Shorter moves give no information about slopes: velocities jump by 1e-9 where the solver's
+/// sampling changes.
 const TELLING_MOVE_MIN: f64 = 1e-7;
 
-/// What is believed of the moments.
+/// The model of the moments.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Model {
     space: SearchBox,
@@ -62,42 +67,42 @@ pub(super) struct Model {
     slopes: Rows,
 }
 
-/// What is least at the point that is looked for.
+/// The quantity that a descent minimises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Goal {
-    /// The difference of the logarithms: of all measures the most linear, with the same zero.
+    /// The difference of the logarithms: the most linear of all measures with this zero.
     Logarithms,
-    /// The cost itself, where there is no zero.
+    /// The cost itself, used where it has no zero.
     Cost,
 }
 
-/// What a descent is for, and how far it goes.
+/// Goal and limits of a descent.
 #[derive(Debug, Clone, Copy)]
 struct Descent<'a> {
     goal: Goal,
     start: &'a [f64],
     target: Logarithms,
     linearisations_max: usize,
-    /// It stops beside this end of another descent.
+    /// The descent stops near this end of an earlier descent.
     other: Option<&'a [f64]>,
 }
 
 impl Model {
-    /// The model of which nothing is known but the closed form and this offset.
+    /// Creates the model that consists of the closed form and this offset only.
     pub(super) fn new(space: SearchBox, at: Vec<f64>, offset: Logarithms) -> Self {
         let slopes = [vec![0.0; at.len()], vec![0.0; at.len()]];
         Self { space, at, offset, slopes }
     }
 
-    /// Makes the model right at `at`, where `found` was evaluated.
+    /// Makes the model exact at `at`, where `found` was evaluated.
     pub(super) fn settle_on(&mut self, at: &[f64], found: Logarithms) {
         let Some((closed, _)) = closed_form(&self.space, at) else { return };
         self.offset = difference(found, closed);
         self.at = at.to_vec();
     }
 
-    /// Broyden's update: the slopes change as little as they can for the model to be right at `at`,
-    /// where `found` was evaluated, and where it was before.
+    /// Broyden's update: the smallest change of the slopes with which the model is exact both at
+    /// `at`, where `found` was evaluated, and at its present point.
     pub(super) fn learn(&mut self, at: &[f64], found: Logarithms) {
         let step = subtract(at, &self.at);
         let square = dot(&step, &step);
@@ -113,8 +118,8 @@ impl Model {
         }
     }
 
-    /// Makes the slopes along one axis right, from what was `found` at a point that differs from
-    /// the model's own in that coordinate only.
+    /// Corrects the slopes along one axis, from `found` at a point that differs from the model's
+    /// own in that coordinate only.
     pub(super) fn learn_along(&mut self, axis: usize, at: &[f64], found: Logarithms) {
         let step = at[axis] - self.at[axis];
         let Some((believed, _)) = self.believed(at) else { return };
@@ -123,19 +128,21 @@ impl Model {
         }
     }
 
-    /// Forgets the slopes: the Jacobian is the closed form's again. Whether that changed anything.
+    /// Resets the slopes, so that the Jacobian is the closed form's again. Returns whether this
+    /// changed anything.
     pub(super) fn forget_slopes(&mut self) -> bool {
         let changed = self.slopes.iter().flatten().any(|slope| *slope != 0.0);
         self.slopes.iter_mut().flatten().for_each(|slope| *slope = 0.0);
         changed
     }
 
-    /// Of the admissible points that the model takes for `target`, the one nearest to `start` that
-    /// is found by [`Self::nearest_from_here`] and [`DESCENTS`] more descents, which begin all over
-    /// the box; where the first of them finds none, where that ends.
+    /// Returns the point nearest to `start` among the admissible solutions of the model for
+    /// `target` that are found by [`Self::nearest_from_here`] and [`DESCENTS`] more descents, which
+    /// begin all over the box. If the first descent finds no solution, returns the point where it
+    /// ended.
     ///
-    /// The points that match are a curved surface, on which several points may be nearer to the
-    /// start than all others around them. A descent ends at one of these.
+    /// The solutions form a curved surface, which may have several points that are locally nearest
+    /// to the start. A descent ends at one of these.
     pub(super) fn nearest(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
         let mut nearest = self.nearest_from_here(start, target);
         if !self.solves(&nearest, target) {
@@ -163,14 +170,14 @@ impl Model {
         nearest
     }
 
-    /// An admissible point that the model takes for `target` and that is nearer to `start` than all
-    /// others around it, by a descent from the evaluated point; where it finds none, of the points
-    /// around with the least cost.
+    /// Returns an admissible solution of the model for `target` that is locally nearest to `start`,
+    /// by a descent from the evaluated point; if it finds none, returns a local minimum of the
+    /// cost.
     ///
-    /// The descent linearises the model again and again: each linearisation has a nearest point,
-    /// and where these come to rest, the way from the start is normal to the model's solutions
-    /// (within the active bounds). Where those are curved more strongly than the sphere around the
-    /// start, whole steps would go to and fro, and shares are taken.
+    /// The descent repeats a linearisation of the model: each linearisation has a nearest point,
+    /// and where these converge, the line from the start is normal to the model's solutions (within
+    /// the active bounds). Where the solutions are curved more strongly than the sphere around the
+    /// start, full steps would oscillate, so the steps are shortened.
     pub(super) fn nearest_from_here(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
         let mut at = self.at.clone();
         for goal in [Goal::Logarithms, Goal::Cost] {
@@ -188,13 +195,13 @@ impl Model {
         at
     }
 
-    /// Whether the model takes this point for `target`.
+    /// Returns whether this point solves the model for `target`.
     fn solves(&self, at: &[f64], target: Logarithms) -> bool {
         let missed = self.believed(at).map(|(believed, _)| difference(believed, target));
         missed.is_some_and(|missed| missed.iter().all(|d| d.abs() < SOLVED))
     }
 
-    /// Linearises until that comes to rest. Whether it does.
+    /// Linearises repeatedly until the point converges. Returns whether it does.
     fn approach(&self, at: &mut Vec<f64>, descent: &Descent<'_>) -> bool {
         let Descent { goal, start, target, linearisations_max, other } = *descent;
         let mut share = 1.0;
@@ -217,7 +224,7 @@ impl Model {
         false
     }
 
-    /// Two equations, linear in the coordinates, that say that `goal` is reached.
+    /// Returns two equations, linear in the coordinates, that express that `goal` is reached.
     fn linear(&self, goal: Goal, at: &[f64], target: Logarithms) -> Option<(Rows, [f64; 2])> {
         let (believed, mut rows) = self.believed(at)?;
         let mut residual = difference(believed, target);
@@ -232,7 +239,7 @@ impl Model {
         Some((rows, right))
     }
 
-    /// The step, or as much of it as stays admissible.
+    /// Makes the step, or the largest part of it (by halving) that stays admissible.
     fn admissible_step(&self, from: &[f64], step: &[f64], mut share: f64) -> Vec<f64> {
         for _ in 0..HALVINGS_MAX {
             let to: Vec<f64> =
@@ -245,7 +252,8 @@ impl Model {
         from.to_vec()
     }
 
-    /// Value and Jacobian at a point; `None` where the closed form has none.
+    /// Returns the model's value and Jacobian at a point; `None` where the closed form is
+    /// undefined.
     pub(super) fn believed(&self, at: &[f64]) -> Option<(Logarithms, Rows)> {
         let (closed, mut rows) = closed_form(&self.space, at)?;
         let step = subtract(at, &self.at);
@@ -256,7 +264,7 @@ impl Model {
     }
 }
 
-/// ln √(c1111/ρ) and ln δ with their derivatives with respect to the coordinates.
+/// Returns ln √(c1111/ρ) and ln δ with their derivatives with respect to the coordinates.
 fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(Logarithms, Rows)> {
     let point = space.point(at);
     let velocity = bulk_velocity(&point).ok()?;
@@ -271,7 +279,7 @@ fn difference(a: Logarithms, b: Logarithms) -> Logarithms {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// a - b.
+/// Returns a - b.
 pub(super) fn subtract(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }

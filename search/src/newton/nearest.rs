@@ -1,17 +1,20 @@
-//! The point of the unit box that is nearest to a start, among those that solve two linear
-//! equations; where none does, among those that come nearest to solving them.
+//! The point of the unit box nearest to a start among the solutions of two linear equations, or, if
+//! there are none in the box, among the points with the smallest residuals.
 
-/// Weight of a violated equation: minimised is |x - start|² + |J x - b|² / `SOFTNESS`. So the
-/// equations are met to about 1e-10 where they can be met in the box, and where they cannot, their
-/// least squares win over the distance. Much smaller, and rounding spoils the latter.
+/// Weight of a violated equation: the minimised function is |x - start|² + |J x - b|² / `SOFTNESS`.
+/// The equations are thus met to about 1e-10 where they can be met in the box; where they cannot,
+/// their least squares outweigh the distance. With a much smaller value rounding errors spoil the
+/// latter case.
 const SOFTNESS: f64 = 1e-10;
-/// Most steps on the multipliers; three to ten are usual, each leaves a bound or reaches one.
+/// Maximum number of steps on the multipliers; three to ten are usual, and each leaves a bound or
+/// reaches one.
 const STEPS_MAX: usize = 100;
-/// Most halvings of an interval of step lengths.
+/// Maximum number of halvings of an interval of step lengths.
 const HALVINGS_MAX: usize = 60;
-/// Equations met to this need no further step.
+/// Equations with residuals of at most this need no further step.
 const MET: f64 = 1e-14;
-/// Nor do multipliers that change by less than this fraction: rounding, where they are large.
+/// The iteration also ends if the multipliers change by less than this fraction, which is rounding
+/// error where they are large.
 const CHANGE_MIN: f64 = 1e-13;
 
 /// Two rows of coefficients, one for each equation.
@@ -20,10 +23,11 @@ pub type Rows = [Vec<f64>; 2];
 /// Minimises |x - start|² + |rows · x - right|² / `SOFTNESS` over the unit box.
 ///
 /// The dual of that problem has two unknowns, the multipliers λ: x is the start moved by rowsᵀ λ
-/// and cut to the box, and λ solves rows · x(λ) - right + `SOFTNESS` λ = 0, the gradient of a
-/// convex function that is piecewise quadratic, a piece for each set of active bounds. Newton's
-/// method with an exact search along each step ends on it: an active set that may change in many
-/// bounds at once (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2002).
+/// and clipped to the box, and λ solves rows · x(λ) - right + `SOFTNESS` λ = 0. The left side is
+/// the gradient of a convex function that is piecewise quadratic, with one piece for each set of
+/// active bounds. Newton's method with an exact search along each step ends on the solution; this
+/// is an active-set method in which many bounds may change at once (Hintermüller, Ito and Kunisch,
+/// SIAM J. Optim. 13, 2002).
 pub fn nearest(start: &[f64], rows: &Rows, right: [f64; 2]) -> Vec<f64> {
     let dual = Dual { start, rows, right };
     let mut multipliers = [0.0; 2];
@@ -70,7 +74,7 @@ impl Dual<'_> {
         gradient
     }
 
-    /// The step to the minimum of the present quadratic piece.
+    /// Returns the step to the minimum of the current quadratic piece.
     fn newton_step(&self, multipliers: [f64; 2], gradient: [f64; 2]) -> [f64; 2] {
         // The matrix [a b; b d] of second derivatives.
         let [mut a, mut b, mut d] = [SOFTNESS, 0.0, SOFTNESS];
@@ -82,13 +86,13 @@ impl Dual<'_> {
                 d += second * second;
             }
         }
-        // Cholesky: the pivots stay above zero where the determinant's difference cancels.
+        // Cholesky: the pivots stay above zero where the difference in the determinant cancels.
         let pivot = (d - b * (b / a)).max(SOFTNESS);
         let second = -(gradient[1] - gradient[0] * (b / a)) / pivot;
         [-(gradient[0] + b * second) / a, second]
     }
 
-    /// The share of `step`, at most 1, at which the convex function is lowest along it.
+    /// Returns the fraction of `step`, at most 1, at which the convex function is lowest along it.
     fn share(&self, multipliers: [f64; 2], step: [f64; 2]) -> f64 {
         let slope = |share: f64| {
             let gradient = self.gradient(moved(multipliers, step, share));
@@ -106,7 +110,7 @@ impl Dual<'_> {
                 upper = middle;
             }
         }
-        // The end where the function still falls, unless that is no step at all.
+        // Take the end where the function still falls, unless that is no step at all.
         if lower > 0.0 { lower } else { upper }
     }
 }
@@ -119,12 +123,12 @@ fn moved(from: [f64; 2], step: [f64; 2], share: f64) -> [f64; 2] {
     [from[0] + share * step[0], from[1] + share * step[1]]
 }
 
-/// Σ a_i b_i in the order of the axes.
+/// Returns Σ a_i b_i, summed in the order of the axes.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
 }
 
-/// Euclidean.
+/// Returns the Euclidean norm.
 pub(super) fn norm(vector: &[f64]) -> f64 {
     dot(vector, vector).sqrt()
 }

@@ -1,4 +1,5 @@
-//! Moments that follow the rule nearly, hardly, or not at all; walls; data out of reach.
+//! Tests with moments that follow the closed form nearly, hardly, or not at all; with infeasible
+//! regions; and with data out of reach.
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
@@ -28,7 +29,7 @@ const BOUNDS: [(f64, f64); 7] = [
 ];
 const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
-/// All seven are free; a start is given in units of the box.
+/// A box in which all seven parameters are free; the start is given in units of the box.
 fn all_free(start: &[f64; 7]) -> SearchBox {
     let mut start = start.iter();
     SearchBox::new(BOUNDS.map(|(lower, upper)| {
@@ -37,7 +38,8 @@ fn all_free(start: &[f64; 7]) -> SearchBox {
     }))
 }
 
-/// Only those of `free` are, from the middle of their bounds; the others are the optimum's.
+/// A box in which only `free` are free, starting in the middle of their bounds; the others are the
+/// optimum's.
 fn some_free(free: &[usize]) -> SearchBox {
     let ranges = std::array::from_fn(|i| {
         let (lower, upper) = BOUNDS[i];
@@ -51,7 +53,8 @@ fn some_free(free: &[usize]) -> SearchBox {
     SearchBox::new(ranges)
 }
 
-/// The moments of a bone, to some per cent: the rule, and what is measured to depart from it.
+/// Approximate moments of a bone, to some per cent: the closed form, and the measured departure
+/// from it.
 fn bone(point: &Point) -> Moments {
     let ln = |axis: usize| libm::log(point.0[axis] / OPTIMUM.0[axis]);
     let velocity = libm::exp(bulk_velocity(point).unwrap().logarithm);
@@ -67,7 +70,7 @@ fn bone(point: &Point) -> Moments {
     }
 }
 
-/// The rule, and nothing else.
+/// The closed form alone.
 fn rule(point: &Point) -> Moments {
     Moments {
         mean: libm::exp(bulk_velocity(point).unwrap().logarithm),
@@ -75,7 +78,7 @@ fn rule(point: &Point) -> Moments {
     }
 }
 
-/// What a finished search leaves.
+/// Result of a finished search.
 #[derive(Debug, PartialEq)]
 struct Found {
     stop: Stop,
@@ -84,7 +87,7 @@ struct Found {
     at: Vec<f64>,
 }
 
-/// The search with these moments (`None`: infeasible) to its end.
+/// Runs the search with these moments (`None`: infeasible) to its end.
 fn search(
     space: SearchBox,
     data: Moments,
@@ -115,8 +118,9 @@ fn search(
     }
 }
 
-/// Distance of `at` from the nearest point to the start, of the solutions as they are linearised
-/// there by central differences of the moments themselves; and that point's distance from the start.
+/// Returns the distance of `at` from the nearest solution to the start, with the solutions
+/// linearised there by central differences of the moments themselves; and that solution's distance
+/// from the start.
 fn off_nearest(space: SearchBox, at: &[f64], moments: &dyn Fn(&Point) -> Moments) -> (f64, f64) {
     let y = |at: &[f64]| logarithms(moments(&space.point(at)));
     let mut rows = [vec![0.0; at.len()], vec![0.0; at.len()]];
@@ -141,8 +145,8 @@ fn unit() -> impl Strategy<Value = [f64; 7]> {
     prop::array::uniform7(0.0..=1.0_f64)
 }
 
-/// Of starts all over the box; one in a hundred or so begins beside points that are not admissible,
-/// where c1111 changes so fast that it takes more.
+/// Starts are all over the box. About one in a hundred begins near inadmissible points, where c1111
+/// changes so fast that more evaluations are needed.
 #[test]
 fn a_bone_is_found_in_a_few_evaluations() {
     const SEED: u64 = 17;
@@ -170,8 +174,8 @@ fn a_bone_is_found_in_a_few_evaluations() {
 }
 
 properties! {
-    /// The answer against the nearest point of the solutions as they are linearised there, by
-    /// central differences of the moments themselves.
+    /// Compares the solution with the nearest point to the start, with the solutions linearised
+    /// there by central differences of the moments themselves.
     fn the_answer_is_the_nearest_to_the_start(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
@@ -181,7 +185,7 @@ properties! {
         prop_assert!(off <= 0.08 * distance + 1e-6, "off by {off} of {distance}: {found:?}");
     }
 
-    /// Where the closed form is all there is, nothing is left to be learnt: one step, to the point.
+    /// If the closed form is exact, there is nothing to learn: one step reaches the point.
     fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
@@ -191,7 +195,7 @@ properties! {
         prop_assert!(off <= 1e-5, "off by {off}: {found:?}");
     }
 
-    /// Whatever is told, it ends, and asks for no more than it may.
+    /// For any costs and moments it ends, within the maximum number of evaluations.
     fn it_ends_whatever_it_is_told(
         start in unit(),
         seed in any::<u64>(),
@@ -234,7 +238,7 @@ fn a_start_that_matches_is_the_answer() {
 
 #[test]
 fn what_the_data_leave_free_and_do_not_feel_does_not_move() {
-    // By the closed form alone, g_L says nothing.
+    // By the closed form alone, g_L has no influence.
     let start = [0.3; 7];
     let found = search(all_free(&start), rule(&OPTIMUM), SETTINGS, |p| Some(rule(p)));
     assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 2));
@@ -260,7 +264,7 @@ fn the_dispersion_alone_can_match_data_made_with_the_other_values() {
     assert_eq!(found.stop, Stop::CostReached, "{found:?}");
 }
 
-/// The least cost of one free coordinate, by looking everywhere.
+/// Returns the lowest cost of one free coordinate, by an exhaustive search.
 fn least_of_one(space: SearchBox, data: Moments) -> f64 {
     let at = |k: u32| space.point(&[f64::from(k) / 100_000.0]);
     let admissible = (0..=100_000).map(at).filter(admissible);
@@ -293,7 +297,7 @@ fn data_outside_the_bounds_end_on_them() {
 
 #[test]
 fn an_infeasible_part_of_the_box_halves_the_step() {
-    // Feasible is what the way from the start to the answer leaves and meets again.
+    // An infeasible region lies across the way from the start to the solution.
     let start = [0.9, 0.5, 0.5, 0.5, 0.5, 0.3, 0.9];
     let target = bone(&OPTIMUM);
     let wall = |point: &Point| {
@@ -302,7 +306,7 @@ fn an_infeasible_part_of_the_box_halves_the_step() {
     };
     let found = search(all_free(&start), target, SETTINGS, wall);
     assert_eq!(found.stop, Stop::CostReached, "{found:?}");
-    // A half space that the answer lies in, and the first step does not.
+    // A half space that contains the solution, but not the first step.
     let wall = |point: &Point| (point.0[6] > 0.09).then(|| bone(point));
     let found = search(all_free(&start), target, SETTINGS, wall);
     assert_eq!(found.stop, Stop::CostReached, "{found:?}");
@@ -329,7 +333,8 @@ fn nothing_feasible_ends_soon() {
 
 #[test]
 fn a_rule_that_does_not_hold_is_unlearnt() {
-    // g_L decides, √(c1111/ρ) half as much as believed, and the dispersion by its square root.
+    // g_L dominates; √(c1111/ρ) has half the influence assumed by the model, and the dispersion
+    // acts by its square root.
     let strange = |point: &Point| {
         let velocity = libm::exp(0.5 * bulk_velocity(point).unwrap().logarithm);
         Moments {

@@ -1,4 +1,4 @@
-//! What to change where no point has enough velocities.
+//! Advice on what to change if no point has enough velocities.
 
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::FailureKind;
@@ -6,13 +6,13 @@ use osteon_common::plausible;
 use osteon_common::results::Evaluation;
 use osteon_common::settings::Method;
 
-/// Where at least this share of the realizations fails in the same way, neither accuracy nor patience
-/// helps: layers, probe or parameters are to blame.
+/// If at least this fraction of the realizations fails in the same way, neither more accuracy nor a
+/// larger failure limit helps: the cause lies in layers, probe or parameters.
 const SAME_WAY: f64 = 0.9;
-/// Most unusual numbers of the specification that are named.
+/// Maximum number of unusual values of the specification that are listed.
 const UNUSUAL_MAX: usize = 3;
 
-/// What may help a search whose first evaluation was `row`.
+/// Returns advice for a search whose first evaluation was `row`.
 pub(super) fn after_failures(row: &Evaluation, specification: &JobSpecification) -> String {
     let realizations = specification.monte_carlo.realizations as f64;
     let all_alike = row.failures.iter().find(|&(_, count)| count as f64 >= SAME_WAY * realizations);
@@ -28,7 +28,7 @@ pub(super) fn after_failures(row: &Evaluation, specification: &JobSpecification)
     format!("{likely}{}", unusual.concat())
 }
 
-/// What is the matter where nearly all realizations fail in this way.
+/// Returns the probable cause if nearly all realizations fail in this way.
 fn likely(kind: FailureKind, method: Method) -> &'static str {
     match (kind, method) {
         (FailureKind::DirectWaveFirst, _) => {

@@ -1,4 +1,5 @@
-//! Where a search may go next: nothing is told, and nothing is changed.
+//! Candidate points of a search for speculative evaluation. Finding them does not change the
+//! search.
 
 use std::sync::Arc;
 
@@ -8,7 +9,8 @@ use osteon_common::parameters::Point;
 use super::{Plan, Search, Step};
 
 impl Search {
-    /// Points that may be asked for after the present one, at most `most`, the likeliest first.
+    /// Returns at most `most` points that the search may ask for after the pending one, the most
+    /// probable first.
     pub fn likely(&self, most: usize) -> Vec<Point> {
         match (&self.plan, self.ask()) {
             (Plan::Identification(identification), Step::Evaluate(point)) => {
@@ -18,9 +20,9 @@ impl Search {
         }
     }
 
-    /// The point that will be asked for once these outcomes of the present one are told, and those
-    /// that may be asked for after it, at most `most`, the likeliest first. What they say is kept until
-    /// they are told.
+    /// Returns the point that the search will ask for once it is given these outcomes of the
+    /// pending point, followed by candidates after that one; at most `most` points, the most
+    /// probable first. The assessment of the outcomes is cached until they are passed to `tell`.
     pub fn likely_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
         let (Plan::Identification(identification), Step::Evaluate(point)) =
             (&self.plan, self.ask())
@@ -40,7 +42,7 @@ impl Search {
     }
 }
 
-/// Each of these points once, and not `but`.
+/// Returns each of these points once, without `but`.
 fn distinct(points: impl IntoIterator<Item = Point>, but: Option<Point>) -> Vec<Point> {
     let mut distinct: Vec<Point> = Vec::new();
     for point in points {
@@ -51,7 +53,7 @@ fn distinct(points: impl IntoIterator<Item = Point>, but: Option<Point>) -> Vec<
     distinct
 }
 
-/// Whether two points are the same to the bit.
+/// Returns whether two points are equal to the bit.
 pub fn same_point(a: &Point, b: &Point) -> bool {
     a.0.map(f64::to_bits) == b.0.map(f64::to_bits)
 }

@@ -1,4 +1,4 @@
-//! The searches of an identification: one set of data after the other.
+//! The searches of an identification, for one set of data after another.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use osteon_common::statistics::Verdict;
 use super::Ending;
 use super::one_set::OneSet;
 
-/// An identification under way.
+/// State of an identification.
 #[derive(Debug, Clone)]
 pub(super) struct Identification {
-    /// How the searches for the sets before the present one ended.
+    /// Endings of the searches for the earlier sets.
     ended: Vec<GroupEnding>,
-    /// The search for the present set, the last one when all have ended.
+    /// The search for the current set; the last one when all have ended.
     present: OneSet,
 }
 
 impl Identification {
-    /// Of a specification that has data.
+    /// Creates the identification of a specification that has data.
     pub(super) fn new(specification: &JobSpecification) -> Self {
         let present = OneSet::new(specification, 0);
         let mut identification = Self { ended: Vec::new(), present };
@@ -29,18 +29,18 @@ impl Identification {
         identification
     }
 
-    /// The next point, unless all searches have ended.
+    /// Returns the next point, unless all searches have ended.
     pub(super) fn point(&self) -> Option<Point> {
         self.present.point()
     }
 
-    /// Points of the present set that may be asked for after that, at most `most`, the likeliest
-    /// first.
+    /// Returns at most `most` points of the current set that the search may ask for after the
+    /// pending one, the most probable first.
     pub(super) fn likely(&self, most: usize) -> Vec<Point> {
         self.present.likely(most)
     }
 
-    /// The cost of the point asked for, given the verdict on it.
+    /// Returns the cost of the pending point, given its moments.
     pub(super) fn cost(
         &self,
         specification: &JobSpecification,
@@ -51,8 +51,8 @@ impl Identification {
         self.present.cost(specification, verdict, point, outcomes)
     }
 
-    /// Takes the verdict on the point asked for, with its cost in the row, and its outcomes; the
-    /// completed row.
+    /// Takes the moments and the outcomes of the pending point, with its cost in the row. Returns
+    /// the completed row.
     pub(super) fn tell(
         &mut self,
         specification: &JobSpecification,
@@ -65,12 +65,12 @@ impl Identification {
         row
     }
 
-    /// The best evaluation of the present set.
+    /// Returns the best evaluation of the current set.
     pub(super) fn best(&self) -> Option<&Evaluation> {
         self.present.best()
     }
 
-    /// Number of the best evaluation of set number `set`.
+    /// Returns the number of the best evaluation of set number `set`.
     pub(super) fn best_of(&self, set: usize) -> Option<u64> {
         match self.ended.get(set) {
             Some(ending) => ending.best,
@@ -79,18 +79,18 @@ impl Identification {
         }
     }
 
-    /// The outcomes of the best evaluation of the present set.
+    /// Returns the outcomes of the best evaluation of the current set.
     pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
         self.present.best_outcomes()
     }
 
-    /// How the searches that have ended did.
+    /// Returns the endings of the searches that have ended.
     pub(super) fn endings(&self) -> Vec<GroupEnding> {
         let last = self.present.ending().cloned();
         self.ended.iter().cloned().chain(last).collect()
     }
 
-    /// How all searches together ended.
+    /// Returns how all searches together ended.
     pub(super) fn ending(&self, specification: &JobSpecification) -> Ending {
         let endings = self.endings();
         match (&specification.data, endings.as_slice()) {
@@ -102,12 +102,12 @@ impl Identification {
                 together(&searched, &unsearched)
             }
             (_, [GroupEnding { status, reason, .. }]) => Ending::of_search(*status, reason.clone()),
-            // Only what has ended is asked how it did.
+            // Not reached: called only once all searches have ended.
             _ => Ending::of_search(Status::Cancelled, None),
         }
     }
 
-    /// Goes to the next set whose search has something to evaluate.
+    /// Moves on to the next set whose search has something to evaluate.
     fn begin_next(&mut self, specification: &JobSpecification) {
         let sets = specification.data.as_ref().map_or(1, Data::sets);
         while let Some(ending) = self.present.ending() {
@@ -121,8 +121,8 @@ impl Identification {
     }
 }
 
-/// How the searches for groups ended together. Those for which none could be made are told of, and
-/// decide nothing.
+/// Combines the endings of the groups' searches. Groups that could not be searched are mentioned,
+/// but do not influence the status.
 fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEnding)]) -> Ending {
     for (status, what) in [(Status::Failed, "failed"), (Status::MaxEvaluations, "did not converge")]
     {

@@ -1,4 +1,4 @@
-//! The methods of search behind one face.
+//! The search methods behind a common interface.
 
 use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
@@ -8,11 +8,11 @@ use crate::newton::{self, Newton};
 use crate::search_box::SearchBox;
 use crate::simplex::{self, Costs, Simplex};
 
-/// Log likelihoods of all data together that differ by this are equal: a thousandth of what a standard
-/// error of a parameter makes.
+/// Log likelihoods of all data together that differ by at most this count as equal. It is a
+/// thousandth of the difference caused by one standard error of a parameter.
 const EQUAL_LIKELIHOODS: f64 = 5e-4;
 
-/// A method under way.
+/// State of a search method.
 #[derive(Debug, Clone)]
 pub(super) enum Method {
     Simplex(Simplex),
@@ -20,8 +20,8 @@ pub(super) enum Method {
 }
 
 impl Method {
-    /// The method that the specification names, at the start of the box, for a set of data that has
-    /// these moments and, where they are known, these velocities.
+    /// Creates the method that the specification names, starting at the start of the box, for a set
+    /// of data with these moments and, where they are known, these velocities.
     pub(super) fn new(
         specification: &JobSpecification,
         data: Moments,
@@ -47,7 +47,7 @@ impl Method {
         }
     }
 
-    /// The next point, or why there is none.
+    /// Returns the next point, or the reason why there is none.
     pub(super) fn ask(&self) -> Ask<'_> {
         match self {
             Self::Simplex(simplex) => simplex.ask(),
@@ -55,7 +55,7 @@ impl Method {
         }
     }
 
-    /// Takes cost and moments of the point asked for.
+    /// Takes the cost and the moments of the pending point.
     pub(super) fn tell(&mut self, cost: f64, moments: Option<Moments>) {
         match self {
             Self::Simplex(simplex) => simplex.tell(cost),
@@ -63,7 +63,8 @@ impl Method {
         }
     }
 
-    /// Points that may be asked for after the present one, at most `most`, the likeliest first.
+    /// Returns at most `most` points that the method may ask for after the pending one, the most
+    /// probable first.
     pub(super) fn likely(&self, most: usize) -> Vec<Vec<f64>> {
         match self {
             Self::Simplex(simplex) => simplex.likely(most),
@@ -71,7 +72,7 @@ impl Method {
         }
     }
 
-    /// The point asked for is inadmissible.
+    /// Reports that the pending point is inadmissible.
     pub(super) fn refuse(&mut self) {
         match self {
             Self::Simplex(simplex) => simplex.refuse(),
@@ -80,8 +81,8 @@ impl Method {
     }
 }
 
-/// How costs compare. A likelihood has no value that is low enough, and differences of its logarithm,
-/// which is an average over the data, count by their number.
+/// Returns how costs compare. A likelihood has no target value. Its logarithm is an average over
+/// the data, so the difference that counts as equal is divided by their number.
 fn costs(specification: &JobSpecification, measured: Option<&[f64]>) -> Costs {
     match (specification.objective, measured) {
         (Objective::Likelihood, Some(measured)) => {

@@ -1,4 +1,5 @@
-//! The search for one set of data: from one start or several, then the derivatives at the best point.
+//! The search for one set of data: from one start or several, then the derivatives at the best
+//! point.
 
 use std::sync::Arc;
 
@@ -14,9 +15,9 @@ use super::reasons;
 use crate::ask::{Ask, Stop};
 use crate::search_box::{SearchBox, admissible};
 
-/// Steps of the differences that measure derivatives, in edges of the box.
+/// Step of the finite differences that measure derivatives, in edges of the box.
 const DIFFERENCE: f64 = 1e-4;
-/// Random points of the box that are tried for an admissible start.
+/// Maximum number of random points of the box that are tried for an admissible start.
 const START_TRIES: u64 = 64;
 
 /// The search for one set of data.
@@ -25,17 +26,18 @@ pub(super) struct OneSet {
     /// Number of the set.
     set: u32,
     data: Moments,
-    /// Number of the present start.
+    /// Number of the current start.
     start: u32,
     space: SearchBox,
     method: Method,
-    /// Points evaluated for this set, and the first of them.
+    /// Number of points evaluated for this set, and the first of them.
     evaluations: u64,
     first: Option<Evaluation>,
     best: Option<Best>,
-    /// How the search ended that found the best point, or, while there is none, the last one.
+    /// Why the search from the start of the best point stopped, or, while there is none, the latest
+    /// search.
     stop: Option<Stop>,
-    /// Points that measure derivatives, the next one last.
+    /// Points that measure derivatives, in reverse order.
     differences: Vec<(Parameter, Point)>,
     ending: Option<GroupEnding>,
 }
@@ -48,13 +50,13 @@ struct Best {
 }
 
 impl OneSet {
-    /// The search for set number `set` of the data, at its beginning.
+    /// Creates the search for set number `set` of the data.
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
         let given = specification.data.as_ref();
         let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
         let space = SearchBox::new(specification.parameters);
         let mut search = Self {
-            // A job has at most a thousand.
+            // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
             data,
             start: 0,
@@ -74,7 +76,7 @@ impl OneSet {
         search
     }
 
-    /// The next point, unless the search has ended.
+    /// Returns the next point, unless the search has ended.
     pub(super) fn point(&self) -> Option<Point> {
         if self.ending.is_some() {
             return None;
@@ -86,7 +88,8 @@ impl OneSet {
         }
     }
 
-    /// Points that may be asked for after that, at most `most`, the likeliest first.
+    /// Returns at most `most` points that the search may ask for after the pending one, the most
+    /// probable first.
     pub(super) fn likely(&self, most: usize) -> Vec<Point> {
         if self.differences.is_empty() {
             let likely = self.method.likely(most);
@@ -95,7 +98,7 @@ impl OneSet {
         self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
     }
 
-    /// The cost of the point asked for, given the verdict on it.
+    /// Returns the cost of the pending point, given its moments.
     pub(super) fn cost(
         &self,
         specification: &JobSpecification,
@@ -113,8 +116,8 @@ impl OneSet {
         cost + specification.penalty(point)
     }
 
-    /// Takes the verdict on the point asked for, with its cost in the row, and its outcomes; the
-    /// completed row.
+    /// Takes the moments and the outcomes of the pending point, with its cost in the row. Returns
+    /// the completed row.
     pub(super) fn tell(
         &mut self,
         specification: &JobSpecification,
@@ -137,23 +140,23 @@ impl OneSet {
         row
     }
 
-    /// The best evaluation, if a point was feasible: of equal costs the first, and what matches the
-    /// data is not improved upon.
+    /// Returns the best evaluation, if a point was feasible. Of equal costs the first is kept, and
+    /// a point within the tolerance is never replaced.
     pub(super) fn best(&self) -> Option<&Evaluation> {
         self.best.as_ref().map(|best| &best.row)
     }
 
-    /// Its outcomes.
+    /// Returns the outcomes of the best evaluation.
     pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
         self.best.as_ref().map(|best| &*best.outcomes)
     }
 
-    /// How the search ended, if it has.
+    /// Returns how the search ended, if it has.
     pub(super) fn ending(&self) -> Option<&GroupEnding> {
         self.ending.as_ref()
     }
 
-    /// Whether the same realizations failed as at the best point.
+    /// Returns whether the same realizations failed as at the best point.
     fn fails_alike(&self, outcomes: &[Outcome]) -> bool {
         self.best_outcomes().is_some_and(|best| {
             best.iter().zip(outcomes).all(|(one, other)| one.is_err() == other.is_err())
@@ -169,7 +172,7 @@ impl OneSet {
         let Some(cost) = row.cost else { return };
         let tolerance = match specification.objective {
             Objective::Moments => specification.search.cost_tolerance,
-            // No likelihood is high enough.
+            // A likelihood has no value that is high enough to stop.
             Objective::Likelihood => f64::NEG_INFINITY,
         };
         let lowest = self.best.as_ref().and_then(|best| best.row.cost);
@@ -178,7 +181,7 @@ impl OneSet {
         }
     }
 
-    /// Goes on to a point that is to be evaluated, or to the end.
+    /// Moves on to a point that is to be evaluated, or to the end.
     fn settle(&mut self, specification: &JobSpecification) {
         while self.ending.is_none() && self.differences.is_empty() {
             match self.method.ask() {
@@ -189,7 +192,7 @@ impl OneSet {
         }
     }
 
-    /// Begins the search from the next start, or what comes after the last.
+    /// Starts the search from the next start; after the last start, the derivatives or the end.
     fn stopped(&mut self, specification: &JobSpecification, stop: Stop) {
         if u64::from(self.start) == specification.search.starts {
             return self.end(specification);
@@ -218,7 +221,7 @@ impl OneSet {
             first: self.first.as_ref(),
             evaluations: self.evaluations,
         };
-        // It was noted before the end.
+        // Always set before the end.
         let stop = self.stop.unwrap_or(Stop::Settled);
         let super::Ending { status, reason, .. } = reasons::ending(stop, &evidence, specification);
         let best = self.best().map(|row| row.number);
@@ -226,21 +229,21 @@ impl OneSet {
     }
 }
 
-/// How the search for a group ends that has nothing to match.
+/// Returns the ending of a group whose data have no variation to match.
 fn unsearched(why: NoVariation) -> GroupEnding {
     GroupEnding { status: Status::Failed, reason: Some(why.to_string()), best: None }
 }
 
-/// The velocities of a set of data, where they are known.
+/// Returns the velocities of a set of data, if they are known.
 fn measured(specification: &JobSpecification, set: usize) -> Option<&[f64]> {
     specification.data.as_ref().and_then(|data| data.velocities(set))
 }
 
-/// The box with its start at a random point, the same for every set of data.
+/// Returns the box with its start at a random point, which is the same for every set of data.
 fn random_start(specification: &JobSpecification, start: u64) -> SearchBox {
     let space = SearchBox::new(specification.parameters);
     let tries = (0..START_TRIES).map(|attempt| {
-        // No realization has an index this large.
+        // No realization has an index this large, so these germs are used for nothing else.
         let index = u64::MAX - (start * START_TRIES + attempt);
         space.started_at(Germs::draw(specification.monte_carlo.seed, index).values())
     });
@@ -248,7 +251,7 @@ fn random_start(specification: &JobSpecification, start: u64) -> SearchBox {
     usable.next().unwrap_or(space)
 }
 
-/// Points a little beside `best`, each in one free parameter, the first parameter last.
+/// Returns points close to `best`, each differing in one free parameter, the first parameter last.
 fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter, Point)> {
     let beside = |parameter: Parameter| {
         let Range::Free { lower, upper, .. } = specification.range(parameter) else {

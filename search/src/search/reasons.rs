@@ -1,4 +1,4 @@
-//! How a search ended, in words.
+//! Explanations of how a search ended.
 
 use osteon_common::job::{JobSpecification, Objective, SearchMethod};
 use osteon_common::results::{Evaluation, Status};
@@ -8,17 +8,17 @@ use crate::ask::Stop;
 use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
 
-/// What a search has seen.
+/// The observations from which an explanation is made.
 pub(super) struct Evidence<'a> {
     /// The best feasible evaluation.
     pub(super) best: Option<&'a Evaluation>,
     /// The first evaluation.
     pub(super) first: Option<&'a Evaluation>,
-    /// How many there were.
+    /// Number of evaluations.
     pub(super) evaluations: u64,
 }
 
-/// How a search ended that stopped for this reason.
+/// Returns status and explanation of a search that stopped for this reason.
 pub(super) fn ending(
     stop: Stop,
     evidence: &Evidence<'_>,
@@ -43,7 +43,7 @@ pub(super) fn ending(
     Ending::of_search(status, reason)
 }
 
-/// Which realizations of an evaluation failed.
+/// Describes the failed realizations of an evaluation.
 pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> String {
     let kinds: Vec<String> =
         row.failures.iter().map(|(kind, count)| format!("{count} {}", kind.name())).collect();
@@ -56,7 +56,7 @@ pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> Stri
     )
 }
 
-/// Why a search that settled has no lower cost, where its method knows.
+/// Explains why a search that settled has no lower cost, if its method can tell.
 fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> Option<String> {
     let best = best.filter(|_| specification.search.method == SearchMethod::Newton)?;
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
@@ -88,7 +88,7 @@ fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) 
                 variation has no logarithm; raise [monte_carlo] realizations"
             .to_owned();
     }
-    // Without a law a point has no likelihood, whether or not realizations failed.
+    // If all velocities are equal, a point has no likelihood even if no realization failed.
     if specification.objective == Objective::Likelihood
         && evidence.first.is_some_and(|row| row.failures.total() == 0)
     {

@@ -1,4 +1,4 @@
-//! The meaning of outcomes, and replay.
+//! Tests of the assessment of outcomes, and of replay.
 
 use osteon_common::case::Setup;
 use osteon_common::job::{
@@ -43,7 +43,7 @@ fn outcomes(point: &Point) -> Arc<[Outcome]> {
 /// Points with their outcomes.
 type Told = Vec<(Point, Arc<[Outcome]>)>;
 
-/// The search to its end, with everything told to it.
+/// Runs the search to its end; returns it with all points and outcomes passed to it.
 fn run(specification: &JobSpecification) -> (Search, Told) {
     let mut search = Search::new(Arc::new(specification.clone()));
     let mut told = Vec::new();
@@ -72,11 +72,11 @@ fn an_identification_finds_what_made_the_data() {
     assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-4, "{best:?}");
     assert!((best.point.dispersion() / 0.12 - 1.0).abs() < 1e-3, "{best:?}");
     assert_eq!(best.outcomes, outcomes(&best.point).to_vec());
-    // Two more for the derivatives.
+    // Two more evaluations measure the derivatives.
     assert_eq!(result.evaluations + 2, search.history().len() as u64);
 }
 
-/// The same by `newton`.
+/// The same job with the method `newton`.
 fn by_newton(max_evaluations: u64) -> JobSpecification {
     let search = SearchSettings { max_evaluations, ..SearchSettings::by(SearchMethod::Newton) };
     JobSpecification { search, ..specification(max_evaluations) }
@@ -105,7 +105,7 @@ fn newton_says_why_it_settled_above_its_tolerance() {
     assert!(reason.contains("settled at a cost of 1.037e-1"), "{reason}");
     assert!(reason.contains("(longitudinal_young_modulus on its lower bound)"), "{reason}");
     assert!(reason.contains("widen the bounds"), "{reason}");
-    // The simplex says nothing of the kind: it may have collapsed anywhere.
+    // The simplex gives no such explanation, since it may have collapsed anywhere.
     let job = JobSpecification { search: specification(400).search, ..job };
     assert_eq!(self::ending(&run(&job).0).reason, None);
 }
@@ -197,7 +197,7 @@ fn a_replay_of_another_path_is_refused() {
 fn the_digest_follows_the_order_of_the_path() {
     let (search, told) = run(&specification(20));
     let mut digest = PathDigest::new();
-    // What measures derivatives is not on it.
+    // Points that measure a derivative are not on the path.
     for ((point, outcomes), row) in told.iter().zip(search.history()) {
         if row.role.varied.is_none() {
             digest.add_evaluation(point, outcomes);
@@ -220,7 +220,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     assert!(reason.contains("among the 3 evaluated"), "{reason}");
     assert!(reason.contains("1 of 4 realizations failed (1 no_arrival)"), "{reason}");
     assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
-    // What failed everywhere has no best point, nothing that data could have determined.
+    // A search whose points all failed has no best point, and the data determine nothing.
     assert_eq!(search.best(), None);
     assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
 }
@@ -294,8 +294,9 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     assert!(search.result(&ending(&search), &Program::this(None)).best.is_none());
 }
 
-/// Velocities that the control variate explains wholly: their moments are the law's whatever the
-/// germs, and a search that is told few of them finds the point that made the data.
+/// If the control variate explains the velocities completely, their moments are those of the
+/// ensemble's law for any germs. A search then finds the point that made the data from few
+/// velocities.
 #[test]
 fn a_controlled_search_goes_by_the_moments_of_the_law() {
     let asked = MonteCarlo {

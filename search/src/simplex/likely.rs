@@ -1,24 +1,26 @@
-//! Where a simplex may go: what it will ask for after each way in which its pending points may turn
-//! out, the likeliest first.
+//! Candidate points: the points that a simplex asks for after each possible cost of its pending
+//! point, the most probable first.
 
 use super::{Move, Simplex, Vertex};
 
-/// How often a reflected point is the best of all, is better than the second worst vertex, than the
-/// worst, and than none: about as on the landscape of an identification.
+/// Probabilities that a reflected point is the best of all, is better than the second worst vertex,
+/// is better than the worst vertex only, and is no better than any. They are approximately those
+/// observed in identifications.
 const REFLECTED: [f64; 4] = [0.15, 0.30, 0.10, 0.45];
-/// How often an expansion is better than the reflected point.
+/// Probability that an expansion is better than the reflected point.
 const EXPANDED: f64 = 0.4;
-/// How often a contraction is taken; each rank among the vertices half as often as the one before.
+/// Probability that a contraction is accepted; each further rank among the vertices is half as
+/// probable as the one before.
 const CONTRACTED: f64 = 0.98;
 
 impl Simplex {
-    /// Points that may be asked for after the pending one and are not it, at most `most`, the
-    /// likeliest first. Each is one that [`Simplex::ask`] gives, to the bit, if the costs told turn out
-    /// so. Nothing is changed.
+    /// Returns at most `most` points, other than the pending one, that the search may ask for after
+    /// it, the most probable first. Each is bit for bit what [`Simplex::ask`] returns if the costs
+    /// turn out accordingly. Does not change the state.
     pub fn likely(&self, most: usize) -> Vec<Vec<f64>> {
         let mut found: Vec<Vec<f64>> = Vec::new();
         let mut ahead = self.outcomes(1.0);
-        // Each turn finds a point, or one that was found before on another way.
+        // Each turn finds a new point or one that was already found by another path.
         for _ in 0..2 * most {
             let likeliest = (0..ahead.len()).max_by(|&a, &b| ahead[a].0.total_cmp(&ahead[b].0));
             let Some((chance, next)) = likeliest.map(|at| ahead.swap_remove(at)) else {
@@ -37,7 +39,8 @@ impl Simplex {
         found
     }
 
-    /// What may become of the pending point, with the chances, which come to at most `chance`.
+    /// Returns the possible states after the pending point with their probabilities, whose sum is
+    /// at most `chance`.
     fn outcomes(&self, chance: f64) -> Vec<(f64, Self)> {
         let mut outcomes = Vec::new();
         let mut suppose = |share: f64, cost: Option<f64>| {
@@ -47,7 +50,7 @@ impl Simplex {
         };
         let last = self.vertices.len().saturating_sub(1);
         match &self.purpose {
-            // The order of a whole simplex is anybody's guess.
+            // The order of the vertices of a complete fresh simplex cannot be predicted.
             Move::Build if self.vertices.len() < self.origin.len() => suppose(1.0, Some(f64::MAX)),
             Move::Shrink { index } if *index < last => suppose(1.0, Some(f64::MAX)),
             Move::Build | Move::Shrink { .. } => {}
@@ -80,8 +83,8 @@ impl Simplex {
         outcomes
     }
 
-    /// A cost with which the pending point comes after the `rank` best vertices and before the
-    /// others, and before `limit`; `None` if there is none.
+    /// Returns a cost with which the pending point ranks after the `rank` best vertices and before
+    /// the others, and before `limit`; `None` if there is no such cost.
     fn at_rank(&self, rank: usize, limit: Option<&Vertex>) -> Option<f64> {
         let below = rank.checked_sub(1).map(|before| self.vertices[before].cost);
         let above = self.vertices[rank].cost;
@@ -95,7 +98,7 @@ impl Simplex {
         (cost < above && below.is_none_or(|below| cost >= below)).then_some(cost)
     }
 
-    /// The search after the pending point has this cost, if it goes on.
+    /// Returns the search as it is after the pending point gets this cost, unless that ends it.
     fn supposing(&self, cost: f64) -> Option<Self> {
         let mut next = self.clone();
         next.evaluations += 1;
@@ -105,7 +108,7 @@ impl Simplex {
     }
 }
 
-/// Adds a way to others; one that leads to the same point makes that likelier.
+/// Adds a possible state; a state with the same pending point adds to its probability instead.
 fn join(ways: &mut Vec<(f64, Simplex)>, chance: f64, next: Simplex) {
     match ways.iter_mut().find(|(_, way)| way.pending == next.pending) {
         Some((known, _)) => *known += chance,

@@ -1,4 +1,4 @@
-//! Standard functions, and the shapes that have made other simplexes lie.
+//! Standard test functions, and functions on which other simplexes have failed.
 
 use osteon_fuzz::properties;
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ const SETTINGS: Settings = Settings {
     initial_step: 0.15,
 };
 
-/// What a finished search leaves.
+/// Result of a finished search.
 #[derive(Debug, PartialEq)]
 struct Found {
     stop: Stop,
@@ -56,8 +56,8 @@ fn rosenbrock(at: &[f64]) -> f64 {
     (1.0 - x) * (1.0 - x) + 100.0 * (y - x * x) * (y - x * x)
 }
 
-/// The identification's landscape: ln v and ln D are nearly linear in the logarithms of seven
-/// parameters, two combinations of which matter. Bounds are those of the bone literature.
+/// The landscape of an identification: ln v and ln D are nearly linear in the logarithms of seven
+/// parameters, of which two combinations matter. The bounds are those of the bone literature.
 fn flat_valley(at: &[f64]) -> f64 {
     const BOUNDS: [(f64, f64); 7] =
         [(1500., 2000.), (12., 25.), (0.2, 0.45), (3., 6.5), (8., 16.), (0.2, 0.5), (0.02, 0.3)];
@@ -237,7 +237,8 @@ fn equal_costs_keep_the_order_of_their_making() {
 }
 
 properties! {
-    /// Asks stay in the box, ends come, and telling the same costs again leads to the same state.
+    /// Points stay in the box, the search ends, and replaying the same costs leads to the same
+    /// state.
     fn any_costs_lead_to_an_end(
         start in proptest::collection::vec(0.0..=1.0, 0..8),
         costs in proptest::collection::vec(
@@ -268,13 +269,13 @@ fn logarithms_are_minimised_by_their_differences() {
         let settings = Settings { costs, ..SETTINGS };
         let found = minimise(&[0.8, 0.9], settings, |at| sphere(at) + offset);
         assert_eq!(found.stop, Stop::Settled, "{offset}");
-        // Of an offset of 1000 rounding leaves differences of 1e-13.
+        // With an offset of 1000, rounding leaves differences of 1e-13.
         assert!(found.at.iter().all(|u| (u - 0.3).abs() < 1e-5), "{offset}: {:?}", found.at);
     }
 }
 
-/// How many of the points that a search for the least `cost` asks for, after the first, were among
-/// the `most` likely ones before; of all of them.
+/// Returns the fraction of the points of a search for the lowest `cost`, after the first, that were
+/// among the `most` candidates before.
 fn foreseen(start: &[f64], most: usize, cost: impl Fn(&[f64]) -> f64) -> f64 {
     let mut simplex = Simplex::new(start, SETTINGS);
     let (mut asked, mut foreseen) = (0, 0);
@@ -315,12 +316,12 @@ fn most_points_are_foreseen() {
 }
 
 properties! {
-    // All but those after which a whole simplex is put into order.
+    // Excludes those after which a complete simplex is sorted.
     fn with_room_enough_every_point_of_a_step_is_foreseen(
         start in proptest::collection::vec(0.0_f64..=1.0, 1..4),
         seed in any::<u64>(),
     ) {
-        // Any number at any point, infinite ones among them.
+        // Any number at any point, including infinite ones.
         let cost = |at: &[f64]| {
             let noise = at.iter().fold(seed, |mixed, u| {
                 (mixed ^ u.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
@@ -335,7 +336,7 @@ properties! {
             let before = point.to_vec();
             let told = cost(point);
             simplex.tell(told);
-            // What is worth a restart is another question.
+            // Whether a restart is worthwhile depends on other conditions.
             if let Ask::At(next) = simplex.ask() && !made && simplex.restarts == 0 {
                 let known = next == before || found.iter().any(|at| at == next);
                 prop_assert!(known, "after {told}: {next:?}");

@@ -1,11 +1,11 @@
-//! How two solutions of one case differ.
+//! Difference of two solutions of one case.
 
 use osteon_common::case::Setup;
 
 use crate::solver::{Arrival, Failure};
 
-/// Picked times further apart than this, in periods of the centre frequency, are not those of one
-/// extremum: neighbouring extrema are about half a period apart, and discretisation moves one by a
+/// Picked times further apart than this, in periods of the centre frequency, belong to different
+/// extrema: neighbouring extrema are about half a period apart, and discretisation moves one by a
 /// thousandth.
 const SAME_EXTREMUM: f64 = 0.1;
 
@@ -16,7 +16,7 @@ const ERROR_MAX_THIN: f64 = 3e-4;
 /// Plates of less than this thickness times centre frequency are thin, m Hz.
 const THIN: f64 = 2000.0;
 
-/// How a solution differs from a reference.
+/// Difference of a solution from a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Difference {
     /// Neither has a velocity, for the same reason.
@@ -33,7 +33,7 @@ pub enum Difference {
 }
 
 impl Difference {
-    /// Relative difference of the velocities, where the picks are the same.
+    /// Returns the relative difference of the velocities, if the picks are the same.
     pub fn velocity(self) -> Option<f64> {
         match self {
             Self::Numbers { velocity, .. } => Some(velocity),
@@ -41,7 +41,7 @@ impl Difference {
         }
     }
 
-    /// Largest difference of the times, s, where the picks are the same.
+    /// Returns the largest difference of the times, s, if the picks are the same.
     pub fn time(self) -> Option<f64> {
         match self {
             Self::Numbers { time, .. } => Some(time),
@@ -50,7 +50,7 @@ impl Difference {
     }
 }
 
-/// How `found` differs from `reference`, both of a case of `setup`.
+/// Returns the difference of `found` from `reference`, both for a case of `setup`.
 pub fn difference(
     setup: &Setup,
     found: &Result<Arrival, Failure>,
@@ -63,7 +63,7 @@ pub fn difference(
     }
 }
 
-/// Largest accepted relative error of a velocity at refinement 1, in a case of `setup`.
+/// Returns the largest accepted relative error of a velocity at refinement 1, in a case of `setup`.
 pub fn error_max(setup: &Setup) -> f64 {
     let product = setup.layers.bone_thickness * setup.probe.center_frequency;
     if product < THIN { ERROR_MAX_THIN } else { ERROR_MAX }

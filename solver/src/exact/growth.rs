@@ -1,24 +1,24 @@
-//! How fast waves grow or turn across the plate: the largest |λ| of the system's eigenvalues.
+//! Growth or phase of waves across the plate: the largest |λ| of the system's eigenvalues.
 //!
-//! It decides how thin a sublayer must be for its Taylor series. For imaginary s the system is,
-//! but for a similarity and a factor -i, the real matrix
+//! It determines how thin a sublayer must be for its Taylor series. For imaginary s the system is,
+//! except for a similarity and a factor -i, the real matrix
 //!
 //! ```text
 //! N = [ kP, -R; k²Q - ρω², kPᵀ ]        P = A33⁻¹ A31, R = A33⁻¹, Q = A11 - A13 A33⁻¹ A31
 //! ```
 //!
-//! whose spectral radius is ω times a function of the slowness k/ω alone. That function is tabulated
-//! once per solid, by repeated squaring; for damped s, |s| stands for ω.
+//! whose spectral radius is ω times a function of the slowness k/ω alone. That function is
+//! tabulated once per solid, by repeated squaring; for damped s, |s| takes the place of ω.
 
 use crate::lanes::{LANES, Lanes};
 use crate::medium::Medium;
 use crate::vector::Vector;
 
-/// Slownesses in the table.
+/// Number of slownesses in the table.
 const POINTS: usize = 2 * LANES;
 /// Distance of the table's slownesses, in units of √(ρ / stiffness).
 const STEP: f64 = 0.25;
-/// Squarings: the norm of the 32nd power bounds the spectral radius to 6 %.
+/// Number of squarings: the norm of the 32nd power bounds the spectral radius to 6 %.
 const SQUARINGS: usize = 5;
 
 /// The table of one solid.
@@ -26,7 +26,7 @@ const SQUARINGS: usize = 5;
 pub(crate) struct Growth {
     /// √(ρ / stiffness), s/m.
     slowness: f64,
-    /// |λ| over |s| times √(ρ / stiffness), at slownesses 0, STEP, 2 STEP, …
+    /// |λ| divided by |s| √(ρ / stiffness), at slownesses 0, STEP, 2 STEP, …
     table: [f64; POINTS],
 }
 
@@ -57,15 +57,15 @@ impl Growth {
         }
     }
 
-    /// Estimate from above of |λ|, rad/m, at wavenumbers from `k_min` to `k_max` (rad/m) and complex
-    /// frequency of modulus `s_modulus` (1/s).
+    /// Returns an upper estimate of |λ|, rad/m, at wavenumbers from `k_min` to `k_max` (rad/m) and
+    /// complex frequency of modulus `s_modulus` (1/s).
     #[inline(always)]
     pub(crate) fn at(&self, k_min: f64, k_max: f64, s_modulus: f64) -> f64 {
         let unit = self.slowness * s_modulus;
         unit * self.relative(k_min / unit).max(self.relative(k_max / unit))
     }
 
-    /// By linear interpolation; beyond the table in proportion to the slowness.
+    /// Interpolates linearly; beyond the table it grows in proportion to the slowness.
     #[inline(always)]
     fn relative(&self, slowness: f64) -> f64 {
         let position = slowness / STEP;
@@ -79,7 +79,8 @@ impl Growth {
     }
 }
 
-/// Bound of the spectral radius of N at slownesses `p`, everything in units of density and stiffness.
+/// Returns an upper bound of the spectral radius of N at slownesses `p`, in units of density and
+/// stiffness.
 #[inline(always)]
 fn spectral_radius<V: Vector>(medium: &Medium, p: V) -> V {
     let mut power = [[V::splat(0.0); 6]; 6];

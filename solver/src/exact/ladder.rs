@@ -1,4 +1,5 @@
-//! Samplings of one kind by the speed of the fastest wave, with the tables of those that bones need.
+//! A ladder: a geometric grid of speeds, each rung with the sampling for waves up to its speed, and
+//! a cache of the tables of those rungs that bones need.
 
 use std::ops::Deref;
 use std::sync::OnceLock;
@@ -10,38 +11,40 @@ use osteon_common::sampling::{Grade, RUNGS, Sampling};
 
 use crate::exact::look::Rung;
 
-/// A bone may need this many times the pairs of the setup's usual sampling limit before it fails.
+/// A bone may need this many times the maximum number of pairs of the setup's usual sampling before
+/// it fails.
 pub(crate) const PAIRS_MARGIN: f64 = 8.0;
-/// Bytes of tables that one solver keeps; those of further rungs are made when needed.
+/// Memory for tables that one solver keeps, bytes; those of further rungs are recomputed when
+/// needed.
 const KEPT_BYTES_MAX: u64 = 24_000_000;
 
-/// Samplings of one kind, by speed.
+/// Samplings of one grade, by speed.
 #[derive(Debug)]
 pub(crate) struct Ladder {
     setup: Setup,
     grade: Grade,
-    /// Each is decided when a bone first needs it.
+    /// Each slot is filled when a bone first needs it.
     slots: [OnceLock<Slot>; RUNGS],
 }
 
-/// Bytes that all ladders of a solver keep together.
+/// Memory of the tables that all ladders of a solver keep, bytes.
 #[derive(Debug, Default)]
 pub(crate) struct KeptBytes(AtomicU64);
 
-/// A rung that is kept, or was made for one look.
+/// A rung that is kept, or was created for one look.
 #[derive(Debug)]
 pub(crate) enum Held<'a> {
     Kept(&'a Rung),
     Made(Box<Rung>),
 }
 
-/// What is kept of a rung.
+/// The cached data of a rung.
 #[derive(Debug)]
 enum Slot {
     Rung(Box<Rung>),
-    /// Its tables are made whenever they are needed.
+    /// Only the sampling; its tables are recomputed whenever they are needed.
     Sampling(Box<Sampling>),
-    /// It would be too large to be computed.
+    /// The rung is too large to be computed.
     TooLarge,
 }
 
@@ -50,7 +53,7 @@ impl Ladder {
         Self { setup: *setup, grade, slots: [const { OnceLock::new() }; RUNGS] }
     }
 
-    /// The rung at `index`, unless it is too large.
+    /// Returns the rung at `index`, unless it is too large.
     pub(crate) fn rung(&self, index: usize, kept: &KeptBytes) -> Option<Held<'_>> {
         match self.slots.get(index)?.get_or_init(|| self.slot(index, kept)) {
             Slot::Rung(rung) => Some(Held::Kept(rung)),
@@ -76,7 +79,7 @@ impl Ladder {
 }
 
 impl KeptBytes {
-    /// Whether so many more may be kept.
+    /// Reserves this much memory; returns whether the limit allows it.
     fn take(&self, bytes: u64) -> bool {
         let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= KEPT_BYTES_MAX;
         if !may {

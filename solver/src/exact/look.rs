@@ -1,5 +1,5 @@
-//! One look at the first arrival: extrema of the signals in one band, the pick, and the estimate of
-//! its error.
+//! One look (pass) at the first arrival: extrema of the signals in one band, the pick, and the
+//! estimate of its error.
 
 use osteon_common::case::Setup;
 use osteon_common::sampling::{self, RUN, Sampling, velocity_taper};
@@ -16,8 +16,9 @@ use crate::picking::{self, Pick, Window, pick};
 use crate::solver::{Arrival, Looks, Sampled, pressure_not_finite};
 use crate::vector::Vector;
 
-/// The tapers that the estimate of the error compares with: start and end over the band. Sharper and
-/// narrower ones, since the error is what the smooth taper takes off the pulse's kink.
+/// The tapers with which the error estimate compares: start and end, as multiples of the band. They
+/// are sharper and narrower, since the error is the part of the pulse's kink that the smooth taper
+/// removes.
 const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.2, 1.0),
     (0.3, 0.7),
@@ -28,7 +29,7 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.9, 1.0),
     (0.95, 1.0),
 ];
-/// Estimated error over the root mean square change of the velocity by the other tapers.
+/// Ratio of the estimated error to the root mean square change of the velocity by the other tapers.
 const ESTIMATE_FACTOR: f64 = 1.3;
 
 /// Tables of one rung of the speed ladder, shared by all bones.
@@ -36,19 +37,19 @@ const ESTIMATE_FACTOR: f64 = 1.3;
 pub(crate) struct Rung {
     pub(crate) tables: Tables,
     grid: Grid,
-    /// Up to the band of a first look.
+    /// The band of a first look.
     pub(crate) first: Look,
-    /// Up to the whole band.
+    /// The whole band.
     pub(crate) whole: Look,
 }
 
-/// A band.
+/// One band of a rung.
 #[derive(Debug)]
 pub(crate) struct Look {
     pub(crate) sampled: Sampled,
-    /// How many lines it needs, from the first on.
+    /// Number of lines that it needs, from the first on.
     pub(crate) lines: usize,
-    /// One weight per line, of the runs that hold the lines.
+    /// One weight per line, for the runs that contain the lines.
     taper: Vec<Lanes>,
     /// The tapers of the error estimate, side by side, per run and line.
     others: Vec<[Lanes; LANES]>,
@@ -75,7 +76,7 @@ pub(crate) struct Estimated {
 }
 
 impl Estimated {
-    /// The arrival, found in `count` looks of so many pairs together.
+    /// Returns the arrival, found in `count` looks with this total number of pairs.
     pub(crate) fn arrival(self, count: u32, pairs_computed: u64) -> Arrival {
         let Self { pick, error, sampled: last } = self;
         Arrival {
@@ -88,13 +89,14 @@ impl Estimated {
 }
 
 impl Rung {
-    /// Bytes that a rung takes, of so many pairs, that keeps its tables.
+    /// Returns the memory of a rung with this many pairs that keeps its tables, bytes.
     pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> u64 {
         let lines = sampling.runs().len() * RUN;
         (Tables::bytes(setup, sampling, pairs) + Grid::bytes(setup, lines)) as u64
     }
 
-    /// `keep`: whether tables are kept, rather than be computed whenever they are needed.
+    /// Creates the tables of a rung. `keep`: whether they are kept, or recomputed whenever they are
+    /// needed.
     pub(crate) fn new(setup: &Setup, sampling: Sampling, keep: bool) -> Self {
         let whole = velocity_taper(sampling.band);
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
@@ -128,10 +130,10 @@ impl Look {
 }
 
 impl Exact {
-    /// Lists, in the workspace, the extrema of the signals of its spectra.
+    /// Stores the extrema of the signals of its spectra in the workspace.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// If a number is not finite.
     pub(super) fn observe(
         &self,
         speed: f64,
@@ -150,7 +152,7 @@ impl Exact {
     /// Picks one of the extrema in the workspace, and estimates its error.
     ///
     /// # Errors
-    /// When there is no acceptable pick.
+    /// If there is no acceptable pick.
     pub(super) fn picked(
         &self,
         rung: &Rung,
@@ -167,19 +169,19 @@ impl Exact {
             square = change.mul_add(change, square);
         }
         let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
-        // A signal that changes past recognition makes the largest error, not a failure.
+        // A signal that changes beyond recognition gives the largest error, not a failure.
         let error = if error <= 1.0 { error } else { 1.0 };
         Ok(Estimated { pick, error, sampled: look.sampled })
     }
 }
 
-/// Lists the extrema of the pressure at every receiver.
+/// Kernel that lists the extrema of the pressure at every receiver.
 struct Observe<'a> {
     setup: &'a Setup,
     distances: &'a [f64],
     rung: &'a Rung,
     look: &'a Look,
-    /// Bound of every wave's speed, m/s.
+    /// Upper bound of every wave's speed, m/s.
     speed: f64,
     workspace: &'a mut ExactWorkspace,
 }
@@ -207,7 +209,8 @@ impl Kernel for Observe<'_> {
     }
 }
 
-/// The same extrema, s, of the spectra in the workspace cut by each of the other tapers.
+/// Kernel that finds the times of the same extrema, s, with the spectra cut by each of the other
+/// tapers.
 struct Repick<'a> {
     rung: &'a Rung,
     look: &'a Look,

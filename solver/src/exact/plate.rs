@@ -2,19 +2,19 @@
 //!
 //! A sublayer of thickness d = h/2ⁿ has, from its transfer matrix, the dynamic stiffness
 //! `[t_top; t_bottom] = K [u_top; u_bottom]` (outward tractions). For every triclinic tensor
-//! K_bb = K_ttᵀ, K_tb and K_bt are symmetric, and K_bt(k) = K_tb(-k). Two equal layers, one upon
-//! the other, are one of twice the thickness: with A = K_tt, D = -K_tb, U = -K_bt
+//! K_bb = K_ttᵀ, K_tb and K_bt are symmetric, and K_bt(k) = K_tb(-k). Two equal layers, one on the
+//! other, form one of twice the thickness: with A = K_tt, D = -K_tb, U = -K_bt
 //!
 //! ```text
 //! S = A + Aᵀ,   A ← A - D S⁻¹ U,   D ← D S⁻¹ D,   U ← U S⁻¹ U
 //! ```
 //!
-//! S is complex symmetric and, s having a positive real part, its factorization needs no pivoting.
-//! The last doubling closes the lower face on the marrow and eliminates straight to the scalar
-//! 1/Y, Y = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
+//! S is complex symmetric. As s has a positive real part, its factorization needs no pivoting. The
+//! last doubling closes the lower face with the marrow and eliminates directly to the scalar 1/Y,
+//! Y = û3(0)/p̂(0). There are no roots to find, no branches and no degenerate solids.
 //!
-//! Matrix entries are written out, and closures are avoided: what the compiler does not inline and
-//! unroll is not kept in registers, nor compiled for the instruction set (see [`crate::isa`]).
+//! Matrix entries are written out, and closures are avoided: code that the compiler does not inline
+//! and unroll is not kept in registers, nor compiled for the instruction set (see [`crate::isa`]).
 
 use crate::complex::Complex;
 use crate::exact::growth::Growth;
@@ -22,10 +22,10 @@ use crate::exact::series::{Polynomials, Series};
 use crate::medium::Medium;
 use crate::vector::{ComplexVector, Vector};
 
-/// Most doublings: a plate of 2⁴⁰ sublayers is beyond every admissible input.
+/// Maximum number of doublings: a plate of 2⁴⁰ sublayers is beyond every admissible input.
 const DOUBLINGS_MAX: u32 = 40;
 
-/// A plate of one solid, with what was computed for the present frequency.
+/// A plate of one solid, with the quantities computed for the current frequency.
 #[derive(Debug)]
 pub(crate) struct Plate<const TERMS: usize> {
     series: Series<TERMS>,
@@ -33,15 +33,15 @@ pub(crate) struct Plate<const TERMS: usize> {
     polynomials: Polynomials,
     growth_max: f64,
     thickness: f64,
-    /// What the polynomials were summed for.
+    /// Frequency and sublayer for which the polynomials were summed.
     prepared: Option<Prepared>,
 }
 
-/// The plate of quick looks: the remainder of its series is 3e-7 of the leading terms, an error as
-/// smooth as a slightly different solid's, which a velocity does not notice.
+/// The plate of quick looks: the remainder of its series is 3e-7 of the leading terms. This error
+/// is as smooth as that of a slightly different solid, and has no visible effect on a velocity.
 pub(crate) type FastPlate = Plate<8>;
 
-/// The plate of thorough looks, traces and single admittances: right to 1e-13.
+/// The plate of thorough looks, traces and single admittances: accurate to 1e-13.
 pub(crate) type AccuratePlate = Plate<11>;
 
 impl Default for FastPlate {
@@ -56,14 +56,14 @@ impl Default for AccuratePlate {
     }
 }
 
-/// Frequency and sublayer of the present polynomials.
+/// Frequency and sublayer of the current polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Prepared {
     s: Complex,
     doublings: u32,
     /// Thickness of the sublayer, m.
     sublayer: f64,
-    /// Pa/m that a scaled stiffness of one stands for.
+    /// The stiffness, Pa/m, that corresponds to a scaled stiffness of one.
     stiffness: f64,
 }
 
@@ -76,15 +76,15 @@ type Symmetric<V> = [ComplexVector<V>; 6];
 struct Layer<V> {
     /// A = K_tt; K_bb is its transpose.
     top: Matrix<V>,
-    /// D = -K_tb: minus the traction on top for a displacement below.
+    /// D = -K_tb: minus the traction on top for a displacement of the bottom.
     down: Symmetric<V>,
-    /// U = -K_bt: minus the traction below for a displacement on top.
+    /// U = -K_bt: minus the traction on the bottom for a displacement of the top.
     up: Symmetric<V>,
 }
 
 impl<const TERMS: usize> Plate<TERMS> {
-    /// `growth_max`: largest |λ| d of a sublayer, below π, where the block that is inverted becomes
-    /// singular.
+    /// Creates a plate. `growth_max` is the largest |λ| d of a sublayer; it is below π, where the
+    /// block that is inverted becomes singular.
     fn new(growth_max: f64) -> Self {
         Self {
             series: Series::default(),
@@ -96,7 +96,7 @@ impl<const TERMS: usize> Plate<TERMS> {
         }
     }
 
-    /// Makes this the plate of `medium`, `thickness` in m.
+    /// Fills the plate for `medium`; `thickness` in m.
     #[inline(always)]
     pub(crate) fn fill<V: Vector>(&mut self, medium: &Medium, thickness: f64) {
         self.series.fill(medium);
@@ -129,9 +129,10 @@ impl<const TERMS: usize> Plate<TERMS> {
         self.prepared = Some(Prepared { s, doublings, sublayer, stiffness });
     }
 
-    /// -1/Y, Pa/m, at wavenumbers `k` (rad/m), the lower face loaded by τ3 = `load` u3 (Pa/m).
+    /// Returns -1/Y, Pa/m, at wavenumbers `k` (rad/m), with the lower face loaded by τ3 = `load` u3
+    /// (Pa/m).
     ///
-    /// [`Plate::prepare`] has been called for these wavenumbers; else the result is NaN.
+    /// [`Plate::prepare`] must have been called for these wavenumbers; otherwise the result is NaN.
     #[inline(always)]
     pub(crate) fn impedance<V: Vector>(&self, k: V, load: ComplexVector<V>) -> ComplexVector<V> {
         let Some(prepared) = self.prepared else {
@@ -147,7 +148,7 @@ impl<const TERMS: usize> Plate<TERMS> {
     }
 }
 
-/// Stiffness of the thinnest sublayer: with the blocks X and Y of the transfer matrix,
+/// Returns the stiffness of the thinnest sublayer: with the blocks X and Y of the transfer matrix,
 /// D = Y(-k)⁻¹, U = Y(k)⁻¹, A = (U X)ᵀ.
 #[inline(always)]
 fn sublayer<const TERMS: usize, V: Vector>(polynomials: &Polynomials, k: V) -> Layer<V> {
@@ -168,7 +169,7 @@ fn sublayer<const TERMS: usize, V: Vector>(polynomials: &Polynomials, k: V) -> L
     Layer { top, down, up }
 }
 
-/// Products of three rows with one column of the block (u, u) of the transfer matrix.
+/// Returns the products of three rows with one column of the block (u, u) of the transfer matrix.
 #[inline(always)]
 fn products<const TERMS: usize, V: Vector>(
     polynomials: &Polynomials,
@@ -184,7 +185,7 @@ fn products<const TERMS: usize, V: Vector>(
 }
 
 impl<V: Vector> Layer<V> {
-    /// Two of these, one upon the other.
+    /// Returns two of these layers, one on the other.
     #[inline(always)]
     fn doubled(&self) -> Self {
         let factor = Factor::new(&self.joint());
@@ -207,7 +208,7 @@ impl<V: Vector> Layer<V> {
         Self { top, down: new_down, up: gram(&factor.scaled(&up), &up) }
     }
 
-    /// S = A + Aᵀ of the joint between two equal layers.
+    /// Returns S = A + Aᵀ of the joint between two equal layers.
     #[inline(always)]
     fn joint(&self) -> Symmetric<V> {
         let a = &self.top;
@@ -221,8 +222,8 @@ impl<V: Vector> Layer<V> {
         ]
     }
 
-    /// Two of these, one upon the other, the lower face loaded by `load`: the last pivot of the
-    /// elimination of all displacements but u3 of the upper face.
+    /// Returns the last pivot of the elimination of all displacements but u3 of the upper face, for
+    /// two of these layers, one on the other, with the lower face loaded by `load`.
     #[inline(always)]
     fn closed(&self, load: ComplexVector<V>) -> ComplexVector<V> {
         let a = &self.top;
@@ -235,7 +236,7 @@ impl<V: Vector> Layer<V> {
         Lu::new(&top).last_pivot
     }
 
-    /// target - D pivot⁻¹ U.
+    /// Returns target - D pivot⁻¹ U.
     #[inline(always)]
     fn eliminated(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
         let lu = Lu::new(pivot);
@@ -258,13 +259,13 @@ impl<V: Vector> Layer<V> {
     }
 }
 
-/// Σ a b.
+/// Returns Σ a b.
 #[inline(always)]
 fn dot<V: Vector>(a: [ComplexVector<V>; 3], b: [ComplexVector<V>; 3]) -> ComplexVector<V> {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
 }
 
-/// minuend - Σ a b.
+/// Returns minuend - Σ a b.
 #[inline(always)]
 fn dot_from<V: Vector>(
     minuend: ComplexVector<V>,
@@ -274,7 +275,7 @@ fn dot_from<V: Vector>(
     a[2].mul_sub_from(b[2], a[1].mul_sub_from(b[1], a[0].mul_sub_from(b[0], minuend)))
 }
 
-/// The symmetric product aᵀ b of matrices given by columns.
+/// Returns the symmetric product aᵀ b of matrices given by columns.
 #[inline(always)]
 fn gram<V: Vector>(a: &[[ComplexVector<V>; 3]; 3], b: &[[ComplexVector<V>; 3]; 3]) -> Symmetric<V> {
     [
@@ -295,7 +296,7 @@ struct Lower<V> {
 }
 
 impl<V: Vector> Lower<V> {
-    /// The columns of L⁻¹ b.
+    /// Returns the columns of L⁻¹ b.
     #[inline(always)]
     fn forward(&self, b: &Symmetric<V>) -> [[ComplexVector<V>; 3]; 3] {
         [
@@ -337,7 +338,7 @@ impl<V: Vector> Factor<V> {
         Self { lower: Lower { l10, l20, l21 }, inverse: [first, second, third] }
     }
 
-    /// The columns of D⁻¹ b.
+    /// Returns the columns of D⁻¹ b.
     #[inline(always)]
     fn scaled(&self, b: &[[ComplexVector<V>; 3]; 3]) -> [[ComplexVector<V>; 3]; 3] {
         [self.scaled_column(b[0]), self.scaled_column(b[1]), self.scaled_column(b[2])]
@@ -349,7 +350,7 @@ impl<V: Vector> Factor<V> {
     }
 }
 
-/// Inverse of a complex symmetric 3×3 matrix: L⁻ᵀ D⁻¹ L⁻¹.
+/// Returns the inverse of a complex symmetric 3×3 matrix: L⁻ᵀ D⁻¹ L⁻¹.
 #[inline(always)]
 fn inverse<V: Vector>(s: &Symmetric<V>) -> Symmetric<V> {
     let Factor { lower: Lower { l10, l20, l21 }, inverse: [d0, d1, d2] } = Factor::new(s);
@@ -392,7 +393,7 @@ impl<V: Vector> Lu<V> {
         Self { lower, u01: a[1], u02: a[2], u12, inverse: [first, second], last_pivot }
     }
 
-    /// The row b U⁻¹; `last`: the inverse of the last pivot.
+    /// Returns the row b U⁻¹; `last` is the inverse of the last pivot.
     #[inline(always)]
     fn divided(&self, b: [ComplexVector<V>; 3], last: ComplexVector<V>) -> [ComplexVector<V>; 3] {
         let x = b[0].mul(self.inverse[0]);

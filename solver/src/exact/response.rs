@@ -1,4 +1,4 @@
-//! The sum over wavenumbers: spectrum of the pressure at every receiver.
+//! The sum over wavenumbers, which gives the spectrum of the pressure at every receiver.
 
 use std::ops::Range;
 
@@ -10,11 +10,11 @@ use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::medium::Medium;
 use crate::vector::{ComplexVector, Vector};
 
-/// Receivers that are summed side by side.
+/// Number of receivers that are summed side by side.
 const GROUP: usize = 4;
 
-/// Spectra of the pressure less the direct wave, not yet tapered: one row of runs of eight lines
-/// per receiver, zero where a line is not computed.
+/// Spectra of the pressure without the direct wave, not yet tapered: for each receiver a row of
+/// runs of eight lines, zero where a line is not computed.
 #[derive(Debug, Default)]
 pub(crate) struct Spectra {
     rows: Vec<ComplexLanes>,
@@ -24,17 +24,17 @@ pub(crate) struct Spectra {
 }
 
 impl Spectra {
-    /// Spectrum at one receiver.
+    /// Returns the spectrum at one receiver.
     pub(crate) fn receiver(&self, r: usize) -> &[ComplexLanes] {
         &self.rows[r * self.runs..(r + 1) * self.runs]
     }
 
-    /// Whether every number is finite.
+    /// Returns whether every number is finite.
     pub(crate) fn is_finite(&self) -> bool {
         self.rows.iter().all(|l| l.re.0.iter().chain(&l.im.0).all(|value| value.is_finite()))
     }
 
-    /// Makes room for the spectra of one plate, all zero.
+    /// Makes room for the spectra of one plate, and sets them to zero.
     pub(crate) fn clear(&mut self, tables: &Tables) {
         self.runs = tables.runs.len();
         self.rows.clear();
@@ -43,8 +43,8 @@ impl Spectra {
 
     /// Computes some lines of the spectra of one plate.
     ///
-    /// The parts are kernels of their own: in one large function the compiler has too few registers
-    /// for the innermost one.
+    /// Its parts are separate kernels: in one large function the compiler would have too few
+    /// registers for the innermost one.
     pub(crate) fn fill<const TERMS: usize>(
         &mut self,
         isa: Isa,
@@ -69,7 +69,7 @@ impl Spectra {
     }
 }
 
-/// Computes what the cosines of one frequency's wavenumbers are weighted with.
+/// Computes the weights of the cosines of one frequency's wavenumbers.
 pub(crate) fn respond<const TERMS: usize>(
     isa: Isa,
     tables: &Tables,
@@ -89,7 +89,7 @@ pub(crate) fn respond<const TERMS: usize>(
     }
 }
 
-/// Prepares a plate for one block of wavenumbers.
+/// Kernel that prepares a plate for one block of wavenumbers.
 struct Prepare<'a, const TERMS: usize> {
     plate: &'a mut Plate<TERMS>,
     medium: &'a Medium,
@@ -106,7 +106,7 @@ impl<const TERMS: usize> Kernel for Prepare<'_, TERMS> {
     }
 }
 
-/// What the cosines of one block of wavenumbers are weighted with.
+/// Kernel that computes the weights of the cosines of one block of wavenumbers.
 struct Respond<'a, const TERMS: usize> {
     plate: &'a Plate<TERMS>,
     k: &'a Lanes,
@@ -138,7 +138,7 @@ impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
     }
 }
 
-/// Sums the responses of one line at every receiver.
+/// Kernel that sums the responses of one line at every receiver.
 struct SumOverWavenumbers<'a> {
     tables: &'a Tables,
     line: usize,
@@ -167,8 +167,8 @@ impl Kernel for SumOverWavenumbers<'_> {
     }
 }
 
-/// Σ response cos(k x), lane by lane, at receivers `r` … `r` + 3; beyond the last receiver the
-/// last one's.
+/// Returns Σ response cos(k x), lane by lane, at receivers `r` … `r` + 3; the last receiver is
+/// repeated beyond the end.
 #[inline(always)]
 fn cosine_sums<V: Vector>(
     tables: &Tables,

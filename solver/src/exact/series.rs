@@ -130,14 +130,14 @@ pub(crate) struct Parts<V> {
 }
 
 impl<V: Vector> Parts<V> {
-    /// At wavenumbers `k`: κ = -ik.
+    /// Returns the entry at wavenumbers `k`: κ = -ik.
     #[inline(always)]
     pub(crate) fn at(&self, k: V) -> ComplexVector<V> {
         let re = self.odd.im.mul_add(k, self.even.re);
         ComplexVector { re, im: self.odd.re.mul_sub_from(k, self.even.im) }
     }
 
-    /// At the opposite wavenumbers.
+    /// Returns the entry at the opposite wavenumbers.
     #[inline(always)]
     pub(crate) fn at_opposite(&self, k: V) -> ComplexVector<V> {
         let re = self.odd.im.mul_sub_from(k, self.even.re);

@@ -14,10 +14,11 @@ use crate::vector::{ComplexVector, Vector};
 
 /// Grid points per period of the centre frequency on which extrema are bracketed.
 const POINTS_PER_CYCLE: f64 = 24.0;
-/// Most steps of the refinement of an extremum; bisection alone needs 40 to reach rounding.
+/// Maximum number of steps of the refinement of an extremum; bisection alone needs 40 to reach
+/// rounding.
 const REFINEMENTS_MAX: usize = 60;
-/// A step that moves an extremum by less than this fraction of a grid step, squared by the next
-/// one, is the last.
+/// The refinement ends with a step that moves an extremum by less than this fraction of a grid
+/// step; the next step would move it by the square of that.
 const STEP_MIN: f64 = 1e-3;
 /// Blocks of times that are summed side by side.
 const GROUP: usize = 4;
@@ -30,8 +31,8 @@ pub(crate) struct Grid {
     blocks: usize,
     /// α + iω of each line.
     slopes: Vec<Complex>,
-    /// e^{iωt} of line i at the first time of block b, `[i * blocks + b]`; nothing where that is too
-    /// much to be kept.
+    /// e^{iωt} of line i at the first time of block b, `[i * blocks + b]`; empty if that would take
+    /// too much memory.
     coarse: Vec<Complex>,
     /// e^{iωt} of each line at the lanes' delays.
     fine: Vec<ComplexLanes>,
@@ -42,30 +43,30 @@ pub(crate) struct Grid {
 pub(crate) struct Slopes {
     /// Coefficients of the slope times `fine`, per line.
     delayed: Vec<ComplexLanes>,
-    /// e^{iωt} at the first times of one group of blocks, where the grid keeps none.
+    /// e^{iωt} at the first times of one group of blocks, if the grid does not keep them.
     coarse: Vec<Complex>,
     /// The slope on the grid, from its first block on.
     values: Vec<Lanes>,
-    /// Extrema that were found but not yet refined.
+    /// Extrema found but not yet refined.
     brackets: Vec<Bracket>,
 }
 
-/// An extremum between two times of the grid.
+/// An extremum bracketed by two times of the grid.
 #[derive(Debug, Clone, Copy)]
 struct Bracket {
     low: f64,
     high: f64,
-    /// Where it is estimated to be.
+    /// Its estimated time.
     time: f64,
-    /// Whether the slope rises: a minimum.
+    /// Whether the slope rises, i.e. the extremum is a minimum.
     rising: bool,
     done: bool,
 }
 
 impl Grid {
-    /// A grid that covers every window of the setup.
+    /// Creates a grid that covers every window of the setup.
     ///
-    /// `keep`: whether its waves are kept, rather than be computed whenever they are needed.
+    /// `keep`: whether its waves are kept, or recomputed whenever they are needed.
     pub(crate) fn new(setup: &Setup, tables: &Tables, keep: bool) -> Self {
         let slopes: Vec<_> = tables.lines.iter().map(|line| line.s).collect();
         let mut grid = Self {
@@ -89,7 +90,7 @@ impl Grid {
         grid
     }
 
-    /// Bytes that a grid of so many lines takes, if its waves are kept.
+    /// Returns the memory of a grid of this many lines that keeps its waves, bytes.
     pub(crate) fn bytes(setup: &Setup, lines: usize) -> f64 {
         let a_line = Self::blocks(setup) * size_of::<Complex>() + size_of::<ComplexLanes>();
         lines as f64 * a_line as f64
@@ -104,14 +105,14 @@ impl Grid {
         ((last / Self::step(setup)) as usize / LANES + 2).next_multiple_of(GROUP)
     }
 
-    /// e^{iωt} of a line at time `j` of the grid.
+    /// Returns e^{iωt} of a line at time `j` of the grid.
     fn wave(&self, line: usize, j: usize) -> Complex {
         let (sin, cos) = libm::sincos(self.slopes[line].im * (j as f64 * self.step));
         Complex::new(cos, sin)
     }
 
-    /// e^{iωt} of the first `lines` at the first times of the [`GROUP`] blocks from `start` on, at
-    /// `[i * stride + offset + b]` of what is returned, with stride and offset.
+    /// Returns e^{iωt} of the first `lines` at the first times of the [`GROUP`] blocks from `start`
+    /// on, as a slice indexed by `[i * stride + offset + b]`, with stride and offset.
     #[inline(always)]
     fn coarse<'a>(
         &'a self,
@@ -129,7 +130,7 @@ impl Grid {
         (scratch, GROUP, 0)
     }
 
-    /// The slope, times e^{-αt} T/2, in the blocks from `first` to at least `last`.
+    /// Computes the slope, times e^{-αt} T/2, in the blocks from `first` to at least `last`.
     #[inline(always)]
     fn slopes<V: Vector>(
         &self,
@@ -153,7 +154,7 @@ impl Grid {
         slopes.values.clear();
         let mut b = first;
         while b <= last {
-            // The last group may begin earlier, so as to end on the grid.
+            // The last group may begin earlier, so that it ends with the grid.
             let start = b.min(self.blocks - GROUP);
             let (waves, stride, offset) = self.coarse(lines, start, &mut slopes.coarse);
             let mut sums = [Lanes::ZERO; GROUP];
@@ -184,7 +185,7 @@ impl Grid {
 /// The pressure at one receiver.
 pub(crate) struct Signal<'a> {
     pub(crate) sampling: &'a Sampling,
-    /// Where the lines stand.
+    /// The runs in which the lines are stored.
     pub(crate) runs: &'a [Run],
     /// The lines of the first runs, tapered; zero where a line is not computed.
     pub(crate) spectrum: &'a [ComplexLanes],
@@ -198,7 +199,7 @@ struct Derivatives {
 }
 
 impl Signal<'_> {
-    /// p, Pa, at eight times, s.
+    /// Returns p, Pa, at eight times, s.
     #[inline(always)]
     pub(crate) fn at<V: Vector>(&self, times: &Lanes) -> Lanes {
         let mut pressures = self.derivatives::<V, _>(&self.turns(times), &Unweighted).value;
@@ -213,8 +214,8 @@ impl Signal<'_> {
         2.0 * value * libm::exp(self.sampling.damping * t) / self.sampling.period
     }
 
-    /// All local extrema in `from` ≤ t < `to` (s), in order of time, into `extrema`; returns p(`to`),
-    /// Pa.
+    /// Writes all local extrema in `from` ≤ t < `to` (s), in order of time, to `extrema`; returns
+    /// p(`to`), Pa.
     #[inline(always)]
     pub(crate) fn extrema<V: Vector>(
         &self,
@@ -245,8 +246,8 @@ impl Signal<'_> {
         last
     }
 
-    /// Moves the times of up to eight brackets to the zeros of the slope: Newton's method, kept
-    /// inside the brackets by bisection; those that are done stay. Returns the pressures there, times
+    /// Moves the times of up to eight brackets to the zeros of the slope by Newton's method, kept
+    /// inside the brackets by bisection; converged times stay. Returns the pressures there, times
     /// e^{-αt} T/2.
     #[inline(always)]
     fn refine<V: Vector>(&self, brackets: &mut [Bracket], step_min: f64) -> Lanes {
@@ -285,8 +286,9 @@ impl Signal<'_> {
         values.unwrap_or(Lanes::ZERO)
     }
 
-    /// Where one step of Newton's method puts the extremum near `time` (s) once the lines are
-    /// weighted: `weights` holds, run by run and line by line, eight weightings side by side.
+    /// Returns the position to which one step of Newton's method moves the extremum near `time` (s)
+    /// if the lines are weighted: `weights` contains, by run and line, eight weightings side by
+    /// side.
     #[inline(always)]
     pub(crate) fn moved_extrema<V: Vector>(&self, time: f64, weights: &[[Lanes; LANES]]) -> Lanes {
         let (sin, cos) = libm::sincos(self.sampling.frequency_step * time);
@@ -299,13 +301,13 @@ impl Signal<'_> {
         times
     }
 
-    /// The factor e^{αt} has no share in the zero: this is Newton's step for the rest.
+    /// The factor e^{αt} does not affect the zero: this is Newton's step for the rest.
     #[inline(always)]
     fn newton_step(&self, slope: f64, curvature: f64) -> f64 {
         slope / self.sampling.damping.mul_add(-slope, curvature)
     }
 
-    /// e^{iωt} of the first frequency above zero.
+    /// Returns e^{iωt} of the first frequency above zero.
     #[inline(always)]
     fn turns(&self, times: &Lanes) -> ComplexLanes {
         let mut turns = ComplexLanes::ZERO;
@@ -317,7 +319,7 @@ impl Signal<'_> {
         turns
     }
 
-    /// At eight times, given by their [`Signal::turns`].
+    /// Returns the derivatives at eight times, given by their [`Signal::turns`].
     #[inline(always)]
     fn derivatives<V: Vector, W: Weights + ?Sized>(
         &self,
@@ -367,13 +369,13 @@ impl Signal<'_> {
     }
 }
 
-/// What a line's coefficient is multiplied by in each of eight lanes.
+/// Factor of a line's coefficient in each of eight lanes.
 trait Weights {
-    /// The coefficient of line `line` of run `run`, in part `part` of the lanes.
+    /// Returns the weighted coefficient of line `line` of run `run`, in part `part` of the lanes.
     fn apply<V: Vector>(&self, run: usize, line: usize, part: usize, c: (f64, f64)) -> (V, V);
 }
 
-/// By 1.
+/// Weights of 1.
 struct Unweighted;
 
 impl Weights for Unweighted {
@@ -397,7 +399,7 @@ impl Weights for [[Lanes; LANES]] {
     }
 }
 
-/// Lists the sign changes of the slope on the grid, whose values begin at block `first`.
+/// Lists the sign changes of the slope on the grid, whose values begin with block `first`.
 #[inline(always)]
 fn find_brackets(step: f64, first: usize, slopes: &mut Slopes) {
     let Slopes { values, brackets, .. } = slopes;
@@ -434,8 +436,8 @@ fn find_brackets(step: f64, first: usize, slopes: &mut Slopes) {
     }
 }
 
-/// Where the cubic through values at -1, 0, 1, 2 vanishes between 0 and 1, given that the middle
-/// values differ in sign; nearly: two Newton steps from the secant's root.
+/// Returns the approximate root between 0 and 1 of the cubic through values at -1, 0, 1, 2, given
+/// that the middle values differ in sign: two Newton steps from the secant's root.
 #[inline(always)]
 fn cubic_root([a, b, c, d]: [f64; 4]) -> f64 {
     // The Newton form at 0, 1, -1, 2.

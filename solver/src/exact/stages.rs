@@ -1,9 +1,9 @@
-//! The stages of one realization one by one, for benchmarks.
+//! The individual stages of one realization, for benchmarks.
 //!
-//! They are the very code that [`Solver::arrival`](crate::Solver::arrival) runs, cut where a clock can
-//! be read in between: the first look at a bone, which most bones need nothing after. Admittances
-//! and sums take turns there, frequency by frequency; here all admittances come first. Each stage
-//! may be repeated.
+//! They use the code of [`Solver::arrival`](crate::Solver::arrival), divided so that the time
+//! between them can be measured, for the first look at a bone, after which most bones need nothing
+//! more. There, admittances and sums alternate, frequency by frequency; here all admittances come
+//! first. Each stage may be repeated.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::{self, Grade, RUNGS};
@@ -27,11 +27,11 @@ pub struct Stages {
 #[derive(Debug, Default)]
 pub struct Memory {
     exact: ExactWorkspace,
-    /// Per line.
+    /// Responses of each line.
     responses: Vec<Vec<ComplexLanes>>,
 }
 
-/// A bone whose tensor has been turned into what its plate's admittances have in common.
+/// A bone whose tensor has been converted into the common part of its plate's admittances.
 #[derive(Debug)]
 pub struct Filled<'a> {
     exact: &'a Exact,
@@ -55,15 +55,16 @@ pub struct Summed<'a, 'b>(&'a mut Filled<'b>);
 pub struct Observed<'a, 'b>(&'a mut Filled<'b>);
 
 impl Stages {
-    /// The stages at cases of `setup`, which has passed validation, on one instruction set.
+    /// Creates the stages for cases of `setup`, which has passed validation, on one instruction
+    /// set.
     pub fn new(setup: &Setup, isa: Isa) -> Self {
         Self { exact: Exact::new(setup, isa) }
     }
 
-    /// Tensor: what the admittances of one bone have in common.
+    /// Tensor: computes the common part of the admittances of one bone.
     ///
     /// # Errors
-    /// When nothing that arrives through the bone can come first, or it is out of scale.
+    /// If no wave through the bone can arrive first, or if it is out of scale.
     pub fn tensor<'a>(
         &'a self,
         bone: &Bone,
@@ -84,7 +85,7 @@ impl Stages {
     }
 }
 
-/// The first look of a rung.
+/// Returns the first look of a rung.
 fn look(rung: &Rung, accurate: bool) -> &Look {
     if accurate { &rung.whole } else { &rung.first }
 }
@@ -94,12 +95,12 @@ impl<'b> Filled<'b> {
         look(&self.rung, self.accurate)
     }
 
-    /// Number of (frequency, wavenumber) pairs.
+    /// Returns the number of (frequency, wavenumber) pairs.
     pub fn pairs(&self) -> usize {
         self.look().sampled.pairs as usize
     }
 
-    /// Admittance: the plate's response in every pair.
+    /// Admittance: computes the plate's response at every pair.
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
         let (isa, tables, medium) = (self.exact.isa, &self.rung.tables, &self.medium);
         let lines = &tables.lines[..self.look().lines];
@@ -117,7 +118,7 @@ impl<'b> Filled<'b> {
 }
 
 impl<'b> Responded<'_, 'b> {
-    /// Wavenumber sum: spectra at every receiver.
+    /// Wavenumber sum: computes the spectra at every receiver.
     pub fn sum(&mut self) -> Summed<'_, 'b> {
         let Filled { exact, rung, memory, .. } = &mut *self.0;
         memory.exact.spectra.clear(&rung.tables);
@@ -129,10 +130,10 @@ impl<'b> Responded<'_, 'b> {
 }
 
 impl<'b> Summed<'_, 'b> {
-    /// Time synthesis: extrema of the pressure at every receiver.
+    /// Time synthesis: computes the extrema of the pressure at every receiver.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// If a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
         let Filled { exact, rung, accurate, speed, memory, .. } = &mut *self.0;
         exact.observe(*speed, rung, look(rung, *accurate), &mut memory.exact)?;
@@ -141,10 +142,10 @@ impl<'b> Summed<'_, 'b> {
 }
 
 impl Observed<'_, '_> {
-    /// Picking: the first arrival and the estimate of its error.
+    /// Picking: returns the first arrival and the estimate of its error.
     ///
     /// # Errors
-    /// When there is no acceptable pick.
+    /// If there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
         let Filled { exact, rung, memory, .. } = &*self.0;
         let look = self.0.look();
@@ -180,7 +181,7 @@ mod tests {
                 let mut summed = responded.sum();
                 let arrival = summed.synthesis().unwrap().picking().unwrap();
                 same += usize::from(arrival == expected);
-                // Where the solver looks again, it finds nearly the same.
+                // If the solver makes further looks, it finds nearly the same.
                 assert!((arrival.velocity / expected.velocity - 1.0).abs() < 3e-4, "index {i}");
             }
             assert!(same >= 15, "only {same} of 20 arrivals are those of a first look");

@@ -1,5 +1,5 @@
-//! Tables that all realizations of one setup share: they depend on layers, probe, solver settings
-//! and the rung of the speed ladder only.
+//! Tables that all realizations of one setup share: they depend only on layers, probe, solver
+//! settings and the rung of the speed ladder.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -16,7 +16,7 @@ use crate::pulse::Pulse;
 pub(crate) struct Tables {
     setup: Setup,
     pub(crate) sampling: Sampling,
-    /// Where the lines stand on the frequency axis: eight lines a run.
+    /// Positions of the lines on the frequency axis, eight lines per run.
     pub(crate) runs: Vec<Run>,
     pub(crate) lines: Vec<Line>,
     /// Wavenumbers, rad/m, in blocks.
@@ -24,7 +24,7 @@ pub(crate) struct Tables {
     /// cos(k x) of wavenumber block b at receiver r, at `[r * blocks + b]`.
     cosines: Vec<Lanes>,
     receivers: usize,
-    /// Most blocks of a line.
+    /// Maximum number of blocks of a line.
     blocks: usize,
 }
 
@@ -37,13 +37,14 @@ pub(crate) struct Line {
     pub(crate) s: Complex,
     /// ρ1 s², kg/m³/s².
     pub(crate) inertia: Complex,
-    /// F(s) times the line's share in the sum over frequencies; not yet tapered.
+    /// F(s) times the line's weight in the sum over frequencies; not yet tapered.
     pub(crate) pulse: Complex,
-    /// Number of blocks of wavenumbers; none where the line is not needed.
+    /// Number of blocks of wavenumbers; none if the line is not needed.
     pub(crate) blocks: usize,
-    /// The blocks, unless there are too many to be kept.
+    /// The blocks, unless they would take too much memory.
     kept: Vec<Block>,
-    /// exp(-2 g h1) of the kept blocks where the outer face of the coupling is heard, else nothing.
+    /// exp(-2 g h1) of the kept blocks if echoes of the coupling's outer face matter, otherwise
+    /// empty.
     echoes: Vec<ComplexLanes>,
 }
 
@@ -52,14 +53,14 @@ pub(crate) struct Line {
 pub(crate) struct Block {
     /// g = √(k² + s²/c1²), rad/m.
     pub(crate) g: ComplexLanes,
-    /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m: what loads the lower face.
+    /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m: the load on the lower face.
     pub(crate) load: ComplexLanes,
-    /// Everything that multiplies the reflection coefficient, with the measure of the sum over k.
+    /// All factors of the reflection coefficient, including the measure of the sum over k.
     pub(crate) weight: ComplexLanes,
 }
 
 impl Tables {
-    /// Bytes that tables of so many pairs take, if they are kept.
+    /// Returns the memory of tables of this many pairs that are kept, bytes.
     pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> f64 {
         let a_pair = (size_of::<Block>() + size_of::<ComplexLanes>()) / LANES;
         let highest = sampling.runs().iter().flat_map(|run| run.frequencies()).max().unwrap_or(0);
@@ -67,10 +68,10 @@ impl Tables {
         pairs * a_pair as f64 + (cosines * size_of::<f64>()) as f64
     }
 
-    /// Tables for a pulse of the given amplitude.
+    /// Creates the tables for a pulse of the given amplitude.
     ///
-    /// `taper` cuts the whole band; `keep`: whether blocks are kept, rather than be computed whenever
-    /// they are needed.
+    /// `taper` cuts the whole band; `keep`: whether blocks are kept, or recomputed whenever they
+    /// are needed.
     pub(crate) fn new(
         setup: &Setup,
         sampling: Sampling,
@@ -121,7 +122,7 @@ impl Tables {
         }
     }
 
-    /// Block `b` of a line, taken from the tables or made in `scratch`.
+    /// Returns block `b` of a line, from the tables or computed into `scratch`.
     #[inline(always)]
     pub(crate) fn block<'a>(
         &'a self,
@@ -136,13 +137,13 @@ impl Tables {
         (block, echo)
     }
 
-    /// The wavenumbers of block `b`, rad/m, the same at every frequency.
+    /// Returns the wavenumbers of block `b`, rad/m, which are the same at every frequency.
     #[inline(always)]
     pub(crate) fn wavenumbers(&self, b: usize) -> &Lanes {
         &self.wavenumbers[b]
     }
 
-    /// cos(k x) at receiver `r`, one entry per block of wavenumbers.
+    /// Returns cos(k x) at receiver `r`, one entry per block of wavenumbers.
     #[inline(always)]
     pub(crate) fn cosines(&self, r: usize) -> &[Lanes] {
         &self.cosines[r * self.blocks..(r + 1) * self.blocks]
@@ -152,18 +153,18 @@ impl Tables {
         self.receivers
     }
 
-    /// How many lines, from the first on, take part in a signal that is cut by a taper.
+    /// Returns the number of lines, from the first on, that contribute to a signal cut by a taper.
     pub(crate) fn lines_within(&self, taper: (f64, f64)) -> usize {
         let within = |line: &Line| self.sampling.is_within(line.n, taper);
         self.lines.iter().rposition(within).map_or(0, |last| last + 1)
     }
 
-    /// (Frequency, wavenumber) pairs of some lines.
+    /// Returns the number of (frequency, wavenumber) pairs of some lines.
     pub(crate) fn pairs(&self, lines: Range<usize>) -> u64 {
         self.lines[lines].iter().map(|line| (line.blocks * LANES) as u64).sum()
     }
 
-    /// Weights of the lines, eight at a time, of a taper that starts and ends at two frequencies, Hz.
+    /// Returns the weights of the lines, eight at a time, for a taper with this start and end, Hz.
     pub(crate) fn taper(&self, taper: (f64, f64)) -> Vec<Lanes> {
         let weights = |run: &Run| {
             let mut lanes = Lanes::ZERO;
@@ -188,7 +189,8 @@ impl Line {
         let inertia = (s * s).scale(setup.layers.coupling.density);
         let within = sampling.is_within(n, taper);
         let blocks = if within { sampling.wavenumbers(n) / LANES } else { 0 };
-        // Of the two signs of every frequency but zero, one is summed: the factor 2 is the sum's.
+        // Of the two signs of every frequency but zero, only one is summed: hence the sum's factor
+        // 2.
         let share = if n == 0 { 0.5 } else { sampling.share(n) };
         Self {
             n,
@@ -201,7 +203,7 @@ impl Line {
         }
     }
 
-    /// Computes all blocks.
+    /// Computes and keeps all blocks.
     fn keep(&mut self, setup: &Setup, sampling: &Sampling) {
         for b in 0..self.blocks {
             let (block, echo) = self.block(setup, sampling, b);
@@ -212,7 +214,8 @@ impl Line {
         }
     }
 
-    /// One block, and exp(-2 g h1) where the outer face of the coupling is heard, else 0.
+    /// Computes one block, and exp(-2 g h1) if echoes of the coupling's outer face matter,
+    /// otherwise 0.
     fn block(&self, setup: &Setup, sampling: &Sampling, b: usize) -> (Block, ComplexLanes) {
         let zero = ComplexLanes::ZERO;
         let (mut block, mut echo) = (Block { g: zero, load: zero, weight: zero }, zero);
@@ -220,7 +223,7 @@ impl Line {
             let m = b * LANES + lane;
             let k = m as f64 * sampling.wavenumber_step;
             let point = spectral_point(setup, sampling, self.s, k);
-            // The trapezoidal rule from k = 0 on, over (1/π) ∫ … cos(kx) dk.
+            // The trapezoidal rule from k = 0 on, for (1/π) ∫ … cos(kx) dk.
             let end = if m == 0 { 0.5 } else { 1.0 };
             let measure = end * sampling.wavenumber_step / PI;
             let weight = measure * sampling.wavenumber_weight(self.n, k);
@@ -233,7 +236,7 @@ impl Line {
     }
 }
 
-/// What the fluids contribute at one (k, s).
+/// The contribution of the fluids at one (k, s).
 struct SpectralPoint {
     g: Complex,
     load: Complex,
@@ -242,14 +245,15 @@ struct SpectralPoint {
     echo: Complex,
 }
 
-/// The pressure in fluid 1 less the direct wave and its image in the outer face is, per unit of F,
+/// Computes the contribution of the fluids. The pressure in fluid 1, without the direct wave and
+/// its image in the outer face, is, per unit of F,
 ///
 /// ```text
 /// ρ1/(2g) e2 (1 - ea) (1 - eb) R / (1 + R E2)
 /// e2 = exp(-g (x3 + x3S)), ea = exp(-2g (h1 - x3)), eb = exp(-2g (h1 - x3S)), E2 = exp(-2g h1)
 /// ```
 ///
-/// and ρ1/(2g) e2 R while no reflection of the outer face is heard.
+/// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window.
 fn spectral_point(setup: &Setup, sampling: &Sampling, s: Complex, k: f64) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
@@ -268,8 +272,8 @@ fn spectral_point(setup: &Setup, sampling: &Sampling, s: Complex, k: f64) -> Spe
     SpectralPoint { g, load, factor, echo }
 }
 
-/// Z with τ3 = Z u3 at the bone's lower face, Pa/m: ρ2 s² tanh(g2 h2)/g2, or ρ2 s²/g2 while no
-/// reflection of the marrow's outer face is heard.
+/// Returns Z with τ3 = Z u3 at the bone's lower face, Pa/m: ρ2 s² tanh(g2 h2)/g2, or ρ2 s²/g2 if no
+/// reflection of the marrow's outer face can arrive in a window.
 pub(crate) fn marrow_load(setup: &Setup, s: Complex, k: f64, echoes: bool) -> Complex {
     let marrow = &setup.layers.marrow;
     let g = vertical_wavenumber(k, s, marrow.sound_speed);
@@ -282,7 +286,7 @@ pub(crate) fn marrow_load(setup: &Setup, s: Complex, k: f64, echoes: bool) -> Co
     load * ((one - decay) / (one + decay))
 }
 
-/// √(k² + s²/c²), real part > 0.
+/// Returns √(k² + s²/c²), real part > 0.
 fn vertical_wavenumber(k: f64, s: Complex, c: f64) -> Complex {
     let over_c = s.scale(1.0 / c);
     (over_c * over_c + Complex::new(k * k, 0.0)).sqrt()

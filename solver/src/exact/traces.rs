@@ -15,12 +15,13 @@ use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::solver::{OUT_OF_SCALE, Solver};
 use crate::vector::Vector;
 
-/// Most pressures, all receivers together: 40 MB.
+/// Maximum number of pressures, all receivers together: 40 MB.
 const PRESSURES_MAX: f64 = 5e6;
-/// A time step that a message names is longer by this than the shortest one: it is rounded.
+/// A time step that a message suggests is longer than the shortest one by this factor, because it
+/// is rounded.
 const TO_BE_SAFE: f64 = 1.01;
 
-/// Pressures at the receivers.
+/// Kernel that computes the pressures at the receivers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traces {
     /// Times, s, from 0 on.
@@ -29,7 +30,7 @@ pub struct Traces {
     pub pressures: Vec<Vec<f64>>,
 }
 
-/// Why there are no traces.
+/// Reason why there are no traces.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum TraceError {
     /// Duration or time step is not a positive number, or there is no step in the duration.
@@ -38,9 +39,9 @@ pub enum TraceError {
          --duration at least as long"
     )]
     Times {
-        /// s.
+        /// Duration, s.
         duration: f64,
-        /// s.
+        /// Time step, s.
         time_step: f64,
     },
     /// There would be too many samples.
@@ -52,9 +53,9 @@ pub enum TraceError {
         TO_BE_SAFE * .duration * f64::from(*.receivers) / PRESSURES_MAX
     )]
     TooMany {
-        /// s.
+        /// Duration, s.
         duration: f64,
-        /// s.
+        /// Time step, s.
         time_step: f64,
         /// Number of receivers.
         receivers: u32,
@@ -65,9 +66,9 @@ pub enum TraceError {
          shorten --duration or lower the refinement"
     )]
     TooLong {
-        /// s.
+        /// Duration, s.
         duration: f64,
-        /// Pairs that would be needed.
+        /// Number of pairs required.
         pairs: f64,
     },
     /// A pressure came out as NaN or infinite.
@@ -79,7 +80,7 @@ fn pressures(duration: f64, time_step: f64, receivers: u32) -> f64 {
     (duration / time_step + 1.0) * f64::from(receivers)
 }
 
-/// Computes the pressure at many times.
+/// Kernel that computes the pressure at many times.
 struct Sample<'a> {
     signal: Signal<'a>,
     times: &'a [f64],
@@ -101,14 +102,14 @@ impl Kernel for Sample<'_> {
 }
 
 impl Solver {
-    /// Pressure traces of one bone from 0 to `duration` (s), every `time_step` (s).
+    /// Computes the pressure traces of one bone from 0 to `duration` (s), every `time_step` (s).
     ///
-    /// All reflections of the outer faces are in them. The direct wave and its image in the
-    /// coupling's outer face have a closed form; the rest comes from the exact-layer method with a
-    /// sampling of its own: velocities are not touched by asking for traces.
+    /// They include all reflections of the outer faces. The direct wave and its image in the
+    /// coupling's outer face have a closed form; the rest is computed by the exact-layer method
+    /// with a separate sampling, so that traces have no influence on velocities.
     ///
     /// # Errors
-    /// When the trace would be empty or too large.
+    /// If the traces would be empty or too large.
     pub fn traces(&self, bone: &Bone, duration: f64, time_step: f64) -> Result<Traces, TraceError> {
         let samples = duration / time_step;
         if !(duration > 0.0 && time_step > 0.0 && samples >= 1.0) {

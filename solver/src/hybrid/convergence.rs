@@ -1,8 +1,8 @@
-//! How the error falls with element size, order and time step.
+//! Convergence of the error with element size, order and time step.
 //!
 //! Measured one wavenumber at a time, under a load on the bone's face that is a smooth function of
-//! time: the pulse itself has a kink at t = 0, behind which no scheme of high order shows its
-//! order. The pressure at the receivers' height is compared with that of a finer computation.
+//! time: the pulse itself has a kink at t = 0, after which no scheme of high order shows its order.
+//! The pressure at the receivers' height is compared with that of a finer computation.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
@@ -144,7 +144,7 @@ impl<'a> Study<'a> {
         Mesh::with_sizes(self.setup, &self.scope, order, [size; 3])
     }
 
-    /// The largest stable time step, s.
+    /// Kernel that computes the largest stable time step, s.
     fn limit(&mut self, mesh: &Mesh) -> f64 {
         Isa::fastest().run(Limit {
             operator: &Operator::new(self.setup, self.bone, mesh),

@@ -12,7 +12,7 @@ const NEWTON_STEPS: usize = 10;
 pub(super) struct Element {
     /// Ascending, both ends included.
     pub(super) nodes: Vec<f64>,
-    /// Of integration.
+    /// Weights of integration.
     pub(super) weights: Vec<f64>,
     /// Derivative of polynomial j at node i: `[i][j]`.
     pub(super) derivative: Vec<Vec<f64>>,

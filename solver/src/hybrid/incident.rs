@@ -25,7 +25,7 @@ use crate::pulse::Pulse;
 const PULSE_PERIODS: f64 = 3.4;
 /// Points of interpolation between samples.
 const POINTS: usize = 6;
-/// Most images of the source.
+/// Maximum number of images of the source.
 const IMAGES_MAX: usize = 64;
 
 /// An image of the source: its height above the bone's face, m, and its sign.
@@ -35,7 +35,7 @@ pub(super) struct Image {
     pub(super) sign: f64,
 }
 
-/// The source, and its images in fluid 1's outer face whose waves can be heard.
+/// Returns the source, and its images in fluid 1's outer face whose waves can arrive in a window.
 pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
     let (source, depth) = (setup.probe.source.x3, setup.layers.coupling.thickness);
     let heard = path_heard(setup, scope) - setup.probe.receivers.x3;
@@ -53,10 +53,10 @@ pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
     images
 }
 
-/// Makes the load for one block of wavenumbers after another.
+/// Computes the load for one block of wavenumbers after another.
 #[derive(Debug)]
 pub(super) struct Incident {
-    /// The source first.
+    /// The images, with the source first.
     images: Vec<Image>,
     sound_speed: f64,
     density: f64,
@@ -71,7 +71,7 @@ pub(super) struct Incident {
 }
 
 impl Incident {
-    /// For samples `step` (s) apart.
+    /// Creates the load for samples `step` (s) apart.
     pub(super) fn new(setup: &Setup, scope: &Scope, step: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let samples = (PULSE_PERIODS / fc / step) as usize + 1;
@@ -90,8 +90,8 @@ impl Incident {
         }
     }
 
-    /// The pressure on the face at n substeps after the source's wave has reached it, for every n of
-    /// `load`; `ratio` substeps make a step, `k` is in rad/m.
+    /// Computes the pressure on the face at n substeps after the source's wave has reached it, for
+    /// every n of `load`; `ratio` substeps make a step, `k` is in rad/m.
     #[inline(always)]
     pub(super) fn fill(&mut self, k: Lanes, ratio: usize, load: &mut [Lanes]) {
         load.fill(Lanes::ZERO);
@@ -109,8 +109,9 @@ impl Incident {
         }
     }
 
-    /// The wave of one image at multiples of the step after its arrival: the trapezoidal rule with
-    /// the first Euler-Maclaurin correction at both ends, of fourth order in the step.
+    /// Tabulates the wave of one image at multiples of the step after its arrival, by the
+    /// trapezoidal rule with the first Euler-Maclaurin correction at both ends, which is of fourth
+    /// order in the step.
     #[inline(always)]
     fn tabulate(&mut self, k: Lanes, image: Image, count: usize) {
         let delay = image.height / self.sound_speed;
@@ -144,7 +145,7 @@ impl Incident {
     }
 }
 
-/// Trapezoidal Σ pulse_i kernel_(n-i) over i = 0 … n, in four interleaved sums.
+/// Returns the trapezoidal sum Σ pulse_i kernel_(n-i) over i = 0 … n, in four interleaved sums.
 #[inline(always)]
 fn convolve(pulse: &[f64], kernel: &[Lanes]) -> Lanes {
     let n = pulse.len() - 1;
@@ -165,7 +166,7 @@ fn convolve(pulse: &[f64], kernel: &[Lanes]) -> Lanes {
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-/// F'(t) of amplitude 1, t ≥ 0.
+/// Returns F'(t) of amplitude 1, t ≥ 0.
 fn pulse_slope(center_frequency: f64, t: f64) -> f64 {
     let (sin, cos) = libm::sincos(2.0 * PI * center_frequency * t);
     let from_center = center_frequency * t - 1.0;

@@ -1,4 +1,4 @@
-//! All wavenumbers of one bone through all times, summed up at the receivers.
+//! Steps all wavenumbers of one bone through all times, and sums them at the receivers.
 
 use super::incident::Incident;
 use super::operator::Operator;
@@ -8,7 +8,7 @@ use crate::isa::Kernel;
 use crate::lanes::{LANES, Lanes};
 use crate::vector::Vector;
 
-/// The largest stable time step, s.
+/// Kernel that computes the largest stable time step, s.
 pub(super) struct Limit<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) wavenumber: f64,
@@ -24,7 +24,7 @@ impl Kernel for Limit<'_> {
     }
 }
 
-/// Pressures at the receivers.
+/// Kernel that computes the pressures at the receivers.
 pub(super) struct March<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) plan: &'a Plan,
@@ -36,18 +36,18 @@ pub(super) struct March<'a> {
     pub(super) memory: &'a mut Memory,
 }
 
-/// What is wanted at one receiver.
+/// The samples required at one receiver.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Receiver {
     /// Distance from the source along x1, m.
     pub(super) distance: f64,
-    /// First sample that is looked at.
+    /// First sample required.
     pub(super) first: usize,
-    /// Last sample that is looked at.
+    /// Last sample required.
     pub(super) last: usize,
 }
 
-/// Memory that a thread uses again.
+/// Memory that a thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     pub(super) state: State,
@@ -73,7 +73,7 @@ impl Memory {
     }
 }
 
-/// Eight wavenumbers under a load that `memory` holds; the answer is its record.
+/// Kernel that steps eight wavenumbers under a load in `memory`; the result is its record.
 #[cfg(feature = "measure")]
 pub(super) struct Response<'a> {
     pub(super) operator: &'a Operator<1>,
@@ -96,7 +96,7 @@ impl Kernel for Response<'_> {
 impl Kernel for March<'_> {
     type Output = bool;
 
-    /// Whether every number was finite.
+    /// Returns whether every number was finite.
     #[inline(always)]
     fn run<V: Vector>(self) -> bool {
         let samples = self.times.samples;
@@ -148,12 +148,12 @@ fn run_block<V: Vector>(
     }
 }
 
-/// Factors of the cosine transform at `distance` (m).
+/// Returns the factors of the cosine transform at `distance` (m).
 fn transform(plan: &Plan, k: Lanes, distance: f64) -> Lanes {
     Lanes(k.0.map(|k| plan.weight(k) * libm::cos(k * distance)))
 }
 
-/// Adds one block's share of a receiver's pressure.
+/// Adds one block's contribution to a receiver's pressure.
 #[inline(always)]
 fn add(factor: Lanes, record: &[Lanes], receiver: &Receiver, sums: &mut [f64]) {
     let range = receiver.first..=receiver.last;
@@ -186,7 +186,7 @@ mod tests {
         let mesh = Mesh::with_sizes(&setup, &Scope::whole(&setup, 5000.0), 8, [0.4e-3; 3]);
         let operator = Operator::<1>::new(&setup, &bone, &mesh);
         let step = 5e-9;
-        // What returns from the coupling's outer face after 13 µs is weaker by e^-25.
+        // Echoes from the coupling's outer face after 13 µs are weakened by e^-25.
         let (damping, samples) = (1.9e6, 2600);
         let times = Times { step, ratio: 1, samples };
         let k = Lanes(std::array::from_fn(|lane| 600.0 * lane as f64));

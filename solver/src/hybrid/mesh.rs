@@ -1,8 +1,8 @@
-//! Elements and depths: how far the fluids are meshed, and into how many elements each layer is
-//! cut.
+//! Elements and depths: to which depth the fluids are meshed, and into how many elements each layer
+//! is divided.
 //!
 //! A fluid is cut off, with p = 0, where no echo of the cut can reach a receiver before the direct
-//! wave: what is looked at is as if the fluid were whole.
+//! wave: the windows are the same as for the whole fluid.
 
 use std::f64::consts::PI;
 
@@ -15,19 +15,20 @@ use crate::medium::Medium;
 
 /// The slowest wavelength at the centre frequency, m, for which `element_size` is meant.
 const WAVELENGTH: f64 = 1.5e-3;
-/// Depths are made larger by this share, so that an echo comes clearly late.
+/// Depths are increased by this factor, so that an echo is clearly late.
 const DEPTH_MARGIN: f64 = 1.02;
-/// With this many nodes per wavelength at the centre frequency a mesh resolves the waves: then
-/// passes that tell the same are right.
+/// With this many nodes per wavelength at the centre frequency a mesh resolves the waves, so that
+/// agreeing passes are right.
 const NODES_PER_WAVELENGTH: f64 = 5.0;
-/// Most elements of a layer that are counted; beyond, the work is over its bound anyway.
+/// Maximum number of elements of a layer that are counted; beyond, the work exceeds its limit
+/// anyway.
 const ELEMENTS_MAX: f64 = 1e9;
 
 /// Equal elements of one layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LayerMesh {
     pub(super) elements: usize,
-    /// m.
+    /// Size of an element, m.
     pub(super) size: f64,
 }
 
@@ -41,16 +42,16 @@ pub(super) struct Mesh {
 }
 
 impl LayerMesh {
-    /// As few equal elements as make none larger than `size` (m).
+    /// Returns the smallest number of equal elements that are not larger than `size` (m).
     pub(super) fn new(thickness: f64, size: f64) -> Self {
-        // A thickness that is a whole number of sizes but for rounding is one.
+        // A thickness that is a whole number of sizes except for rounding counts as one.
         let elements = (thickness / size * (1.0 - 1e-12)).ceil().clamp(1.0, ELEMENTS_MAX);
         Self { elements: elements as usize, size: thickness / elements }
     }
 }
 
 impl Mesh {
-    /// The mesh for `scope`, of elements `finer` times smaller than the setup says.
+    /// Creates the mesh for `scope`, with elements `finer` times smaller than in the setup.
     pub(super) fn new(setup: &Setup, bone: &Bone, scope: &Scope, finer: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let size = |slowest: f64| {
@@ -65,8 +66,8 @@ impl Mesh {
         Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
     }
 
-    /// A mesh of elements of degree `order`, none larger than `sizes` (m) in fluid 1, bone and
-    /// fluid 2.
+    /// Creates a mesh of elements of degree `order`, none larger than `sizes` (m) in fluid 1, bone
+    /// and fluid 2.
     pub(super) fn with_sizes(setup: &Setup, scope: &Scope, order: usize, sizes: [f64; 3]) -> Self {
         let [coupling, bone, marrow] = sizes;
         Self {
@@ -77,17 +78,17 @@ impl Mesh {
         }
     }
 
-    /// Elements of all layers.
+    /// Returns the number of elements of all layers.
     pub(super) fn elements(&self) -> usize {
         self.coupling.elements + self.bone.elements + self.marrow.elements
     }
 
-    /// The largest relative error of the speed of waves at the centre frequency on this mesh, by the
-    /// leading term for elements of degree n with lumped mass,
-    /// (k h)^(2n) (n!/(2n)!)² / (2n (2n + 1)): Ainsworth and Wajid, SIAM J. Numer. Anal. 47 (2009).
+    /// Returns the largest relative error of the speed of waves at the centre frequency on this
+    /// mesh, by the leading term for elements of degree n with lumped mass, (k h)^(2n) (n!/(2n)!)²
+    /// / (2n (2n + 1)): Ainsworth and Wajid, SIAM J. Numer. Anal. 47 (2009).
     ///
-    /// Only layers count that have too few nodes per wavelength for two meshes that agree to mean
-    /// anything; the term is more than 1 where waves are not resolved at all.
+    /// Only layers with so few nodes per wavelength that two agreeing meshes prove nothing are
+    /// counted; the term is larger than 1 where waves are not resolved at all.
     pub(super) fn dispersion(&self, setup: &Setup, bone: &Bone) -> f64 {
         let order = self.element.count() - 1;
         let error = |mesh: &LayerMesh, speed: f64| {
@@ -115,28 +116,29 @@ impl Mesh {
     }
 }
 
-/// Longest path, m, across the coupling fluid in which a wave can arrive within its window.
+/// Returns the longest path, m, across the coupling fluid on which a wave can arrive within its
+/// window.
 pub(super) fn path_heard(setup: &Setup, scope: &Scope) -> f64 {
     scope.across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
 }
 
-/// The speed, m/s, of waves that elements in the bone are made for.
+/// Returns the speed, m/s, of the waves for which elements in the bone are made.
 ///
-/// Where shear waves in the bone are slower than sound in the coupling fluid, it is the mean of the two
-/// on a scale of ratios: the slowest waves have little part in the first arrival.
+/// If shear waves in the bone are slower than sound in the coupling fluid, it is the geometric mean
+/// of the two: the slowest waves contribute little to the first arrival.
 fn bone_speed(setup: &Setup, bone: &Bone) -> f64 {
     (setup.layers.coupling.sound_speed * Medium::new(bone).slowest_across()).sqrt()
 }
 
-/// Depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then up to the
-/// cut and down to the receiver.
+/// Returns the depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then
+/// up to the cut and down to the receiver.
 fn coupling_depth(setup: &Setup, scope: &Scope) -> f64 {
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
     let heard = 0.5 * (path_heard(setup, scope) + receivers - source);
     (DEPTH_MARGIN * heard.max(receivers)).min(setup.layers.coupling.thickness)
 }
 
-/// Depth of fluid 2 that is meshed, m; at least one element of `size`.
+/// Returns the depth of fluid 2 that is meshed, m; at least one element of `size`.
 fn marrow_depth(setup: &Setup, scope: &Scope, size: f64) -> f64 {
     let marrow = &setup.layers.marrow;
     let heard = 0.5 * scope.longest() / slowness(marrow.sound_speed, scope.speed);

@@ -43,10 +43,10 @@ const USUAL_NODES: usize = 9;
 /// A length by which displacements are scaled, m.
 const LENGTH: f64 = 1e-3;
 
-/// The operator A of one bone. A state is fluid 1, solid, fluid 2, each by ascending x3.
+/// The operator A of one bone. A state consists of fluid 1, solid, fluid 2, each by ascending x3.
 ///
-/// `COUPLING` numbers per node of fluid 1: its pressure is even in x1, so 1, its real part, is
-/// enough; with 2 the imaginary part is computed, and comes out as zero.
+/// `COUPLING` is the number of real numbers per node of fluid 1: its pressure is even in x1, so 1,
+/// its real part, is sufficient; with 2 the imaginary part is computed, and comes out as zero.
 #[derive(Debug, Clone)]
 pub(super) struct Operator<const COUPLING: usize> {
     coupling: FluidLayer,
@@ -68,13 +68,13 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         }
     }
 
-    /// Real numbers (in each lane) of a state.
+    /// Returns the number of real numbers (in each lane) of a state.
     pub(super) fn len(&self) -> usize {
         let (coupling, solid, marrow) = self.lengths();
         coupling + solid + marrow
     }
 
-    /// Real numbers of fluid 1, solid, fluid 2.
+    /// Returns the number of real numbers of fluid 1, solid, fluid 2.
     pub(super) fn lengths(&self) -> (usize, usize, usize) {
         let nodes = |elements: usize, count: usize| elements * (count - 1) + 1;
         (
@@ -84,8 +84,8 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         )
     }
 
-    /// `out` = A `x` + the effect of the pressure `load` on the upper face; `sink` sees every
-    /// number of it once, as soon as it is final.
+    /// Computes `out` = A `x` + the effect of the pressure `load` on the upper face; `sink`
+    /// receives every number of it once, as soon as it is final.
     #[inline(always)]
     pub(super) fn apply<V: Vector, S: Sink>(
         &self,
@@ -130,7 +130,8 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         sink.take::<V>(coupling + solid + face, &p2_out[face..]);
     }
 
-    /// Adds what the pressure `p` (real and imaginary part) does to a face, pushing it upwards.
+    /// Adds the effect of the pressure `p` (real and imaginary part) on a face, which it pushes
+    /// upwards.
     #[inline(always)]
     fn push(&self, face: &mut [Lanes], p: [Lanes; 2]) {
         for i in 0..3 {
@@ -140,7 +141,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         }
     }
 
-    /// The component across the layers, its real and imaginary part.
+    /// Returns the component across the layers, its real and imaginary part.
     #[inline(always)]
     fn across(&self, face: &[Lanes]) -> [Lanes; 2] {
         let mut across = [Lanes::ZERO; 2];
@@ -153,15 +154,15 @@ impl<const COUPLING: usize> Operator<COUPLING> {
     }
 }
 
-/// What is done with A x while it is still in the fast memory.
+/// Processes A x while it is still in the fast memory.
 ///
-/// The free ends of the fluids, where p = 0 for ever, are not shown.
+/// The free ends of the fluids, where p = 0 always, are left out.
 pub(super) trait Sink {
-    /// Numbers `start` … of A x are `values`. To be `#[inline(always)]`.
+    /// Receives numbers `start` … of A x in `values`. Must be `#[inline(always)]`.
     fn take<V: Vector>(&mut self, start: usize, values: &[Lanes]);
 }
 
-/// Nothing is done.
+/// Does nothing.
 pub(super) struct Keep;
 
 impl Sink for Keep {
@@ -169,7 +170,7 @@ impl Sink for Keep {
     fn take<V: Vector>(&mut self, _: usize, _: &[Lanes]) {}
 }
 
-/// -E D / J of an element of half length `half` (m), by rows.
+/// Returns -E D / J of an element of half length `half` (m), by rows.
 fn stiffness(element: &Element, half: f64) -> Vec<Vec<f64>> {
     let count = element.count();
     let (d, w) = (&element.derivative, &element.weights);
@@ -180,7 +181,7 @@ fn stiffness(element: &Element, half: f64) -> Vec<Vec<f64>> {
     (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
 }
 
-/// The mean of what two elements say of their shared node.
+/// Returns the mean of the values of two elements at their shared node.
 #[inline(always)]
 fn average<const C: usize, V: Vector>(below: &[Lanes; C], node: &mut [Lanes; C]) {
     let half = V::splat(0.5);

@@ -1,4 +1,4 @@
-//! One bone in passes, each finer than the one before, until the picked times stand still.
+//! Computes one bone in passes, each finer than the one before, until the picked times converge.
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
@@ -14,52 +14,53 @@ use crate::picking::{FLOOR, Pick, Window, pick};
 use crate::solver::pressure_not_finite;
 use crate::{Arrival, Failure};
 
-/// How fine the first pass is, over what the setup says. In a thin plate all passes are finer, by the
-/// square root of how thin it is.
+/// Fineness of the first pass, relative to the setup. In a thin plate all passes are finer, by the
+/// square root of the thinness.
 const FIRST: f64 = 0.75;
-/// The same of the second.
+/// Fineness of the second pass.
 const SECOND: f64 = 1.2;
-/// How much finer every pass from the third on is than the one before.
+/// Factor of fineness from each pass to the next, from the third on.
 const FINER: f64 = 1.5;
-/// Most passes.
+/// Maximum number of passes.
 const PASSES_MAX: usize = 5;
-/// Passes without a velocity after which there is none: coarse ones can miss a weak arrival.
+/// Number of passes without a velocity after which the bone has none: coarse ones can miss a weak
+/// arrival.
 const FAILURES_MAX: usize = 3;
-/// After the first, passes look this many periods of the centre frequency beyond the picked
-/// extremum: what the picking rule compares it with, and a little more.
+/// After the first pass, windows end this many periods of the centre frequency after the picked
+/// extremum: they include the extrema with which the picking rule compares it, and a little more.
 const PACKET_PERIODS: f64 = 1.25;
-/// Share of what a pass changes that is taken for its error: elements have a high order, and most of
-/// the waves of the kink that one pass misses are in the next.
+/// Fraction of a pass's change that is taken as its error: elements have a high order, and most of
+/// the kink's waves that one pass misses are resolved by the next.
 const REMAINDER: f64 = 0.5;
-/// Estimated relative error of the velocity at which passes end, at refinement 1; in a thin plate
-/// larger by how thin it is, since there the kink's waves die out more slowly.
+/// Estimated relative error of the velocity at which passes end, at refinement 1. In a thin plate
+/// it is multiplied by the thinness, since there the kink's waves decay more slowly.
 const SMALL_ERROR: f64 = 2.5e-5;
-/// Change of the mean of all times, in periods of the centre frequency, at which passes end. That
-/// all times shift alike is the error of the elements, which falls fast; that they scatter is the
-/// kink's, and part of the estimated error.
+/// Change of the mean of all times, in periods of the centre frequency, at which passes end. A
+/// common shift of all times is the error of the elements, which falls fast; their scatter is
+/// caused by the kink, and is part of the estimated error.
 const SMALL_SHIFT: f64 = 2.5e-3;
-/// Largest change of a time against the mean, in periods of the centre frequency, at which passes end: a
-/// flat extremum moves by more than a line through all of them tells.
+/// Largest change of a time relative to the mean, in periods of the centre frequency, at which
+/// passes end: a flat extremum moves by more than the line through all times shows.
 const SMALL_SCATTER: f64 = 5e-4;
 
-/// A bone on its way through the passes.
+/// State of a bone's passes.
 pub(super) struct Passes<'a> {
     pub(super) setup: &'a Setup,
-    /// Of the receivers from the source, m.
+    /// Distances of the receivers from the source, m.
     pub(super) distances: &'a [f64],
     pub(super) isa: Isa,
     pub(super) bone: &'a Bone,
-    /// All that comes before the direct wave.
+    /// The windows up to the direct wave.
     pub(super) whole: Scope,
     pub(super) memory: &'a mut Memory,
     pub(super) windows: &'a mut Vec<Window>,
-    /// Time step over the stability limit, once it is known.
+    /// Ratio of the time step to the stability limit, once it is known.
     pub(super) share: Option<f64>,
-    /// What the passes may still take.
+    /// The work that the passes may still use.
     pub(super) budget: Budget,
 }
 
-/// What a pass found.
+/// Result of a pass.
 struct Found {
     pick: Pick,
     /// Extrema below these are noise, Pa per Pa of the pulse's amplitude; one per receiver.
@@ -69,11 +70,11 @@ struct Found {
 }
 
 impl Passes<'_> {
-    /// The first arrival.
+    /// Computes the first arrival.
     ///
     /// # Errors
-    /// A typed failure when the case has no velocity in three passes, or what has to be computed is
-    /// above its bounds.
+    /// A typed failure if the case has no velocity in three passes, or if the computation exceeds
+    /// its limits.
     pub(super) fn arrival(&mut self) -> Result<Arrival, Failure> {
         let mut last = self.pass(self.fineness(0), None);
         let mut estimate = 1.0;
@@ -84,12 +85,12 @@ impl Passes<'_> {
             let finer = self.fineness(passes);
             let mut next = self.pass(finer, last.as_ref().ok());
             if last.is_ok() && next.as_ref().is_err_and(|failure| !is_final(failure)) {
-                // What is picked now may lie behind the packet that was looked at.
+                // The extremum picked now may lie behind the packet that was computed.
                 next = self.pass(finer, None);
             }
             match (&last, &next) {
-                // Finer than the bounds of the computation allow. One pass alone says nothing of its
-                // error.
+                // The next pass would exceed the limits of the computation. One pass alone gives no
+                // estimate of its error.
                 (Ok(_), Err(failure)) if is_final(failure) => {
                     if passes == 1 {
                         last = next;
@@ -114,13 +115,13 @@ impl Passes<'_> {
         last.map(|Found { pick, dispersion, .. }| Arrival {
             velocity: pick.velocity,
             times: pick.times,
-            // Passes that do not resolve the waves can tell the same by accident.
+            // Passes that do not resolve the waves can agree by accident.
             estimated_error: estimate.max(dispersion.min(1.0)),
             looks: None,
         })
     }
 
-    /// How fine a pass is; they are counted from 0.
+    /// Returns the fineness of a pass; passes are counted from 0.
     fn fineness(&self, pass: usize) -> f64 {
         let thin = thinness(self.setup).sqrt();
         let over = if pass == 0 {
@@ -131,8 +132,8 @@ impl Passes<'_> {
         over * self.setup.solver.refinement.sqrt()
     }
 
-    /// The relative error of the velocity: its change, and what the scatter of the times would make
-    /// of it at the end of the array.
+    /// Returns the relative error of the velocity: its change, plus the effect that the scatter of
+    /// the times may have on it at the end of the array.
     fn estimate(&self, change: &Change, pick: &Pick) -> f64 {
         let count = self.distances.len() as f64;
         let mean = self.distances.iter().fold(0.0, |sum, x| sum + x) / count;
@@ -144,7 +145,7 @@ impl Passes<'_> {
         REMAINDER * (change.velocity + pick.velocity * change.scatter * largest / square)
     }
 
-    /// Whether a pass changed so little that it can be the last.
+    /// Returns whether a pass changed so little that it can be the last.
     fn is_small(&self, change: &Change, estimate: f64) -> bool {
         let refinement = self.setup.solver.refinement;
         let periods = self.setup.probe.center_frequency * change.shift;
@@ -154,8 +155,8 @@ impl Passes<'_> {
             && refinement * self.setup.probe.center_frequency * change.scatter <= SMALL_SCATTER
     }
 
-    /// Computes the bone `finer` times as fine as the setup says: the packet that was found
-    /// `before`, or everything.
+    /// Computes the bone `finer` times as fine as in the setup: the packet found `before`, or the
+    /// whole windows.
     fn pass(&mut self, finer: f64, before: Option<&Found>) -> Result<Found, Failure> {
         let after = PACKET_PERIODS / self.setup.probe.center_frequency;
         let scope = match before {
@@ -167,7 +168,8 @@ impl Passes<'_> {
         Ok(Found { pick, floors, dispersion })
     }
 
-    /// Computes the pressures at the receivers; also the relative error of the speed of waves.
+    /// Computes the pressures at the receivers; also returns the relative error of the speed of
+    /// waves.
     fn march(&mut self, finer: f64, scope: &Scope) -> Result<(Times, f64), Failure> {
         let setup = self.setup;
         let plan = Plan::new(setup, self.bone, scope, finer)?;
@@ -204,11 +206,11 @@ impl Passes<'_> {
         Ok((times, plan.mesh.dispersion(setup, self.bone)))
     }
 
-    /// The time step over the stability limit: of the first pass, `limit` (s), what the setup asks
-    /// for; of all others the same.
+    /// Returns the ratio of the time step to the stability limit: in the first pass, with `limit`
+    /// (s), the one that the setup requests; in all others the same.
     ///
     /// # Errors
-    /// `NoConvergence` when the setup's step is above the limit.
+    /// `NoConvergence` if the setup's step is above the limit.
     fn share(&mut self, limit: f64) -> Result<f64, Failure> {
         if let Some(share) = self.share {
             return Ok(share);
@@ -233,12 +235,13 @@ impl Passes<'_> {
         Ok(share)
     }
 
-    /// When the source's wave reaches the bone, s: the computation begins.
+    /// Returns the time at which the source's wave reaches the bone, s, when the computation
+    /// begins.
     fn onset(&self) -> f64 {
         self.setup.probe.source.x3 / self.setup.layers.coupling.sound_speed
     }
 
-    /// The samples that a window needs under a filter of some `reach`.
+    /// Returns the samples that a window needs with a filter of this `reach`.
     fn receiver(&self, span: &Span, times: Times, reach: usize) -> Receiver {
         let margin = SAMPLES_BEYOND + reach;
         let sample = |t: f64| ((t - self.onset()) / times.sample()).max(0.0) as usize;
@@ -249,8 +252,7 @@ impl Passes<'_> {
         }
     }
 
-    /// Picks the first arrival in what was computed; also the pressures below which extrema are
-    /// noise.
+    /// Picks the first arrival; also returns the pressures below which extrema are noise.
     fn pick(
         &mut self,
         scope: &Scope,
@@ -282,19 +284,19 @@ impl Passes<'_> {
     }
 }
 
-/// Whether a finer pass could do nothing about the failure.
+/// Returns whether a finer pass could not avoid the failure.
 fn is_final(failure: &Failure) -> bool {
     matches!(failure.kind, FailureKind::NoConvergence | FailureKind::NotFinite)
 }
 
-/// What one more pass changes.
+/// Change from one pass to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Change {
-    /// Of the velocity, relative.
+    /// Relative change of the velocity.
     velocity: f64,
-    /// Of the mean of the times, s.
+    /// Change of the mean of the times, s.
     shift: f64,
-    /// The largest of a time against the mean, s.
+    /// Largest change of a time relative to the mean, s.
     scatter: f64,
 }
 

@@ -1,4 +1,5 @@
-//! What one bone's computation takes: mesh, wavenumbers, times, and whether that is within bounds.
+//! Plan of one bone's computation: mesh, wavenumbers, times, and the check of its work against the
+//! limits.
 
 use std::f64::consts::PI;
 
@@ -11,13 +12,14 @@ use super::scope::Scope;
 use crate::Failure;
 use crate::lanes::LANES;
 
-/// Highest frequency over centre frequency whose waves along the coupling fluid are resolved, at
-/// the fineness that the setup says. The large reflected wave needs it more than the first arrival.
+/// Highest frequency, as a multiple of the centre frequency, whose waves along the coupling fluid
+/// are resolved at the setup's fineness. The large reflected wave requires it more than the first
+/// arrival.
 const BAND: f64 = 4.0;
-/// Plates thinner than this many metres at 1 Hz (m·Hz) are computed finer: their first extremum lies
-/// closer to the wave of the kink.
+/// Plates thinner than this many metres at 1 Hz (m·Hz) are computed more finely: their first
+/// extremum lies closer to the wave of the kink.
 const THIN_PLATE: f64 = 2000.0;
-/// Thinness beyond which nothing is made finer still.
+/// Thinness beyond which the fineness does not increase further.
 const THINNESS_MAX: f64 = 2.25;
 /// Exponent at which evanescent waves between face and probe are neglected.
 const EVANESCENCE: f64 = 12.0;
@@ -25,21 +27,21 @@ const EVANESCENCE: f64 = 12.0;
 const TAPER_START: f64 = 0.6;
 /// Samples per period of the centre frequency.
 const SAMPLES_PER_PERIOD: f64 = 100.0;
-/// Samples beyond a window for interpolation.
+/// Number of samples beyond a window for interpolation.
 pub(super) const SAMPLES_BEYOND: usize = 8;
-/// Most elements of a mesh.
+/// Maximum number of elements of a mesh.
 const ELEMENTS_MAX: usize = 2000;
-/// Nodes per wavelength in the coupling fluid at the frequency above which nothing is resolved.
+/// Nodes per wavelength in the coupling fluid at the highest resolved frequency.
 const NODES_PER_WAVELENGTH: f64 = 3.0;
 /// Samples per period of that frequency.
 const BAND_SAMPLES: f64 = 6.0;
-/// Most time steps.
+/// Maximum number of time steps.
 const STEPS_MAX: f64 = 2e5;
-/// Most products of elements, wavenumbers and time steps, of all passes of a bone: some 20 s. Four
-/// passes of a plate of 1 mm in the paper's geometry take 1.1e8, and 7e8 at refinement 4.
+/// Maximum product of elements, wavenumbers and time steps, for all passes of a bone: some 20 s.
+/// Four passes of a plate of 1 mm in the paper's geometry take 1.1e8, and 7e8 at refinement 4.
 const WORK_MAX: f64 = 8e8;
 
-/// Everything that is fixed before the first time step but its length.
+/// Everything that is fixed before the first time step, except its length.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub(super) mesh: Mesh,
@@ -49,7 +51,7 @@ pub(super) struct Plan {
     pub(super) wavenumber_limit: f64,
     /// Highest frequency that the mesh resolves, Hz.
     pub(super) band: f64,
-    /// End of the last window, s.
+    /// Returns the end of the last window, s.
     pub(super) end: f64,
 }
 
@@ -64,7 +66,7 @@ pub(super) struct Times {
     pub(super) samples: usize,
 }
 
-/// What passes may still take.
+/// The work that passes may still use.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget(f64);
 
@@ -75,10 +77,10 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// Takes the work of one pass.
+    /// Takes the work of one pass off the budget.
     ///
     /// # Errors
-    /// `NoConvergence` when there is less left.
+    /// `NoConvergence` if less is left.
     fn take(&mut self, work: f64) -> Result<(), Failure> {
         if work <= self.0 {
             self.0 -= work;
@@ -100,10 +102,10 @@ impl Times {
 }
 
 impl Plan {
-    /// The plan for what `scope` takes in, `finer` times as fine as the setup says.
+    /// Plans the computation of the windows in `scope`, `finer` times as fine as in the setup.
     ///
     /// # Errors
-    /// `NoConvergence` when the mesh would be too large.
+    /// `NoConvergence` if the mesh would be too large.
     pub(super) fn new(
         setup: &Setup,
         bone: &Bone,
@@ -120,7 +122,7 @@ impl Plan {
         let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let end = scope.end();
-        // The nearest repeated source is heard at the farthest receiver only after the end.
+        // The nearest repeated source must reach the farthest receiver only after the end.
         let length =
             farthest + scope.speed * (end - earliest_arrival(setup, 0.0, scope.speed)) + heights;
         let sound_speed = setup.layers.coupling.sound_speed;
@@ -137,23 +139,23 @@ impl Plan {
         })
     }
 
-    /// Blocks of eight wavenumbers.
+    /// Returns the number of blocks of eight wavenumbers.
     pub(super) fn blocks(&self) -> usize {
         (self.wavenumber_limit / self.wavenumber_step) as usize / LANES + 1
     }
 
-    /// Weight of wavenumber `k` (rad/m) in the cosine transform.
+    /// Returns the weight of wavenumber `k` (rad/m) in the cosine transform.
     pub(super) fn weight(&self, k: f64) -> f64 {
         let taper = smooth_step((1.0 - k / self.wavenumber_limit) / (1.0 - TAPER_START));
         let half = if k == 0.0 { 0.5 } else { 1.0 };
         half * taper * self.wavenumber_step / PI
     }
 
-    /// Times from `onset` (s) on, with steps of `share` of the largest stable one, `limit` (s); their
-    /// work is taken from the `budget`.
+    /// Returns the times from `onset` (s) on, with steps of `share` of the largest stable one,
+    /// `limit` (s); their work is taken from the `budget`.
     ///
     /// # Errors
-    /// `NoConvergence` when there are too many.
+    /// `NoConvergence` if there are too many.
     pub(super) fn times(
         &self,
         setup: &Setup,
@@ -183,23 +185,25 @@ impl Plan {
     }
 }
 
-/// How much thinner the plate is than one that is not thin; at least 1.
+/// Returns how much thinner the plate is than the limit of thin plates; at least 1.
 pub(super) fn thinness(setup: &Setup) -> f64 {
     let thickness = setup.layers.bone_thickness * setup.probe.center_frequency;
     (THIN_PLATE / thickness).clamp(1.0, THINNESS_MAX)
 }
 
-/// How far wavenumbers reach over what the setup says, for elements `finer` times as fine.
+/// Returns the factor by which wavenumbers extend beyond the setup's limit, for elements `finer`
+/// times as fine.
 ///
-/// Of waves of one frequency the slow ones are the first to be cut off, and what is picked is fast.
-/// So beyond what the setup says wavenumbers grow as the root of the fineness only, and of thinness.
+/// Of the waves of one frequency the slow ones are cut off first, and the picked ones are fast.
+/// Therefore, beyond the setup's limit, wavenumbers grow only as the root of the fineness, and of
+/// the thinness.
 fn wavenumber_fineness(setup: &Setup, finer: f64) -> f64 {
     let usual = setup.solver.refinement.sqrt();
     let over = finer / usual;
     usual * over.min((over * thinness(setup)).sqrt())
 }
 
-/// The computation would take more than its bounds allow.
+/// Returns the failure of a computation that would exceed its limits.
 fn too_large(what: String) -> Failure {
     Failure {
         kind: FailureKind::NoConvergence,

@@ -1,4 +1,4 @@
-//! Extrema of an equally sampled signal.
+//! Extrema of an equidistantly sampled signal.
 
 use std::f64::consts::PI;
 
@@ -6,16 +6,16 @@ use crate::picking::Extremum;
 
 /// Samples of one interpolating polynomial.
 const POINTS: usize = 8;
-/// Bisections of an interval; then Newton's method could not tell more.
+/// Number of bisections of an interval; after them Newton's method could not improve the result.
 const BISECTIONS: usize = 44;
 
-/// Middle of the low-pass filter's fall over the band, and its width.
+/// Centre of the low-pass filter's fall, as a fraction of the band, and its width.
 const FALL: (f64, f64) = (0.84, 0.28);
 /// The filter ends where its Gaussian factor is exp(-this²).
 const FILTER_END: f64 = 3.2;
 
-/// A low-pass filter without delay, ½ erfc((f - f0)/w), f0 and w being shares of a band. What the
-/// mesh does not resolve reaches the receivers at wrong times; the filter takes it out.
+/// A low-pass filter without delay, ½ erfc((f - f0)/w), where f0 and w are fractions of a band. It
+/// removes the components that the mesh does not resolve, which reach the receivers at wrong times.
 #[derive(Debug, Clone)]
 pub(super) struct LowPass {
     /// Half of the symmetric impulse response; the whole sums up to one.
@@ -23,7 +23,7 @@ pub(super) struct LowPass {
 }
 
 impl LowPass {
-    /// For `band` in cycles per sample.
+    /// Creates the filter for `band` in cycles per sample.
     pub(super) fn new(band: f64) -> Self {
         let (middle, width) = (FALL.0 * band, FALL.1 * band);
         let count = (FILTER_END / (PI * width)) as usize + 1;
@@ -44,13 +44,13 @@ impl LowPass {
         Self { response }
     }
 
-    /// Samples that it looks at on either side.
+    /// Returns the number of samples that it uses on either side.
     pub(super) fn reach(&self) -> usize {
         self.response.len() - 1
     }
 
-    /// `values` filtered, into `out`. Before the first there is nothing; the last, whose
-    /// surroundings are not known, are as they are.
+    /// Writes the filtered `values` to `out`. Before the first there are zeros; the last values,
+    /// whose neighbours are unknown, are copied.
     pub(super) fn apply(&self, values: &[f64], out: &mut [f64]) {
         out.copy_from_slice(values);
         for i in 0..values.len().saturating_sub(self.reach()) {
@@ -64,7 +64,7 @@ impl LowPass {
     }
 }
 
-/// A signal sampled from `start` on every `step` (s).
+/// A signal sampled every `step` (s) from `start` on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Samples<'a> {
     pub(super) start: f64,
@@ -73,7 +73,7 @@ pub(super) struct Samples<'a> {
 }
 
 impl Samples<'_> {
-    /// All local extrema in `from` ≤ t < `to` (s), in order of time, into `extrema`.
+    /// Writes all local extrema in `from` ≤ t < `to` (s), in order of time, to `extrema`.
     pub(super) fn extrema(&self, from: f64, to: f64, extrema: &mut Vec<Extremum>) {
         extrema.clear();
         if self.values.len() < POINTS {
@@ -86,7 +86,7 @@ impl Samples<'_> {
         for i in first..=last {
             let piece = next;
             next = self.piece(i + 1);
-            // One slope for each sample, so that no extremum is seen twice or overlooked.
+            // One slope for each sample, so that no extremum is counted twice or missed.
             let (low, high) = (piece.at(0.0).1, next.at(0.0).1);
             if (low < 0.0) == (high < 0.0) {
                 continue;
@@ -99,14 +99,14 @@ impl Samples<'_> {
         }
     }
 
-    /// The value at `t` (s).
+    /// Returns the value at `t` (s).
     pub(super) fn at(&self, t: f64) -> f64 {
         let position = ((t - self.start) / self.step).max(0.0);
         let i = (position as usize).min(self.values.len().saturating_sub(2));
         if self.values.len() < POINTS { 0.0 } else { self.piece(i).at(position - i as f64).0 }
     }
 
-    /// The polynomial around the interval from sample `i` to the next.
+    /// Returns the polynomial around the interval from sample `i` to the next.
     fn piece(&self, i: usize) -> Piece {
         let first = i.saturating_sub(POINTS / 2 - 1).min(self.values.len() - POINTS);
         let mut differences = [0.0; POINTS];
@@ -123,12 +123,12 @@ impl Samples<'_> {
 /// An interpolating polynomial in Newton's form, in units of samples.
 struct Piece {
     differences: [f64; POINTS],
-    /// Place of the interval's lower end among the polynomial's nodes.
+    /// Position of the interval's lower end among the polynomial's nodes.
     offset: f64,
 }
 
 impl Piece {
-    /// Value and slope at `x`, 0 to 1 in the interval.
+    /// Returns value and slope at `x`, 0 to 1 in the interval.
     fn at(&self, x: f64) -> (f64, f64) {
         let x = x + self.offset;
         let (mut value, mut slope) = (self.differences[POINTS - 1], 0.0);
@@ -140,7 +140,7 @@ impl Piece {
         (value, slope)
     }
 
-    /// Where the slope, `rising` through zero or falling, is zero.
+    /// Returns the position where the slope, `rising` or falling through zero, vanishes.
     fn flat_place(&self, rising: bool) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..BISECTIONS {

@@ -1,14 +1,14 @@
-//! What is looked at: a window of time at every receiver.
+//! The windows of time that are evaluated at the receivers.
 
 use osteon_common::case::Setup;
 use osteon_common::sampling::{self, direct_arrival, earliest_arrival};
 
-/// The windows of all receivers, for a bone of waves up to a speed along x1.
+/// The windows of all receivers, for a bone whose waves along x1 have at most this speed.
 #[derive(Debug, Clone)]
 pub(super) struct Scope {
     /// No wave along the bone is faster, m/s.
     pub(super) speed: f64,
-    /// One per receiver.
+    /// One window per receiver.
     pub(super) windows: Vec<Span>,
 }
 
@@ -17,14 +17,14 @@ pub(super) struct Scope {
 pub(super) struct Span {
     /// Distance from the source along x1, m.
     pub(super) distance: f64,
-    /// No wave through the bone is earlier, s.
+    /// Earliest possible arrival of a wave through the bone, s.
     pub(super) from: f64,
-    /// Nothing is looked at from this time on, s; not after the direct wave.
+    /// End of the window, s; at most the arrival of the direct wave.
     pub(super) to: f64,
 }
 
 impl Scope {
-    /// All before the direct wave.
+    /// Returns the windows up to the direct wave.
     pub(super) fn whole(setup: &Setup, speed: f64) -> Self {
         let span = |x| Span {
             distance: x,
@@ -34,7 +34,7 @@ impl Scope {
         Self { speed, windows: sampling::distances(setup).map(span).collect() }
     }
 
-    /// Nothing later than `after` (s) from each of `times` (s), one per receiver.
+    /// Returns windows that end at most `after` (s) after each of `times` (s), one per receiver.
     pub(super) fn until(&self, times: &[f64], after: f64) -> Self {
         let windows = self.windows.iter().zip(times);
         let windows =
@@ -42,17 +42,18 @@ impl Scope {
         Self { windows, ..*self }
     }
 
-    /// End of the last window, s.
+    /// Returns the end of the last window, s.
     pub(super) fn end(&self) -> f64 {
         self.windows.iter().fold(0.0, |end: f64, span| end.max(span.to))
     }
 
-    /// Longest time, s, for which a window stays open after a wave without detours.
+    /// Returns the longest time, s, for which a window stays open after a wave without detours.
     pub(super) fn longest(&self) -> f64 {
         self.windows.iter().fold(0.0, |time: f64, span| time.max(span.to - span.from))
     }
 
-    /// Longest time, s, that a wave can spend on its way across layers and still be heard.
+    /// Returns the longest time, s, that a wave can spend across layers and still arrive in a
+    /// window.
     pub(super) fn across(&self) -> f64 {
         let spent = |span: &Span| span.to - span.distance / self.speed;
         self.windows.iter().map(spent).fold(0.0, f64::max)

@@ -14,7 +14,7 @@ use crate::vector::Vector;
 /// from a random vector of n numbers about 0.87 ln(n) / (m - 1) of the largest can be missing: 3 %
 /// for the usual mesh, half of that in the root.
 const POWER_STEPS: usize = 200;
-/// Share of the stability limit, as estimated, that a step may have: it covers what is missing.
+/// Ratio of a step to the estimated stability limit; it covers the error of the estimate.
 pub(super) const STABLE_SHARE: f64 = 0.98;
 
 /// The largest stable time step, s, at wavenumber `k` (rad/m).
@@ -28,7 +28,7 @@ pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     let mut noise = 1_u64;
     for value in &mut state.now {
         for lane in 0..LANES {
-            // Any vector without symmetry will do.
+            // Any vector without symmetry is suitable.
             noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             value.0[lane] = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
         }
@@ -55,7 +55,7 @@ pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     STABLE_SHARE * (12.0 / largest).sqrt()
 }
 
-/// Two neighbouring times of eight wavenumbers, and scratch memory.
+/// The state at two neighbouring times of eight wavenumbers, and scratch memory.
 #[derive(Debug, Default)]
 pub(super) struct State {
     pub(super) now: Vec<Lanes>,
@@ -66,7 +66,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Everything at rest.
+    /// Sets everything to rest.
     pub(super) fn rest<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
         let len = operator.len();
         for vector in [&mut self.now, &mut self.before, &mut self.first, &mut self.second] {
@@ -75,8 +75,8 @@ impl State {
         }
     }
 
-    /// From rest at t = 0 to t = `step` under a load that starts as t² or more smoothly; `load`
-    /// are its values at 1 and 2 steps.
+    /// Steps from rest at t = 0 to t = `step` under a load that starts as t² or more smoothly;
+    /// `load` contains its values at 1 and 2 steps.
     #[inline(always)]
     pub(super) fn start<V: Vector, const COUPLING: usize>(
         &mut self,
@@ -96,7 +96,7 @@ impl State {
         }
     }
 
-    /// One step; `load` are the load's values one step before, now, and one step after.
+    /// Makes one step; `load` contains the load's values one step before, now, and one step after.
     #[inline(always)]
     pub(super) fn step<V: Vector, const COUPLING: usize>(
         &mut self,
@@ -122,7 +122,7 @@ impl State {
     }
 }
 
-/// The modified equation's update, which turns `before` into what comes after `now`.
+/// The modified equation's update, which replaces `before` by the state after `now`.
 struct Advance<'a> {
     now: &'a [Lanes],
     before: &'a mut [Lanes],

@@ -5,7 +5,7 @@ use osteon_solver::check::{Check, Difference, Solution};
 use super::layout::aligned;
 use super::number::{VELOCITY_DIGITS, digits, significant};
 
-/// The table, and whether the check was passed.
+/// Returns the table, and whether the check was passed.
 pub(super) fn table(check: &Check) -> String {
     let header = ["solver", "velocity (m/s)", "difference", "time (s)", "estimated error"];
     let mut rows = vec![header.map(str::to_owned)];

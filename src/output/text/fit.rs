@@ -1,4 +1,4 @@
-//! Whether the model fits the data, and which of the found numbers the data determine.
+//! Statements on whether the model fits the data, and which parameters the data determine.
 
 use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
@@ -10,13 +10,14 @@ use super::layout::{glued, wrapped};
 use super::number::{DIGITS, digits, significant};
 use super::result::readable;
 
-/// Standard errors that a moment of the model may be off, as where intervals are computed.
+/// Standard errors by which a moment of the model may be off, as in the computation of intervals.
 const ERRORS_MAX: f64 = 3.0;
-/// Relative difference below which a moment is matched however small its error is, as there.
+/// Relative difference below which a moment counts as matched however small its error is, as in the
+/// computation of intervals.
 const EXACT: f64 = 1e-4;
 
-/// Whether the model at the best point fits the data: what the derivatives said, or else what cost
-/// and moments say.
+/// Returns whether the model at the best point fits the data: according to the inference from the
+/// derivatives, or, without it, to cost and moments.
 pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> bool {
     if let Some(identified) = found.identified() {
         return identified.matched;
@@ -25,13 +26,13 @@ pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> 
         || Moment::ALL.into_iter().all(|moment| is_within_noise(found, moment))
 }
 
-/// Whether the search came to the cost that it was asked for.
+/// Returns whether the search reached its target cost.
 fn is_reached(found: &Identification, specification: &JobSpecification) -> bool {
     let cost = found.cost.unwrap_or(f64::INFINITY);
     found.objective != Objective::Likelihood && cost <= specification.search.cost_tolerance
 }
 
-/// Whether a moment of the model is within the noise of both.
+/// Returns whether a moment of the model agrees with the data within the noise of both.
 fn is_within_noise(found: &Identification, moment: Moment) -> bool {
     let Some(difference) = difference(found, moment) else { return false };
     let relative = |error: f64, moment: Option<f64>| error / moment.unwrap_or(f64::NAN);
@@ -50,12 +51,12 @@ fn is_within_noise(found: &Identification, moment: Moment) -> bool {
     difference.abs() <= (ERRORS_MAX * noise).max(EXACT)
 }
 
-/// How far a moment of the model is above that of the data, relative.
+/// Returns the relative difference of a moment of the model from that of the data.
 fn difference(found: &Identification, moment: Moment) -> Option<f64> {
     Some(found.velocity.moments.get(moment)? / found.data.as_ref()?.moments.get(moment)? - 1.0)
 }
 
-/// That the model misses the data, by how much, and which parameters it ran into.
+/// Returns the statement that the model misses the data, by how much, and at which bounds.
 pub(super) fn misfit(
     found: &Identification,
     point: &Point,
@@ -63,7 +64,7 @@ pub(super) fn misfit(
 ) -> String {
     let off = |moment: Moment| {
         let difference = difference(found, moment)?;
-        // Of other units than the model's, say.
+        // A large difference may be due to data in other units than the model's.
         if !(-0.5..=1.0).contains(&difference) {
             return Some(format!("{} times the data's", digits(1.0 + difference, 2)));
         }
@@ -91,7 +92,8 @@ pub(super) fn misfit(
     format!("\n{}", wrapped(&text))
 }
 
-/// Which of the found numbers the data determine, and what the others are, for a model that fits.
+/// Returns the statement on which parameters the data determine, and what the others mean, for a
+/// model that fits.
 pub(super) fn uniqueness(
     found: &Identification,
     point: &Point,

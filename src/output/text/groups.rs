@@ -1,5 +1,5 @@
-//! The tables of groups: one below the other, so that each is narrow, then why a group has no result
-//! or no intervals.
+//! The tables of groups: one below the other, so that each is narrow, followed by the reasons why
+//! groups have no result or no intervals.
 
 use osteon_common::parameters::Parameter;
 use osteon_common::report::{Data, Group, Moment, QuantityEstimate};
@@ -8,7 +8,7 @@ use osteon_common::results::Status;
 use super::result::scale;
 use super::{aligned, significant};
 
-/// A column of numbers: its heading, and for each group a value with the ends of its interval.
+/// A column of numbers: its heading, and for each group a value with its interval.
 struct Column {
     heading: String,
     cells: Vec<Cell>,
@@ -20,7 +20,7 @@ struct Cell {
     ends: Option<[f64; 2]>,
 }
 
-/// The tables, after the beginning of a line.
+/// Returns the tables, each line preceded by the given beginning.
 pub(super) fn table(groups: &[Group]) -> String {
     let mut text = "\n".to_owned();
     let measured = [
@@ -79,7 +79,7 @@ fn side_by_side(groups: &[Group], columns: [Column; 2]) -> String {
     format!("\n{}", aligned(&rows))
 }
 
-/// A moment of the data of each group.
+/// Returns the column of a moment of the data.
 fn data(groups: &[Group], moment: Moment, heading: &str) -> Column {
     let cell = |Group { data, .. }: &Group| Cell {
         value: data.moments.get(moment),
@@ -88,7 +88,7 @@ fn data(groups: &[Group], moment: Moment, heading: &str) -> Column {
     Column { heading: heading.to_owned(), cells: groups.iter().map(cell).collect() }
 }
 
-/// A quantity that the data say something of, for each group, in a readable unit.
+/// Returns the column of a quantity whose uncertainty is known, in a readable unit.
 fn quantities(
     groups: &[Group],
     heading: &str,
@@ -114,12 +114,12 @@ fn of_parameter(groups: &[Group], parameter: Parameter) -> Column {
     quantities(groups, &heading, scale, |group| known(group, parameter))
 }
 
-/// What the data of a group say of a parameter.
+/// Returns the estimate of a parameter from the data of a group.
 fn known(group: &Group, parameter: Parameter) -> Option<QuantityEstimate> {
     *group.identified.as_ref()?.parameters.get(&parameter)?
 }
 
-/// The free parameters of the mean model that the data of some group fix.
+/// Returns the free parameters of the mean model that the data of at least one group determine.
 fn known_parameters(groups: &[Group]) -> Vec<Parameter> {
     let is_known = |parameter: &Parameter| {
         let of = |group| known(group, *parameter).is_some_and(|found| found.interval.is_some());
@@ -129,7 +129,8 @@ fn known_parameters(groups: &[Group]) -> Vec<Parameter> {
     elastic.filter(is_known).collect()
 }
 
-/// The cells of a column, all with the decimals of its narrowest interval: two digits of half of it.
+/// Returns the cells of a column, all with the decimals of the narrowest interval: two digits of
+/// half its width.
 fn shown(cells: &[Cell]) -> Vec<String> {
     let halves = cells.iter().filter_map(|cell| cell.ends).map(|[low, high]| 0.5 * (high - low));
     let narrowest = halves.filter(|half| *half > 0.0).fold(f64::INFINITY, f64::min);
@@ -151,7 +152,7 @@ fn shown(cells: &[Cell]) -> Vec<String> {
     cells.iter().map(cell).collect()
 }
 
-/// Why a group has no result, or no intervals.
+/// Returns the reason why a group has no result, or no intervals.
 fn note(group: &Group) -> Option<String> {
     let reason = group.reason.as_deref().and_then(|reason| reason.lines().next());
     let unmatched = group.identified.as_ref().is_some_and(|known| !known.matched);
@@ -171,7 +172,8 @@ fn notes(groups: &[Group]) -> String {
     if notes.is_empty() { notes } else { format!("\n{notes}") }
 }
 
-/// What so few data cannot say, where several parameters of the mean model are searched.
+/// Returns a caveat if several parameters of the mean model are searched, which so few data cannot
+/// determine.
 fn caveat(groups: &[Group]) -> String {
     let searched = groups.iter().find_map(|group| group.sensitivities.as_ref());
     let Some(searched) = searched else { return String::new() };

@@ -1,4 +1,4 @@
-//! What the data say.
+//! The conclusions from the data as text.
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::inference::Spread;
@@ -12,12 +12,13 @@ use super::result::{readable, scale};
 /// Name of √(c1111/ρ), which the data always determine where they determine anything.
 const SPEED: &str = "√(c1111/ρ)";
 
-/// Whether the data say anything of a number.
+/// Returns whether the uncertainty of any quantity is known.
 pub(super) fn has_intervals(found: &Identification) -> bool {
     found.identified().is_some_and(|known| known.matched && !rows(known).is_empty())
 }
 
-/// Intervals of what is identified, and what is left open; empty where nothing is known.
+/// Returns the intervals of the identified quantities, and what remains undetermined; empty if
+/// nothing is known.
 pub(super) fn text(found: &Identification) -> String {
     let mut text = String::new();
     if let Some(known) = found.identified().filter(|_| has_intervals(found)) {
@@ -34,7 +35,7 @@ pub(super) fn text(found: &Identification) -> String {
     text
 }
 
-/// A row for each number of which the data say something.
+/// Returns a row for each quantity whose uncertainty is known.
 fn rows(known: &Identified) -> Vec<[String; 3]> {
     let mut rows = Vec::new();
     rows.extend(row(SPEED, &known.bulk_velocity, 1.0, " m/s"));
@@ -50,7 +51,7 @@ fn rows(known: &Identified) -> Vec<[String; 3]> {
     rows
 }
 
-/// Name, value and interval of what is known, to the same decimal.
+/// Returns name, value and interval of a known quantity, to the same decimal.
 fn row(name: &str, quantity: &QuantityEstimate, scale: f64, unit: &str) -> Option<[String; 3]> {
     let value = quantity.value? * scale;
     let error = quantity.standard_error? * scale;
@@ -66,7 +67,7 @@ fn row(name: &str, quantity: &QuantityEstimate, scale: f64, unit: &str) -> Optio
     ])
 }
 
-/// What the intervals are, and which noise they count.
+/// Returns a heading that says what the intervals are, and which noise they include.
 fn heading(known: &Identified) -> String {
     let percent = |error: Option<f64>| {
         let error = error.map_or("?".to_owned(), |error| digits(100.0 * error, 2));
@@ -92,12 +93,12 @@ fn heading(known: &Identified) -> String {
     format!("{level} % confidence intervals{given} {counted}")
 }
 
-/// Whether parameters can be moved without changing the moments.
+/// Returns whether parameters can be moved without changing the moments.
 fn leaves_free(known: &Identified) -> bool {
     !known.free_directions.is_empty()
 }
 
-/// What the intervals do not say.
+/// Returns the assumptions under which the intervals hold.
 fn condition(found: &Identification, known: &Identified) -> String {
     if !leaves_free(known) {
         return String::new();
@@ -112,7 +113,7 @@ fn condition(found: &Identification, known: &Identified) -> String {
     ))
 }
 
-/// How far apart the answers of several starts are.
+/// Describes how far apart the solutions of several starts are.
 fn solutions(found: &Identification) -> String {
     let Some(solutions) = found.solutions.as_ref().filter(|found| found.matching > 1) else {
         return String::new();
@@ -135,7 +136,7 @@ fn solutions(found: &Identification) -> String {
     format!("\n{}{}", wrapped(&heading), aligned(&rows))
 }
 
-/// Both ends to the third digit of their distance.
+/// Returns both ends to the third digit of their distance.
 fn range([smallest, largest]: [f64; 2]) -> String {
     let ends = [smallest, largest];
     let [smallest, largest] = match Decimals::of(largest - smallest, 3) {
@@ -145,9 +146,9 @@ fn range([smallest, largest]: [f64; 2]) -> String {
     format!("{smallest} to {largest}")
 }
 
-/// The smallest and the largest √(c1111/ρ) of the points that match the data, m/s.
+/// Returns the smallest and the largest √(c1111/ρ) of the points that match the data, m/s.
 fn speeds(found: &Identification, points: &[Answer]) -> Option<[f64; 2]> {
-    // As where the solutions are counted: a likelihood has no cost that is low enough.
+    // Same criterion as for counting the solutions: a likelihood has no cost that is low enough.
     let best = found.cost?;
     let most = found.search.cost_tolerance.map_or(best, |most| most.max(best));
     let matching = points.iter().filter(|one| one.cost.is_some_and(|cost| cost <= most));

@@ -1,29 +1,29 @@
-//! Lines and tables that fit a terminal of 80 columns, however wide the one in use is: what is
-//! printed can be sent, compared and pasted.
+//! Lines and tables of at most 80 columns, whatever the width of the terminal, so that the output
+//! can be sent, compared and pasted.
 
 use osteon_common::visible;
 use unicode_width::UnicodeWidthStr as _;
 
-/// Columns of every text.
+/// Maximum number of columns of every text.
 pub(super) const WIDTH: usize = 80;
 
-/// Spaces before the lines that continue another.
+/// Indentation of continuation lines.
 pub(super) const INDENT: usize = 2;
 
-/// Narrowest last column of a table in which words are wrapped; where it would be narrower, what does
-/// not fit stands under its row.
+/// Minimum width of a last column whose words are wrapped; if there is less room, a cell that does
+/// not fit is placed below its row.
 const CELL_WIDTH_MIN: usize = 40;
 
-/// Stands for a space at which no line ends. It is printed as a space.
+/// Stands for a space at which no line may break. It is printed as a space.
 const GLUE: char = '\u{a0}';
 
-/// `text` with spaces at which no line ends: a number and its unit.
+/// Returns `text` with spaces at which no line may break, e.g. between a number and its unit.
 pub(super) fn glued(text: &str) -> String {
     text.replace(' ', &GLUE.to_string())
 }
 
-/// The lines of `text` wrapped between words, with a final newline; lines that continue another are
-/// indented. A word that is longer than a line, such as a path, stays whole.
+/// Wraps the lines of `text` between words, with a final newline; continuation lines are indented.
+/// A word that is longer than a line, such as a path, is not broken.
 pub(super) fn wrapped(text: &str) -> String {
     let lines = text.lines().flat_map(|line| {
         words(&visible::line(line), WIDTH, WIDTH - INDENT).into_iter().enumerate()
@@ -35,10 +35,10 @@ pub(super) fn wrapped(text: &str) -> String {
     indented.collect()
 }
 
-/// Columns of equal width, two spaces between. The words of the last column are wrapped where the
-/// row would be too long.
+/// Returns the rows in columns of equal width, with two spaces between them. The words of the last
+/// column are wrapped if the row would be too long.
 pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> String {
-    // Names and reasons of others are among them.
+    // Some cells contain names and reasons given by others.
     let cells =
         |row: &[String; COLUMNS]| row.each_ref().map(|cell| visible::line(cell).into_owned());
     let rows: Vec<[String; COLUMNS]> = rows.iter().map(cells).collect();
@@ -52,7 +52,7 @@ pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Strin
             row.split_last().map_or(("", row.as_slice()), |(last, rest)| (last, rest));
         for (cell, width) in others.iter().zip(widths) {
             line.push_str(cell);
-            // Spaces by the width on the screen, in which a Chinese character has two columns.
+            // Spaces are counted by display width, in which a Chinese character has two columns.
             line.push_str(&" ".repeat(width - cell.width() + 2));
         }
         push_last(&mut text, line, last, before);
@@ -60,7 +60,7 @@ pub(super) fn aligned<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Strin
     text
 }
 
-/// Ends a row that begins with `line`, of `before` columns, by its last cell.
+/// Appends the last cell to a row that begins with `line`, which has `before` columns.
 fn push_last(text: &mut String, line: String, cell: &str, before: usize) {
     let room = WIDTH.saturating_sub(before);
     let (mut line, indent, room) = if room < CELL_WIDTH_MIN && cell.width() > room {
@@ -80,7 +80,7 @@ fn push_last(text: &mut String, line: String, cell: &str, before: usize) {
     }
 }
 
-/// The words of `line` in lines of these widths; at least one line.
+/// Breaks `line` into lines of these widths; returns at least one line.
 fn words(line: &str, first: usize, others: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in line.split(' ') {

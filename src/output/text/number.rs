@@ -1,26 +1,29 @@
-//! Numbers for people: as many digits as their error leaves.
+//! Numbers as text, with as many digits as their error justifies.
 
-/// Digits of a number whose error is not known.
+/// Significant digits of a number whose error is unknown.
 pub(super) const DIGITS: usize = 5;
-/// Digits of the velocity of one case, which the solvers know to about 1e-5.
+/// Significant digits of the velocity of one case, which the solvers compute to about 1e-5.
 pub(super) const VELOCITY_DIGITS: usize = 7;
-/// Digits of a parameter that the data leave free: it says where in its bounds the point lies.
+/// Significant digits of a parameter that the data leave free: they show where in its bounds the
+/// point lies.
 pub(super) const FREE_DIGITS: usize = 3;
-/// Most decimals: a double has about fifteen digits, and an error below them is none.
+/// Maximum number of decimals: a double has about fifteen digits, and smaller errors are
+/// meaningless.
 const DECIMALS_MAX: i32 = 12;
 
-/// To which decimal numbers are shown: 2 is hundredths, -1 is tens.
+/// Number of decimals shown: 2 means hundredths, -1 means tens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Decimals(i32);
 
 impl Decimals {
-    /// The decimals of two significant digits of a standard error; `None` where it is none, or 0.
+    /// Returns the decimals that show two significant digits of a standard error; `None` if it is
+    /// not above 0.
     pub(super) fn of_error(error: f64) -> Option<Self> {
         Self::of(error, 2)
     }
 
-    /// The decimals of so many significant digits of `value`; `None` of 0, of what is not finite, and
-    /// of what is smaller than any decimal that is shown.
+    /// Returns the decimals that show this many significant digits of `value`; `None` if it is 0,
+    /// not finite, or smaller than any decimal that is shown.
     pub(super) fn of(value: f64, digits: usize) -> Option<Self> {
         if value == 0.0 || !value.is_finite() {
             return None;
@@ -29,11 +32,11 @@ impl Decimals {
         Some(last - exponent(value, digits)).filter(|decimals| *decimals <= DECIMALS_MAX).map(Self)
     }
 
-    /// The number to this decimal, zeros at its end included.
+    /// Returns the number with these decimals, including trailing zeros.
     pub(super) fn show(self, value: f64) -> String {
         if self.0 >= 0 {
             let decimals = usize::try_from(self.0).unwrap_or_default();
-            // No zero has a sign.
+            // Zero is shown without a sign.
             let text = format!("{value:.decimals$}");
             let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
             return if zero { text.trim_start_matches('-').to_owned() } else { text };
@@ -43,8 +46,8 @@ impl Decimals {
     }
 }
 
-/// `value ± error`, the error with two significant digits and the value to the same decimal; with
-/// [`DIGITS`] digits where there is no error.
+/// Returns `value ± error`, the error with two significant digits and the value with the same
+/// decimals; the value with [`DIGITS`] digits if there is no error.
 pub(super) fn measured(value: f64, error: f64) -> String {
     match Decimals::of_error(error) {
         Some(decimals) => format!("{} ± {}", decimals.show(value), decimals.show(error)),
@@ -52,7 +55,7 @@ pub(super) fn measured(value: f64, error: f64) -> String {
     }
 }
 
-/// A number with so many significant digits, zeros at its end included.
+/// Returns a number with this many significant digits, including trailing zeros.
 pub(super) fn digits(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -63,8 +66,8 @@ pub(super) fn digits(value: f64, digits: usize) -> String {
     }
 }
 
-/// A number with at most so many significant digits, without zeros at its end: for what was given,
-/// as settings and bounds.
+/// Returns a number with at most this many significant digits, without trailing zeros; used for
+/// given values, such as settings and bounds.
 pub(super) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -82,7 +85,7 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// The decimal exponent of a finite number rounded to so many digits.
+/// Returns the decimal exponent of a finite number rounded to this many digits.
 fn exponent(value: f64, digits: usize) -> i32 {
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));
     scientific.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0)
@@ -99,7 +102,7 @@ mod tests {
             (3907.687, 2.0, "3907.7 ± 2.0"),
             (0.026_706_35, 0.000_35, "0.02671 ± 0.00035"),
             (0.0271, 0.000_366, "0.02710 ± 0.00037"),
-            // The error is rounded first.
+            // The error is rounded before the decimals are chosen.
             (1598.8, 9.96, "1599 ± 10"),
             (1598.8, 99.6, "1600 ± 100"),
             (45_678.0, 1234.0, "45700 ± 1200"),
@@ -108,7 +111,7 @@ mod tests {
             (-1.234, 0.23, "-1.23 ± 0.23"),
             (21.113, 0.000_12, "21.11300 ± 0.00012"),
             (6.071_647, 0.002_34, "6.0716 ± 0.0023"),
-            // Without an error the number of digits is a matter of taste.
+            // Without an error the default number of digits is used.
             (3907.687, 0.0, "3907.7"),
             (3907.687, f64::NAN, "3907.7"),
             (0.1, f64::INFINITY, "0.10000"),

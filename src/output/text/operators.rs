@@ -1,4 +1,4 @@
-//! Tables of jobs and workers for people.
+//! Tables of jobs and workers as text.
 
 use osteon_common::results::Status;
 use osteon_common::visible;
@@ -16,7 +16,7 @@ use crate::client;
 use crate::output::times::utc;
 use crate::progress::span;
 
-/// A table of jobs. How far a job is stands below its row.
+/// A table of jobs. The progress of a job is shown below its row.
 pub(super) fn jobs(jobs: &[JobSnapshot]) -> String {
     let header =
         ["ID", "NAME", "USER", "KIND", "PRIORITY", "STATE", "SUBMITTED", "TIME", "WORKERS"];
@@ -41,8 +41,8 @@ pub(super) fn jobs(jobs: &[JobSnapshot]) -> String {
     table(&header, jobs.iter().map(|job| (row(job), below(job))).collect())
 }
 
-/// How a job stands, or ended: a propagation that is complete has not converged to anything, and
-/// one that no worker computes does not run.
+/// State or ending of a job. A complete propagation is not said to have converged, and a job that
+/// no worker computes is not said to run.
 pub(super) fn state(job: &JobSnapshot) -> &'static str {
     match (client::job_status(job), job.kind(), job.state()) {
         (Some(Status::Converged), JobKind::Propagation, _) => "done",
@@ -52,7 +52,7 @@ pub(super) fn state(job: &JobSnapshot) -> &'static str {
     }
 }
 
-/// The attached workers, and a line for each that went.
+/// The attached workers, and a line for each one that has left.
 pub(super) fn workers(list: &ListWorkersResponse) -> String {
     let mut text = match list.workers.is_empty() {
         true => "no workers\n".to_owned(),
@@ -110,10 +110,10 @@ pub(in crate::output) fn standing_name(worker: &WorkerSnapshot) -> &'static str 
     }
 }
 
-/// Columns of equal width, two spaces between, and below each row a text of its own; a column in
-/// which no row has anything is left out.
+/// Columns of equal width with two spaces between them, and below each row its own text. A column
+/// without any content is left out.
 fn table(header: &[&str], rows: Vec<(Vec<String>, String)>) -> String {
-    // Names of others are among the cells.
+    // Some cells contain names given by others.
     let cells =
         |row: Vec<String>| row.iter().map(|cell| visible::line(cell).into_owned()).collect();
     let rows: Vec<(Vec<String>, String)> =

@@ -1,4 +1,4 @@
-//! The table of a result: one that was stored looks as one that was just computed.
+//! The table of a result. A stored result looks the same as one that was just computed.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use super::{fit, groups, identified, solver};
 use crate::output::ShownResult;
 use crate::verdict;
 
-/// The table.
+/// Returns the table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
     let mut text = String::new();
     let solver = match shown.result {
@@ -48,7 +48,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
         text.push_str(&groups::table(groups));
         return;
     }
-    // Without a finite cost a point says nothing about the data.
+    // A point without a finite cost allows no statement about the data.
     let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
     let Some(point) = point else {
         text.push_str(&wrapped(&format!("{count}; no point was feasible")));
@@ -74,7 +74,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     }
 }
 
-/// How the search ended, and why.
+/// Describes how the search ended, and why.
 fn headline(found: &Identification, specification: &JobSpecification) -> String {
     let reason = found.reason.as_deref().filter(|reason| !reason.is_empty());
     let headline = match found.status {
@@ -88,13 +88,13 @@ fn headline(found: &Identification, specification: &JobSpecification) -> String 
         let each = if search.starts > 1 { " from each start" } else { "" };
         format!("reached the limit of {} evaluations{each}", search.max_evaluations)
     };
-    // A search that stops early says itself why.
+    // The reason of a search that stops early is complete in itself.
     let reason = match reason {
         None if found.status == Status::MaxEvaluations => Some(used_up()),
         reason => reason.map(str::to_owned),
     };
     let Some(reason) = reason else { return format!("{headline}\n") };
-    // A case file may follow the first line of a reason; it must stay as it is.
+    // A case file may follow the first line of a reason; it must not be changed.
     let (first, rest) = reason.split_once('\n').unwrap_or((&reason, ""));
     let first = wrapped(&format!("{headline}: {first}"));
     if rest.is_empty() { first } else { format!("{first}{}\n", visible::lines(rest.trim_end())) }
@@ -111,7 +111,7 @@ fn propagation(text: &mut String, found: &Propagation, specification: &JobSpecif
     text.push_str(&notes(found.control_variate, &found.velocity, &found.failures));
 }
 
-/// How many realizations failed, by kind, by its name.
+/// Returns the number of failed realizations of each kind, by name.
 fn failures(counts: &BTreeMap<FailureKind, u64>) -> String {
     let all = failure_count(counts);
     let mut named = counts.iter().map(|(kind, count)| (kind.name().replace('_', " "), *count));
@@ -129,11 +129,11 @@ fn failures(counts: &BTreeMap<FailureKind, u64>) -> String {
 }
 
 fn failure_count(counts: &BTreeMap<FailureKind, u64>) -> u64 {
-    // A file may say anything.
+    // The counts come from a file and may be arbitrarily large.
     counts.values().copied().fold(0, u64::saturating_add)
 }
 
-/// Moments with their standard errors against the data's, and the cost.
+/// Returns the moments with their standard errors next to the data's, and the cost.
 fn moments_and_cost(found: &Identification) -> String {
     let level = found.data.as_ref().and_then(Data::intervals).map(|intervals| intervals.level);
     let interval = level.map(|level| format!("{} % interval", significant(100.0 * level, 3)));
@@ -151,7 +151,7 @@ fn moments_and_cost(found: &Identification) -> String {
     aligned(&rows)
 }
 
-/// A row for each moment: the model's with its standard error, and the data's.
+/// Returns a row for each moment: the model's with its standard error, and the data's.
 fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
     let row = |name: &str, moment: Moment| {
         let error = velocity.standard_error.get(moment).unwrap_or(f64::NAN);
@@ -166,8 +166,8 @@ fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
     ]
 }
 
-/// A moment of the data and its interval: to the decimal that the interval leaves, or where there
-/// is none, to that of the model's error.
+/// Returns a moment of the data and its interval, with the decimals of the interval's error;
+/// without an interval, with those of the model's error.
 fn of_data(data: &Data, moment: Moment, error_of_model: f64) -> [String; 2] {
     let Some(number) = data.moments.get(moment) else { return [String::new(), String::new()] };
     let Some([low, high]) = data.intervals().map(|intervals| intervals.get(moment)) else {
@@ -183,7 +183,7 @@ fn of_data(data: &Data, moment: Moment, error_of_model: f64) -> [String; 2] {
     }
 }
 
-/// What is to be known of the moments besides.
+/// Returns further remarks on the moments.
 fn notes(
     control_variate: bool,
     velocity: &Velocity,
@@ -194,7 +194,7 @@ fn notes(
     notes.into_iter().flatten().map(|note| wrapped(&note)).collect()
 }
 
-/// That the control variate which was asked for could not be used.
+/// Returns a remark if the requested control variate could not be used.
 fn uncontrolled(
     asked: bool,
     velocity: &Velocity,
@@ -213,7 +213,7 @@ fn uncontrolled(
     })
 }
 
-/// How large a bias the failed realizations may have left, if there are any.
+/// Estimates the bias that failed realizations may have caused, if there are any.
 fn effect_of_failures(
     velocity: &Velocity,
     failures: &BTreeMap<FailureKind, u64>,
@@ -234,7 +234,7 @@ fn effect_of_failures(
     ))
 }
 
-/// Whether the data can be of the model's law, if that was tested.
+/// Returns whether the data agree with the model's law, if that was tested.
 fn kolmogorov(data: &Data) -> Option<String> {
     let test = data.kolmogorov.flatten()?;
     let (distance, p) = (digits(test.distance, 2), digits(test.p_value, 2));
@@ -245,7 +245,7 @@ fn kolmogorov(data: &Data) -> Option<String> {
     )))
 }
 
-/// The best point, with the digits that the data leave each parameter.
+/// Returns the best point, each parameter with the digits that its uncertainty justifies.
 fn parameters(found: &Identification, point: &Point, specification: &JobSpecification) -> String {
     let identified = found.identified();
     let matched = identified.is_some_and(|known| known.matched);
@@ -278,12 +278,12 @@ fn parameters(found: &Identification, point: &Point, specification: &JobSpecific
     aligned(&rows)
 }
 
-/// Name of a parameter.
+/// Returns the name of a parameter.
 pub(super) fn readable(parameter: Parameter) -> String {
     parameter.name().replace('_', " ").replace("young", "Young").replace("poisson", "Poisson")
 }
 
-/// Factor and unit that make a parameter readable.
+/// Returns factor and unit that make a parameter readable.
 pub(super) fn scale(parameter: Parameter) -> (f64, &'static str) {
     match parameter.unit() {
         "Pa" => (1e-9, " GPa"),

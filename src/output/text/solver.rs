@@ -1,11 +1,11 @@
-//! The line that says how velocities were computed.
+//! The line that describes how velocities were computed.
 
 use osteon_common::report::{EstimatedErrors, Solver};
 use osteon_common::settings::Method;
 
 use super::significant;
 
-/// The line for a set of velocities, without its end.
+/// Returns the line for a set of velocities, without line end.
 pub(super) fn line(solver: &Solver<EstimatedErrors>) -> String {
     line_with(solver, |errors| match (errors.median, errors.largest) {
         (Some(median), Some(largest)) => {
@@ -15,7 +15,7 @@ pub(super) fn line(solver: &Solver<EstimatedErrors>) -> String {
     })
 }
 
-/// The line for one velocity, without its end.
+/// Returns the line for one velocity, without line end.
 pub(super) fn line_of_one(solver: &Solver<Option<f64>>) -> String {
     line_with(solver, |found| found.map(error))
 }

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A search in the middle.
+/// A search half way through.
 fn search() -> JobSnapshot {
     JobSnapshot {
         job: "1".to_owned(),
@@ -57,7 +57,7 @@ fn a_search_shows_what_the_width_allows() {
     check(110, [most, best]);
 }
 
-/// The largest numbers that a job can have.
+/// Uses the largest numbers that a job can have.
 #[test]
 fn what_matters_is_seen_at_every_width_from_40_on() {
     let large = JobSnapshot {
@@ -89,7 +89,7 @@ fn a_long_evaluation_has_a_bar() {
     let at = |width| shown(&search(), observed, width).pop().unwrap();
     assert_eq!(at(40), "█████░░░ 63 % of this evaluation");
     assert_eq!(at(80), "██████████░░░░░░ 63 % of this evaluation, 1747 of 2747 realizations");
-    // An evaluation that is not complete is not at 100 %.
+    // An incomplete evaluation is never shown as 100 %.
     let almost = Observed { bar: Some(2746), ..OBSERVED };
     assert!(shown(&search(), almost, 80)[2].contains("░ 99 %"));
 }
@@ -111,7 +111,7 @@ fn a_propagation_is_a_bar() {
 fn the_mean_of_evaluations_counts_before_the_rate() {
     let observed = Observed { evaluation_s: Some(10.0), ..OBSERVED };
     let first = shown(&search(), observed, 80).remove(0);
-    // 365 others and the rest of this one, of 10 s each.
+    // 365 further evaluations and the rest of this one, of 10 s each.
     assert!(first.ends_with("up to 61 min left"), "{first}");
 }
 

@@ -80,7 +80,7 @@ fn few_solvers_are_kept_and_each_is_made_once() {
     let first = solvers.get(&setup(4e-3));
     assert!(Arc::ptr_eq(&first, &solvers.get(&setup(4e-3))));
     let others: Vec<_> = (1..SOLVERS_MAX).map(|i| setup(4e-3 + 1e-4 * i as f64)).collect();
-    // Jobs that take turns: nothing is made anew, and what was used last stays.
+    // Jobs that take turns: nothing is rebuilt, and the most recently used solvers are kept.
     let second = solvers.get(&others[0]);
     for _ in 0..2 {
         others.iter().for_each(|other| drop(solvers.get(other)));

@@ -1,4 +1,4 @@
-//! The worker against coordinators that misbehave, over a Unix socket.
+//! Tests of the worker against coordinators that misbehave, over a Unix socket.
 
 use std::collections::BTreeMap;
 use std::future::pending;
@@ -22,26 +22,26 @@ use tonic::{Request as Call, Response};
 use super::*;
 use crate::backend::Done;
 
-/// What a false coordinator does with every worker.
+/// Behaviour of a fake coordinator towards every worker.
 #[derive(Debug, Clone, Copy)]
 enum Script {
-    /// Does not take it.
+    /// Refuses the worker.
     Refuse,
-    /// Takes it and closes the stream.
+    /// Accepts the worker and closes the stream.
     Leave,
-    /// Takes it and sends what cannot be read.
+    /// Accepts the worker and sends a batch that cannot be read.
     Garble,
-    /// Says nothing.
+    /// Accepts the worker and then stays silent.
     Silence,
-    /// Takes it, sends three batches, takes back the second once the first is answered, and leaves
-    /// when the third is answered.
+    /// Accepts the worker, sends three batches, revokes the second once the first is answered, and
+    /// drains the worker when the third is answered.
     Work,
 }
 
 struct FalseCoordinator {
     script: Script,
     attachments: Arc<AtomicU32>,
-    /// What workers said.
+    /// Messages received from workers.
     heard: Arc<Mutex<Vec<Request>>>,
 }
 
@@ -58,7 +58,7 @@ impl Workers for FalseCoordinator {
         let hello = requests.message().await?.and_then(|request| request.message);
         self.heard.lock().unwrap().extend(hello);
         let (sender, stream) = mpsc::channel(4);
-        // Only who is silent is to be left soon.
+        // Only a silent coordinator should be abandoned soon.
         let expiry_s = if matches!(self.script, Script::Work) { 60.0 } else { 0.5 };
         let welcome = WorkerWelcome { worker: 1, lease: 1, heartbeat_s: 0.2, expiry_s };
         let mut script = Vec::new();
@@ -72,7 +72,7 @@ impl Workers for FalseCoordinator {
             Script::Work => {}
             Script::Silence => {
                 script.push(Reply::Welcome(welcome));
-                // Held open until the worker has gone.
+                // Keeps the stream open until the worker has gone.
                 let open = sender.clone();
                 tokio::spawn(async move { open.closed().await });
             }
@@ -89,7 +89,7 @@ impl Workers for FalseCoordinator {
     }
 }
 
-/// Notes what a worker answers, and does the rest of [`Script::Work`].
+/// Records the worker's messages, and performs the rest of [`Script::Work`].
 async fn take_answers(
     mut requests: Streaming<AttachRequest>,
     sender: mpsc::Sender<Result<AttachResponse, Status>>,
@@ -115,8 +115,8 @@ fn work() -> Work {
     Work { setup, point: Point([1.0; 7]), germs, first: 7, count: 2 }
 }
 
-/// A device that computes nothing. It answers a batch when the next one is given to it or it is told
-/// to forget another one.
+/// A device that computes nothing. It completes a batch when the next one is started or another one
+/// is released.
 #[derive(Debug, Default)]
 struct FakeBackend {
     open: BTreeMap<Task, Held>,
@@ -132,7 +132,7 @@ impl std::fmt::Debug for Held {
 }
 
 impl FakeBackend {
-    /// Ends a batch on a thread of its own, as a device does.
+    /// Ends a batch on a thread of its own, as a real device does.
     fn end(held: Held, computed: Computed) {
         std::thread::spawn(move || (held.1)(computed));
     }
@@ -189,7 +189,7 @@ async fn a_device_is_told_what_to_compute_and_what_to_forget() {
     let expected = [(1, outcomes(&work())), (3, outcomes(&work()))];
     assert_eq!(results.collect::<Vec<_>>(), expected);
     let mut seen = seen.lock().unwrap().clone();
-    // The end of a batch that was forgotten is told at any time after that.
+    // The end of a released batch may be reported at any later time.
     let last = seen.iter().position(|it| it == "forget 3").unwrap();
     seen.truncate(last);
     seen.dedup();
@@ -209,7 +209,7 @@ impl Drop for Scene {
     }
 }
 
-/// Starts a false coordinator; it ends with the test's runtime.
+/// Starts a fake coordinator, which ends with the test's runtime.
 fn scene(name: &str, script: Script) -> Scene {
     let name = format!("osteon-worker-test-{}-{name}", std::process::id());
     let socket = std::env::temp_dir().join(name);

@@ -7,7 +7,7 @@ use super::*;
 
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
-/// A worker under test: every effect must be taken before the next event.
+/// A worker under test, which checks that every effect is taken before the next event.
 struct Recorder {
     state: State,
     now: Duration,

@@ -1,8 +1,8 @@
-//! Bounds on nesting and on what a text holds, held before it is parsed.
+//! Limits on nesting and content of a text, checked before it is parsed.
 //!
-//! The parser has a bound on nesting, too, but its recovery from errors loses count: `x = { y = 1 z`
-//! followed by `[l]`, some thousand times, would take all of the stack. Of the memory that it takes
-//! it has none: 60 bytes for each word and mark, and for each table up to a kilobyte.
+//! The parser limits nesting, too, but its error recovery miscounts: `x = { y = 1 z` followed by
+//! `[l]`, some thousand times, would exhaust the stack. It has no limit on memory, of which it
+//! takes 60 bytes for each word and punctuation mark, and up to a kilobyte for each table.
 
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
@@ -10,11 +10,11 @@ use toml_parser::lexer::TokenKind;
 use crate::document::budget::{Budget, Excess};
 use crate::limits::TOML_TOKENS_MAX;
 
-/// Most brackets that may be open: as many as the parser allows in a text without errors.
+/// Maximum number of open brackets: as many as the parser allows in a text without errors.
 const OPEN_MAX: usize = 80;
 
-/// Refuses a text that is nested too deep or holds too much, with the byte offset of what is too
-/// much.
+/// Refuses a text that is nested too deeply or has too much content; returns the byte offset of the
+/// excess.
 pub(super) fn check(text: &str) -> Result<(), (usize, Excess)> {
     let mut extent = Extent { open: Vec::new(), dots: 0, budget: Budget::new() };
     for (count, token) in Source::new(text).lex().enumerate() {
@@ -25,12 +25,12 @@ pub(super) fn check(text: &str) -> Result<(), (usize, Excess)> {
     Ok(())
 }
 
-/// What has been seen of a text.
+/// Counts of the text read so far.
 struct Extent {
-    /// Brackets that are open. One that closes what is not open closes nothing: so the count is
-    /// never below the number of levels that a parser is in, whatever it takes a wrong text for.
+    /// Open brackets. A closing bracket that matches none is ignored, so the count is never below
+    /// the parser's nesting depth, however it interprets a malformed text.
     open: Vec<TokenKind>,
-    /// Dots since the last mark: those of `a.b.c` before `=` or `]` open tables.
+    /// Dots since the last punctuation mark: those of `a.b.c` before `=` or `]` open tables.
     dots: usize,
     budget: Budget,
 }
@@ -85,7 +85,7 @@ mod tests {
         check(&"[".repeat(80), None);
         check(&"[".repeat(81), Some(80));
         check(&"{".repeat(81), Some(80));
-        // What closes something else closes nothing.
+        // A closing bracket of the wrong kind is ignored.
         check(&"{]".repeat(81), Some(160));
         check(&"# [\n'['\n\"[\"\n".repeat(100), None);
     }
@@ -108,7 +108,7 @@ mod tests {
             let text = unit.repeat(DOCUMENT_KEYS_MAX + 1);
             assert!(matches!(found(&text), Some((_, Excess::Keys))), "{unit}");
         }
-        // The fractions of a list are no keys.
+        // Decimal points in a list do not count as keys.
         let values = format!("a = [{}]", "    3900.5,\n".repeat(DATA_VELOCITIES_MAX));
         assert_eq!(found(&values), None);
         let values = format!("a = [{}]", "1,".repeat(DOCUMENT_VALUES_MAX + 1));

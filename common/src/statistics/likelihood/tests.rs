@@ -42,7 +42,7 @@ fn average_and_scatter(values: &[f64]) -> (f64, f64) {
     (average, (squares / (count - 1.0)).sqrt())
 }
 
-/// The formula as it stands, with one exponential for each pair of velocities.
+/// Compares with the formula as written, with one exponential for each pair of velocities.
 #[test]
 fn the_cost_is_that_of_the_formula() {
     let (model, measured) = (drawn(1, 60), drawn(2, 40));
@@ -74,10 +74,10 @@ fn many_velocities_cost_the_entropy_of_their_law() {
     assert!((found - entropy).abs() < 2e-3, "{found} {entropy}");
 }
 
-/// Where the likelihood of data without noise is largest, by one Newton step from the truth with the normal
-/// law's information (1 of the mean in σ, 2 of ln σ), for models with exact moments: their average is the
-/// bias that smoothing brings. The sampling error, of data and of model alike, is 1/√N of the mean and
-/// 1/√(2N) of ln σ.
+/// The point at which the likelihood of data without noise is largest, by one Newton step from the
+/// truth with the normal law's information (1 of the mean in σ, 2 of ln σ), for models with exact
+/// moments: the average of these is the bias due to smoothing. The sampling error, of data and of
+/// model alike, is 1/√N of the mean and 1/√(2N) of ln σ.
 #[test]
 fn the_maximum_is_unbiased_to_well_under_the_sampling_error() {
     let measured = quantiles(20_000);
@@ -104,8 +104,8 @@ fn the_maximum_is_unbiased_to_well_under_the_sampling_error() {
     }
 }
 
-/// Reported errors against the scatter over seeds: near the maximum, and away from it, where the moments
-/// decide, or the floor.
+/// Compares reported errors with the scatter over seeds: near the maximum, and far from it, where
+/// the moments or the floor dominate.
 #[test]
 fn the_standard_error_is_that_of_repetition() {
     let plain = MonteCarlo::default();
@@ -153,7 +153,7 @@ fn an_outlier_has_a_finite_cost_that_pulls() {
     let with = cost(0.0, &model, &data);
     // One of 301 velocities, at 250 standard deviations.
     assert!(with - without < 20.0 / 301.0, "{with} {without}");
-    // A model far from all of the data: nearer is better.
+    // For a model far from all of the data, a nearer one is better.
     let mut before = f64::INFINITY;
     for shift in [20_000.0, 10_000.0, 3000.0, 1000.0, 500.0, 200.0, 0.0] {
         let moved: Vec<f64> = data[..300].iter().map(|velocity| velocity + shift).collect();
@@ -187,7 +187,8 @@ fn without_different_velocities_there_is_no_law() {
     assert!(cost(0.0, &[Ok(3900.0), Ok(3950.0)], &data).is_finite());
 }
 
-/// Half of them equal: no width by the middle half, and a grid of bounded size by the other.
+/// Half of the values are equal: their middle half has no width, and the standard deviation keeps
+/// the grid bounded.
 #[test]
 fn a_law_with_an_atom_has_a_bounded_grid() {
     let mut model = vec![3900.0; 3000];

@@ -1,11 +1,11 @@
-//! Conditions that the nearest point, and no other, meets.
+//! Conditions that only the nearest point meets.
 
 use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
 
-/// Smallest value over the box of a linear function that is 0 at `at`: of `slopes` · (y - at).
+/// Returns the smallest value over the box of the linear function `slopes` · (y - at).
 fn least_over_the_box(slopes: &[f64], at: &[f64]) -> f64 {
     let along = slopes.iter().zip(at).map(|(slope, u)| (slope * -u).min(slope * (1.0 - u)));
     along.sum()
@@ -19,8 +19,8 @@ fn unit(dimension: usize) -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(prop_oneof![4 => 0.0..1.0_f64, 1 => Just(0.0), 1 => Just(1.0)], dimension)
 }
 
-/// A start, a point of the box, and rows; some entries are zero, as those of a parameter that says
-/// nothing.
+/// A start, a point of the box, and rows; some entries are zero, as for a parameter without
+/// influence.
 fn problem() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Rows)> {
     (1_usize..=7).prop_flat_map(|dimension| {
         let entry = prop_oneof![3 => -1.0..1.0_f64, 1 => Just(0.0)];
@@ -33,22 +33,24 @@ fn problem() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Rows)> {
 properties! {
     #![cases(2000)]
 
-    /// A convex set's nearest point x: no way to another of its points y begins towards the start.
+    /// For the nearest point x of a convex set, no direction from x to another of its points leads
+    /// towards the start.
     fn of_the_solutions_it_is_the_nearest((start, other, rows) in problem()) {
         let right = [0, 1].map(|i| dot(&rows[i], &other));
         let at = nearest(&start, &rows, right);
         prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)));
         let missed = residual(&rows, right, &at);
-        // As SOFTNESS allows: about 1e-10 over the smaller singular value of the rows that matter.
+        // The accuracy permitted by SOFTNESS: about 1e-10 over the smaller singular value of the
+        // relevant rows.
         prop_assert!(missed.iter().all(|r| r.abs() < 1e-5), "{missed:?}");
         let turn: f64 =
             (0..at.len()).map(|i| (at[i] - start[i]) * (other[i] - at[i])).sum();
         prop_assert!(turn > -1e-4, "{turn} at {at:?}");
     }
 
-    /// Least squares over the box: their gradient points out of the box, or nowhere. The multipliers
-    /// are as large as what is missed over SOFTNESS, up to 1e11, and so rounding moves what is
-    /// inside the box by 1e-5.
+    /// For least squares over the box, the gradient points out of the box or vanishes. The
+    /// multipliers are the residuals divided by SOFTNESS, up to 1e11, and so rounding moves
+    /// coordinates inside the box by 1e-5.
     fn without_a_solution_it_is_the_least_squares(
         (start, _, rows) in problem(),
         right in prop::array::uniform2(-6.0..6.0_f64),
@@ -71,7 +73,8 @@ fn a_start_that_solves_stays() {
 
 #[test]
 fn what_one_coordinate_cannot_the_others_do() {
-    // From (0.9, 0.5) up by (0.3, 0.3) leaves the box: the first stops, the second goes on.
+    // The step from (0.9, 0.5) by (0.3, 0.3) leaves the box: the first coordinate stops, the second
+    // continues.
     let rows = [vec![1.0, 1.0], vec![0.0, 0.0]];
     let at = nearest(&[0.9, 0.2], &rows, [1.7, 0.0]);
     assert!((at[0] - 1.0).abs() < 1e-9 && (at[1] - 0.7).abs() < 1e-9, "{at:?}");

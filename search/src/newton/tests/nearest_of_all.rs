@@ -1,19 +1,20 @@
-//! Where the closed form is all there is, the answer against an independent minimiser: descents
-//! along the points that match, from all over the box. They share nothing with the search but the
-//! closed form.
+//! For moments that follow the closed form exactly, compares the solution with an independent
+//! minimiser: descents along the matching points, from all over the box. It shares only the closed
+//! form with the search.
 
 use super::*;
 
-/// Descents of the minimiser, besides the one from the answer itself.
+/// Number of descents of the minimiser, besides the one from the solution itself.
 const DESCENTS: u64 = 8;
 const STARTS: u64 = 2500;
-/// Coordinates that the closed form feels, but for the dispersion, which the data fix by itself.
+/// Coordinates that affect the closed form, except the dispersion, which the data determine by
+/// itself.
 const FELT: [usize; 5] = [0, 1, 2, 4, 5];
 
 /// The points of a box with the velocity and the dispersion of the optimum.
 struct Solutions {
     space: SearchBox,
-    /// From where distances count.
+    /// The point from which distances are measured.
     start: Vec<f64>,
     logarithm: f64,
 }
@@ -24,13 +25,13 @@ impl Solutions {
         Self { space, start: space.start(), logarithm }
     }
 
-    /// How much too fast a point is, and how that changes.
+    /// Returns by how much a point is too fast, and the derivatives of that.
     fn excess(&self, at: &[f64]) -> Option<(f64, Vec<f64>)> {
         let velocity = bulk_velocity(&self.space.point(at)).ok()?;
         Some((velocity.logarithm - self.logarithm, self.space.per_edge(&velocity.gradient)))
     }
 
-    /// The solution on the way from `from` along `normal`, cut to the box.
+    /// Returns the solution on the line from `from` along `normal`, clipped to the box.
     fn restored(&self, from: &[f64], normal: &[f64]) -> Option<Vec<f64>> {
         let (mut at, mut length) = (from.to_vec(), 0.0);
         for _ in 0..50 {
@@ -54,8 +55,8 @@ impl Solutions {
         None
     }
 
-    /// The distance from the start that is reached by moves towards it and back to the solutions,
-    /// each of which must bring it nearer.
+    /// Returns the distance from the start that is reached by moves towards it and back to the
+    /// solutions, each of which must reduce the distance.
     fn descent(&self, from: &[f64]) -> Option<f64> {
         let mut at = from.to_vec();
         at[3] = self.start[3];
@@ -84,7 +85,7 @@ impl Solutions {
         Some(distance)
     }
 
-    /// The least distance of the descents from `answer` and from all over the box.
+    /// Returns the smallest distance of the descents from `answer` and from all over the box.
     fn least(&self, answer: &[f64], seed: u64) -> f64 {
         let drawn = (0..DESCENTS).map(|index| Germs::draw(seed, index).values()[..7].to_vec());
         let ends = drawn.chain([answer.to_vec()]).filter_map(|from| self.descent(&from));
@@ -92,7 +93,7 @@ impl Solutions {
     }
 }
 
-/// The distance of the answer, and the least that the minimiser finds.
+/// Returns the distance of the solution, and the smallest that the minimiser finds.
 fn distances(start: &[f64; 7], seed: u64) -> (f64, f64) {
     let space = all_free(start);
     let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
@@ -101,7 +102,7 @@ fn distances(start: &[f64; 7], seed: u64) -> (f64, f64) {
     (distance, Solutions::of(space).least(&found.at, seed))
 }
 
-/// Starts uniform in the box; of every other one a third of the coordinates lie on bounds.
+/// Starts uniform in the box; every second one has a third of its coordinates on bounds.
 fn starts() -> impl Iterator<Item = (u64, [f64; 7])> {
     let starts = (0..STARTS).map(|index| {
         let germs = Germs::draw(23, index);
@@ -136,8 +137,8 @@ fn a_nearer_point_half_a_box_away_is_found() {
     assert!((distance - least).abs() < 1e-5, "{distance}, {least}");
 }
 
-/// The points that match bend here nearly as the sphere around the start does: the descent takes
-/// fifteen hundred linearisations, and was 3e-5 off after three hundred.
+/// The matching points bend here nearly as much as the sphere around the start: the descent takes
+/// fifteen hundred linearisations, and had an error of 3e-5 after three hundred.
 #[test]
 fn a_slow_descent_is_taken_to_its_end() {
     let start = [
@@ -166,7 +167,8 @@ fn no_point_that_matches_is_nearer() {
     assert!(checked > 2000, "{checked}");
 }
 
-/// What the descent from the evaluated point ends at stays to the bit, or is farther by a margin.
+/// The end of the descent from the evaluated point is either kept to the bit, or replaced by a
+/// point that is nearer by a margin.
 #[test]
 fn only_what_is_clearly_nearer_is_taken() {
     let data = logarithms(rule(&OPTIMUM));

@@ -1,4 +1,4 @@
-//! What a search without any velocity says.
+//! Advice of a search without any velocity.
 
 use osteon_common::outcome::FailureKind::{
     DirectWaveFirst, InconsistentArrival, NoArrival, NoConvergence, NotFinite,
@@ -7,7 +7,7 @@ use osteon_common::settings::Method;
 
 use super::*;
 
-/// The reason of a search all of whose points have these outcomes.
+/// Returns the reason of a search all of whose points have these outcomes.
 fn reason(job: &JobSpecification, outcomes: [Outcome; 10]) -> String {
     let mut search = Search::new(Arc::new(job.clone()));
     while let Step::Evaluate(_) = search.ask() {
@@ -24,7 +24,7 @@ fn job() -> JobSpecification {
     job
 }
 
-/// Accuracy and patience help where a few fail.
+/// More accuracy, or a larger failure limit, helps if only a few fail.
 const A_FEW: &str = "change the starts of [parameters], raise [solver] refinement, or allow a larger \
                      [monte_carlo] max_failed_fraction";
 
@@ -33,7 +33,7 @@ fn more_accuracy_is_advised_where_a_few_fail() {
     let mut outcomes = [Ok(3900.0); 10];
     outcomes[..3].fill(Err(NoArrival));
     assert!(reason(&job(), outcomes).ends_with(A_FEW), "{}", reason(&job(), outcomes));
-    // Most fail, in several ways.
+    // Most realizations fail, in several ways.
     outcomes[..5].fill(Err(InconsistentArrival));
     outcomes[5..].fill(Err(NoArrival));
     assert!(reason(&job(), outcomes).ends_with(A_FEW), "{}", reason(&job(), outcomes));

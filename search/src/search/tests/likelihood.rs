@@ -1,8 +1,8 @@
-//! The likelihood of measured velocities as objective.
+//! Searches with the likelihood of measured velocities as objective.
 
 use super::*;
 
-/// The speeds of the bones at a point, as velocities.
+/// Returns the speeds of the bones at a point, used as velocities.
 fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
     let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
     let speed = |index| {
@@ -28,7 +28,7 @@ fn by_likelihood(truth: &Point, seed: u64, count: u64) -> JobSpecification {
     }
 }
 
-/// The search to its end, told speeds.
+/// Runs the search to its end with speeds as outcomes.
 fn run_on_speeds(specification: &JobSpecification) -> Search {
     let mut search = Search::new(Arc::new(specification.clone()));
     while let Step::Evaluate(point) = search.ask() {
@@ -37,8 +37,9 @@ fn run_on_speeds(specification: &JobSpecification) -> Search {
     search
 }
 
-/// Of 30 sets of 200 velocities: ln e_L is found with an error of 2 σ/√200 / (d ln v/d ln e_L) = 0.7 %, ln δ with one
-/// of 5 %; the average must be right to less than half of that, which is 2.7 standard deviations of it.
+/// For 30 sets of 200 velocities, ln e_L is found with an error of 2 σ/√200 / (d ln v/d ln e_L) =
+/// 0.7 %, and ln δ with one of 5 %. The average must be accurate to less than half of that, which
+/// is 2.7 standard deviations of it.
 #[test]
 fn a_likelihood_finds_what_made_the_data() {
     let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -56,7 +57,7 @@ fn a_likelihood_finds_what_made_the_data() {
         }
     }
     assert!(found[0].abs() < 0.0035 && found[1].abs() < 0.025, "{found:?}");
-    // For a law that is nearly normal the moments say the same.
+    // For a nearly normal law the moments give the same result.
     assert!((found[1] - by_moments[1]).abs() < 0.01, "{found:?} {by_moments:?}");
 }
 
@@ -84,7 +85,7 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     );
 }
 
-/// From far away only the floor of the density tells where the data are.
+/// Far from the data only the floor of the density indicates where they are.
 #[test]
 fn a_likelihood_comes_back_from_far_away() {
     let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.04]);
@@ -97,7 +98,8 @@ fn a_likelihood_comes_back_from_far_away() {
     assert!((best.dispersion() / truth.dispersion() - 1.0).abs() < 0.3, "{best:?}");
 }
 
-/// Two velocities of 200 that are wrong by half the velocity of sound: by its moments the law is twice as wide.
+/// Two of 200 velocities are wrong by half the velocity of sound: by its moments the law is twice
+/// as wide.
 #[test]
 fn outliers_move_a_likelihood_less_than_moments() {
     let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);

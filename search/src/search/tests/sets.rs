@@ -19,7 +19,7 @@ fn derivatives_are_measured_beside_the_best_point() {
         let others = (0..7).filter(|other| *other != place);
         assert!(others.into_iter().all(|k| row.point.0[k] == best.point.0[k]));
     }
-    // At an upper bound the step goes down.
+    // At an upper bound the step goes downwards.
     let mut bounded = specification(400);
     bounded.parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 16e9 };
     let (search, _) = run(&bounded);
@@ -61,8 +61,8 @@ fn without_derivatives_the_search_ends_with_the_method() {
     );
 }
 
-/// Three parameters are free and two moments are given: of the points that match them, about, the
-/// answer is the one that the priors ask for, whatever the start.
+/// Three parameters are free and two moments are given: among the points that approximately match
+/// them, the result is the one that the priors select, whatever the start.
 #[test]
 fn priors_choose_among_the_points_that_match() {
     let mut specification = specification(1000);
@@ -92,7 +92,7 @@ fn priors_choose_among_the_points_that_match() {
             assert!((moments.mean / 3900.0 - 1.0).abs() < 1e-3, "{best:?}");
         }
     }
-    // Away from what the data say, both have their say: the cost counts both.
+    // If a prior contradicts the data, the cost includes both.
     specification.search.priors[6] = Some(Prior { value: 0.2, weight: 0.5 });
     let best = found(&specification);
     let penalty = specification.penalty(&best.point);
@@ -104,7 +104,7 @@ fn priors_choose_among_the_points_that_match() {
     assert!((0.125..0.195).contains(&best.point.dispersion()), "{best:?}");
 }
 
-/// Groups whose mean velocities are these; all have the dispersion of the start.
+/// Groups with these mean velocities; all have the dispersion of the start.
 fn grouped(means: &[f64]) -> JobSpecification {
     let group = |(k, mean): (usize, &f64)| Group {
         name: format!("group {k}"),
@@ -134,7 +134,7 @@ fn each_group_is_identified_by_itself() {
 
 #[test]
 fn a_group_that_fails_leaves_the_others_what_they_have() {
-    // Twice as fast as any point of the box.
+    // A velocity twice as fast as at any point of the box.
     let (search, _) = run(&grouped(&[3800.0, 9000.0, 4000.0]));
     let summary = search.summary();
     assert_eq!(ending(&search).status, Status::Converged);
@@ -168,13 +168,13 @@ fn several_starts_give_several_answers() {
         let another = starts.iter().skip(k + 1).all(|(other, _)| other.point != first.point);
         assert!(another, "start {k} twice");
     }
-    // The first one matches the data: it is the answer.
+    // The first one matches the data, so it is the result.
     assert_eq!(search.best().unwrap().number, starts[0].1.number);
     let again = run(&specification).0;
     assert_eq!(search.summary(), again.summary());
 }
 
-/// Groups of which some have nothing to match.
+/// A job with these groups, some of which have nothing to match.
 fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
     let group = |(name, velocities): &(&str, &[f64])| Group {
         name: (*name).to_owned(),
@@ -213,7 +213,7 @@ fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
         let GroupEnding { status, reason, best } = &summary.groups[place as usize];
         assert_eq!((*status, *best), (Status::Failed, None));
         assert!(reason.as_ref().unwrap().starts_with(expected), "{reason:?}");
-        // The others say how the job ended.
+        // The other groups have the ending of the job.
         assert_eq!(found.status, known.status);
         let told = "no search was made for 1 of 3 groups; the first is \"lonely\": ";
         let reason = found.reason.unwrap();

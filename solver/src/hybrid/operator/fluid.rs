@@ -1,4 +1,4 @@
-//! One fluid's share of the operator.
+//! Contribution of one fluid to the operator.
 
 use osteon_common::layers::Fluid;
 
@@ -15,7 +15,7 @@ pub(super) struct FluidLayer {
     pub(super) elements: usize,
     /// Nodes of one element.
     pub(super) count: usize,
-    /// Half of -c² E D / J: its result is that of even and odd part, added and subtracted.
+    /// Half of -c² E D / J, as the even and odd part of its result are added and subtracted.
     stiffness: Halves,
     /// Half of -c², (m/s)².
     diagonal: f64,
@@ -37,7 +37,8 @@ impl FluidLayer {
         }
     }
 
-    /// `out` from `p`, of `C` numbers per node; the first of them has place `offset` in a state.
+    /// Computes `out` from `p`, with `C` numbers per node; the first of them is at `offset` in a
+    /// state.
     #[inline(always)]
     pub(super) fn apply<const C: usize, V: Vector, S: Sink>(
         &self,
@@ -54,7 +55,7 @@ impl FluidLayer {
         }
     }
 
-    /// Elements of `N` nodes; 0 stands for any number.
+    /// Processes elements of `N` nodes; 0 stands for any number.
     #[inline(always)]
     fn elements<const C: usize, const N: usize, V: Vector, S: Sink>(
         &self,
@@ -86,7 +87,7 @@ impl FluidLayer {
         }
     }
 
-    /// One element, number `c` of every node.
+    /// Processes one element, number `c` of every node.
     #[inline(always)]
     fn element<const C: usize, const N: usize, V: Vector>(
         &self,

@@ -1,31 +1,30 @@
-//! Matrices of one element, in parts of functions that are even and odd about its middle.
+//! Matrices of one element, split for functions that are even and odd about its middle.
 //!
-//! An element looks the same from both ends: its matrices turn even functions into even ones and
-//! odd into odd, or, those of a first derivative, even into odd and odd into even. In such parts
-//! half of a matrix is zero.
+//! An element is symmetric: its matrices map even functions to even ones and odd to odd, or, those
+//! of a first derivative, even to odd and odd to even. In this form half of a matrix is zero.
 //!
 //! Of n values the even part is s_i = x_i + x_(n-1-i), which for the middle node of an odd n is
-//! twice its value; the odd part is d_i = x_i - x_(n-1-i). Back, x_i = (s_i + d_i)/2 and
-//! x_(n-1-i) = (s_i - d_i)/2.
+//! twice its value; the odd part is d_i = x_i - x_(n-1-i). Back, x_i = (s_i + d_i)/2 and x_(n-1-i)
+//! = (s_i - d_i)/2.
 
-/// Most nodes in the even part: half of the 13 of degree 12, rounded up.
+/// Maximum number of nodes in the even part: half of the 13 of degree 12, rounded up.
 pub(super) const HALF: usize = 7;
 
 /// Entry of column j and row i at `[j][i]`.
 pub(super) type Half = [[f64; HALF]; HALF];
 
-/// A matrix of an element in parts.
+/// A matrix of an element, split into parts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Halves {
-    /// What it makes of the even part.
+    /// Its effect on the even part.
     pub(super) of_even: Half,
-    /// What it makes of the odd part.
+    /// Its effect on the odd part.
     pub(super) of_odd: Half,
 }
 
 impl Halves {
-    /// The matrix of `count` rows and columns with `entry(i, j)`, which is its own mirror image
-    /// about the middle, or minus it.
+    /// Creates the matrix of `count` rows and columns with `entry(i, j)`, which is symmetric or
+    /// antisymmetric about the middle.
     pub(super) fn new(count: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let mut halves = Self { of_even: [[0.0; HALF]; HALF], of_odd: [[0.0; HALF]; HALF] };
         for i in 0..count.div_ceil(2) {
@@ -47,7 +46,7 @@ mod tests {
     use super::super::super::element::Element;
     use super::*;
 
-    /// The parts of `x`.
+    /// Returns the parts of `x`.
     fn parts(x: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let n = x.len();
         let even = (0..n.div_ceil(2)).map(|i| x[i] + x[n - 1 - i]).collect();

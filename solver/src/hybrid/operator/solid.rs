@@ -1,16 +1,16 @@
-//! The bone's share of the operator.
+//! The contribution of the bone to the operator.
 //!
 //! Displacements are taken along the principal axes of A33, where it is diagonal; masses are the
 //! same along all axes. With W the weights of integration, E = W⁻¹ Dᵀ W / J, and at the nodes of
-//! Gauss and Lobatto a sum by parts is exact: Dᵀ W = B - W D, where B is -1 at the lower end, 1 at
-//! the upper one and 0 elsewhere. So
+//! Gauss and Lobatto summation by parts is exact: Dᵀ W = B - W D, where B is -1 at the lower end, 1
+//! at the upper one and 0 elsewhere. So
 //!
 //! ```text
 //! u_tt = (-A33 E y + ik (A31 + A13) y - k² A11 u - ik A31 W⁻¹ B u / J) / ρ,
 //! ```
 //!
-//! and the last term is the same, but for its sign, in two elements that share a node: it remains on
-//! the faces of the bone only.
+//! and the last term is the same, except for its sign, in two elements that share a node: it
+//! remains only on the faces of the bone.
 
 use osteon_common::case::Bone;
 
@@ -38,8 +38,8 @@ pub(super) struct SolidLayer {
     slope: Halves,
     /// -E D / J.
     bend: Halves,
-    /// A33 / ρ, diagonal; like the next two halved, because the result is that of even and odd part,
-    /// added and subtracted.
+    /// A33 / ρ, diagonal. This and the next two are halved, because the even and odd parts of their
+    /// result are added and subtracted.
     a33: [f64; 3],
     /// (A31 + A13) / ρ.
     mixed: Matrix3,
@@ -101,8 +101,8 @@ impl SolidLayer {
         }
     }
 
-    /// `out` from `u`, whose first number has place `offset` in a state; no pressure acts. The
-    /// nodes on the faces are not shown to `sink`.
+    /// Computes `out` from `u`, whose first number is at `offset` in a state; no pressure acts. The
+    /// nodes on the faces are not passed to `sink`.
     #[inline(always)]
     pub(super) fn apply<V: Vector, S: Sink>(
         &self,
@@ -125,7 +125,7 @@ impl SolidLayer {
         self.edge(-k, &u[top], &mut out[top]);
     }
 
-    /// Elements of `N` nodes; 0 stands for any number.
+    /// Processes elements of `N` nodes; 0 stands for any number.
     #[inline(always)]
     fn elements<const N: usize, V: Vector, S: Sink>(
         &self,
@@ -162,7 +162,7 @@ impl SolidLayer {
         }
     }
 
-    /// Even and odd parts of number `c` of every node, of its slope and its bend.
+    /// Computes even and odd parts of number `c` of every node, of its slope and its bend.
     #[inline(always)]
     fn derivatives<const N: usize, V: Vector>(
         &self,
@@ -209,7 +209,7 @@ impl SolidLayer {
         }
     }
 
-    /// Accelerations of an element's nodes from even and odd parts.
+    /// Computes accelerations of an element's nodes from even and odd parts.
     #[inline(always)]
     fn forces<const N: usize, V: Vector>(
         &self,
@@ -235,7 +235,7 @@ impl SolidLayer {
         }
     }
 
-    /// Half of A33 z + ik (A31 + A13) y - k² A11 u, over ρ, of `[u, y, z]`.
+    /// Returns half of A33 z + ik (A31 + A13) y - k² A11 u, divided by ρ, of `[u, y, z]`.
     #[inline(always)]
     fn force<V: Vector>(
         &self,
@@ -263,7 +263,8 @@ impl SolidLayer {
         force
     }
 
-    /// Adds ik A31 u / (ρ w J), what sums by parts leave on the lower face; with -k, on the upper.
+    /// Adds ik A31 u / (ρ w J), the boundary term of the summation by parts at the lower face; with
+    /// -k, at the upper.
     #[inline(always)]
     fn edge(&self, k: Lanes, u: &Node, out: &mut Node) {
         for i in 0..3 {
@@ -276,14 +277,14 @@ impl SolidLayer {
     }
 }
 
-/// A_jl / ρ, (m/s)².
+/// Returns A_jl / ρ, (m/s)².
 fn block(bone: &Bone, j: usize, l: usize) -> Matrix3 {
     std::array::from_fn(|i| {
         std::array::from_fn(|m| bone.elasticity.component(i, j, m, l) / bone.density)
     })
 }
 
-/// Qᵀ `a` Q, the columns of Q being `axes`.
+/// Returns Qᵀ `a` Q, where the columns of Q are `axes`.
 fn turned(axes: &Matrix3, a: &Matrix3) -> Matrix3 {
     std::array::from_fn(|i| {
         std::array::from_fn(|m| {

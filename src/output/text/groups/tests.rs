@@ -3,7 +3,7 @@ use serde_json::{Value, json};
 use super::*;
 use crate::sample_result::put;
 
-/// The table of groups with these keys, and all others as where nothing is known.
+/// Returns the table of groups with these keys; all other keys are those of an unknown uncertainty.
 fn table(groups: &[Value]) -> String {
     let complete = json!({
         "cost": null,
