@@ -25,7 +25,7 @@ use crate::progress::say;
 use crate::request::Request;
 
 use self::parts::Parts;
-use self::peer::{Peer, unless_silent};
+use self::peer::{Peer, with_wait_notice};
 
 mod parts;
 mod peer;
@@ -208,7 +208,7 @@ impl Client {
             let credentials = loaded(files, endpoint).await?;
             let left = ANSWER_S_MAX - SILENCE_S_MAX;
             let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
-            unless_silent(Self::find(endpoint, &credentials), notice).await
+            with_wait_notice(Self::find(endpoint, &credentials), notice).await
         };
         let jobs = found.await.map_err(|error: ClientError| error.without(unused))?;
         Ok(Self { peer: Peer::new(remote), jobs })

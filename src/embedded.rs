@@ -26,7 +26,7 @@ const STORE_PATIENCE_S: u64 = 10;
 
 /// Storage of the coordinator's jobs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum StorePlace {
+pub(crate) enum StoreLocation {
     /// In memory: the jobs are lost when the process ends.
     Memory,
     /// In a directory, so that an interrupted run can be resumed.
@@ -46,7 +46,7 @@ impl Embedded {
     /// Starts coordinator and workers. `progress` increases whenever the workers have completed
     /// something.
     pub(crate) async fn start(
-        store: StorePlace,
+        store: StoreLocation,
         workers: u32,
         threads: u32,
         progress: Arc<AtomicU64>,
@@ -82,13 +82,13 @@ impl Embedded {
     }
 }
 
-async fn start_coordinator(store: StorePlace, socket: PathBuf) -> Result<Coordinator, Failure> {
+async fn start_coordinator(store: StoreLocation, socket: PathBuf) -> Result<Coordinator, Failure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(Failure::failed)?;
     let store: Box<dyn Store + Send> = match store {
-        StorePlace::Memory => Box::new(MemoryStore::new()),
+        StoreLocation::Memory => Box::new(MemoryStore::new()),
         // Lost jobs are accepted here: this process submits its job again, and it is recomputed.
-        StorePlace::Directory(path) => {
+        StoreLocation::Directory(path) => {
             let store = SqliteStore::open_with(&path, LostJobs::Accept);
             Box::new(store.map_err(Failure::failed)?)
         }

@@ -106,7 +106,7 @@ impl ResultsDirectory {
         path: &Path,
         specification: &JobSpecification,
     ) -> Result<Option<ResultFile>, Failure> {
-        Ok(Self::stored(path, specification)?.filter(|result| !verdict::may_end_otherwise(result)))
+        Ok(Self::stored(path, specification)?.filter(|result| !verdict::is_worth_repeating(result)))
     }
 
     /// Creates the directory, if necessary, and locks it. By then the stored files may have changed

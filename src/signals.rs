@@ -10,7 +10,7 @@ use crate::progress::say;
 
 /// Signals that follow the first one within this time count as part of it: some programs send a
 /// signal both to a process and to its group.
-const ONE_WISH: Duration = Duration::from_millis(300);
+const SIGNAL_DEBOUNCE: Duration = Duration::from_millis(300);
 /// A command that cannot stop, because nobody reads its output, is killed after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -88,7 +88,7 @@ pub(crate) async fn next(signals: &mut Option<Signal>) {
 
 /// Ends the process at the next SIGINT.
 async fn exit_at_the_next() {
-    tokio::time::sleep(ONE_WISH).await;
+    tokio::time::sleep(SIGNAL_DEBOUNCE).await;
     // Receives only signals sent after this point.
     if let Ok(mut interrupt) = signal(SignalKind::interrupt())
         && interrupt.recv().await.is_some()

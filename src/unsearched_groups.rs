@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use osteon_common::job::Data;
-use osteon_common::job_file::Noted;
+use osteon_common::job_file::JobWithWarnings;
 use osteon_common::visible;
 
 use crate::progress::say;
@@ -12,7 +12,7 @@ use crate::progress::say;
 const TOLD_MAX: usize = 10;
 
 /// Prints on stderr which groups of the job in the file `job` are not searched, and why.
-pub(crate) fn warn(job: &Path, noted: &Noted) {
+pub(crate) fn warn(job: &Path, noted: &JobWithWarnings) {
     let groups = noted.specification.data.as_ref().map_or(&[][..], Data::groups);
     let unsearched: Vec<_> =
         groups.iter().filter_map(|group| Some((group, group.no_variation()?))).collect();

@@ -26,7 +26,7 @@ pub(crate) fn is_cancelled(result: &ResultFile) -> bool {
 
 /// Returns whether running the job again may end otherwise: the run was cancelled, or failed
 /// because of the machines that it ran on.
-pub(crate) fn may_end_otherwise(result: &ResultFile) -> bool {
+pub(crate) fn is_worth_repeating(result: &ResultFile) -> bool {
     is_cancelled(result) || machine_failure(result).is_some()
 }
 

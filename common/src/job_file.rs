@@ -33,12 +33,12 @@ const BOUND: Bound = Bound {
 /// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
 /// once.
 pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
-    read_noting(path, kind).map(|noted| noted.specification)
+    read_with_warnings(path, kind).map(|noted| noted.specification)
 }
 
 /// A job, with warnings and notes about the file from which it was read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Noted {
+pub struct JobWithWarnings {
     /// The job.
     pub specification: JobSpecification,
     /// Warnings about values that are allowed but unusual.
@@ -51,10 +51,10 @@ pub struct Noted {
 ///
 /// # Errors
 /// Same as [`read`].
-pub fn read_noting(path: &Path, kind: JobKind) -> Result<Noted, FileError> {
+pub fn read_with_warnings(path: &Path, kind: JobKind) -> Result<JobWithWarnings, FileError> {
     let (text, format) = file_error::read(path, BOUND)?;
     let directory = path.parent().unwrap_or(Path::new(""));
-    parse_noting(&text, format, directory, kind)
+    parse_with_warnings(&text, format, directory, kind)
         .map_err(|content| FileError::Content { path: path.to_owned(), content })
 }
 
@@ -68,15 +68,15 @@ pub fn parse(
     directory: &Path,
     kind: JobKind,
 ) -> Result<JobSpecification, ContentError> {
-    parse_noting(text, format, directory, kind).map(|noted| noted.specification)
+    parse_with_warnings(text, format, directory, kind).map(|noted| noted.specification)
 }
 
-fn parse_noting(
+fn parse_with_warnings(
     text: &str,
     format: Format,
     directory: &Path,
     kind: JobKind,
-) -> Result<Noted, ContentError> {
+) -> Result<JobWithWarnings, ContentError> {
     let root = document::parse(file_error::without_byte_order_mark(text), format)?;
     let mut reader = Reader::default();
     let keys = [
@@ -111,7 +111,7 @@ fn parse_noting(
     }
     let warnings = plausible::job_warnings_from(&specification, origin.as_ref());
     let velocities_file = origin.map(|origin| origin.path().to_owned());
-    Ok(Noted { specification, warnings, velocities_file })
+    Ok(JobWithWarnings { specification, warnings, velocities_file })
 }
 
 /// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no

@@ -37,7 +37,7 @@ fn warnings(text: &str, more: &str) -> Vec<String> {
         include_str!("files/job.toml").replace(given, &format!("velocities = \"v.csv\"\n{more}"));
     let path = directory.path().join("job.toml");
     std::fs::write(&path, job).unwrap();
-    let warnings = job_file::read_noting(&path, JobKind::Identification).unwrap().warnings;
+    let warnings = job_file::read_with_warnings(&path, JobKind::Identification).unwrap().warnings;
     let shown = |warning: &Warning| {
         warning.to_string().replace(&*directory.path().to_string_lossy(), "DIR")
     };

@@ -26,7 +26,8 @@ fn ordinary_jobs_and_cases_are_silent() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
     for name in ["fast", "quick", "paper"] {
         let path = root.join(format!("{name}.toml"));
-        let warnings = job_file::read_noting(&path, JobKind::Identification).unwrap().warnings;
+        let warnings =
+            job_file::read_with_warnings(&path, JobKind::Identification).unwrap().warnings;
         assert_eq!(shown(&warnings), [""; 0], "{name}");
     }
     for name in ["A", "D", "G"] {

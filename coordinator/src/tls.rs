@@ -173,7 +173,7 @@ fn fault(error: &rustls::Error) -> Fault {
         Some(TlsFailure::UnknownAuthority) => Fault::UnknownAuthority,
         Some(TlsFailure::Expired) => Fault::Expired,
         Some(TlsFailure::NotYetValid) => Fault::NotYetValid,
-        Some(TlsFailure::OtherPurpose) => Fault::OtherUsage,
+        Some(TlsFailure::WrongPurpose) => Fault::OtherUsage,
         _ => Fault::Unusable,
     }
 }

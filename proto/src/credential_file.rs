@@ -222,7 +222,7 @@ pub struct Identity {
 /// If a file cannot be used.
 pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialError> {
     let chain = certificates(certificate)?;
-    in_its_time(certificate, &chain)?;
+    check_validity_dates(certificate, &chain)?;
     let private = private_key(key)?;
     let cannot = |source| CredentialError::Key { path: key.to_owned(), source };
     let provider = ring::default_provider();
@@ -328,7 +328,10 @@ fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
 
 /// Refuses a certificate whose dates the peer would refuse. Whether it is trusted is for the peer
 /// to decide: no trust anchor is given here, and the search for one comes after the check of dates.
-fn in_its_time(path: &Path, chain: &[CertificateDer<'static>]) -> Result<(), CredentialError> {
+fn check_validity_dates(
+    path: &Path,
+    chain: &[CertificateDer<'static>],
+) -> Result<(), CredentialError> {
     let path = || path.to_owned();
     let unusable = |source| CredentialError::Certificate { path: path(), source };
     let Some(first) = chain.first() else {

@@ -20,13 +20,13 @@ pub enum TlsFailure {
     NotYetValid,
     /// The peer's certificate is for another host name.
     #[error("its certificate is not for this host name; it is for {names}")]
-    OtherName {
+    WrongHostName {
         /// The names in the certificate.
         names: String,
     },
     /// The peer's certificate is not for this purpose.
     #[error("its certificate is not one for coordinators")]
-    OtherPurpose,
+    WrongPurpose,
     /// The peer does not speak TLS.
     #[error("it does not speak TLS; write http://HOST:PORT if that is meant")]
     NoTls,
@@ -68,15 +68,15 @@ impl TlsFailure {
             Certificate::UnknownIssuer | Certificate::BadSignature => Self::UnknownAuthority,
             Certificate::Expired | Certificate::ExpiredContext { .. } => Self::Expired,
             Certificate::NotValidYet | Certificate::NotValidYetContext { .. } => Self::NotYetValid,
-            Certificate::NotValidForName => Self::OtherName { names: "other names".to_owned() },
+            Certificate::NotValidForName => Self::WrongHostName { names: "other names".to_owned() },
             Certificate::NotValidForNameContext { presented, .. } if presented.is_empty() => {
-                Self::OtherName { names: "no name at all".to_owned() }
+                Self::WrongHostName { names: "no name at all".to_owned() }
             }
             Certificate::NotValidForNameContext { presented, .. } => {
-                Self::OtherName { names: presented.join(", ") }
+                Self::WrongHostName { names: presented.join(", ") }
             }
             Certificate::InvalidPurpose | Certificate::InvalidPurposeContext { .. } => {
-                Self::OtherPurpose
+                Self::WrongPurpose
             }
             _ => Self::Other(error.clone()),
         }

@@ -102,7 +102,7 @@ enum Purpose {
 
 /// The last refresh of the slopes, if the cost has not been halved since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Renewed {
+enum SlopeRefresh {
     No,
     Forgotten,
     Measured,
@@ -129,8 +129,8 @@ pub struct Newton {
     /// The cost to be halved, and the number of evaluations since it was.
     mark: f64,
     slow: u32,
-    renewed: Renewed,
-    cost_at_renewal: f64,
+    renewed: SlopeRefresh,
+    cost_at_refresh: f64,
     stop: Option<Stop>,
     evaluations: u64,
 }
@@ -154,8 +154,8 @@ impl Newton {
             radius: RADIUS_MAX,
             mark: f64::INFINITY,
             slow: 0,
-            renewed: Renewed::No,
-            cost_at_renewal: f64::INFINITY,
+            renewed: SlopeRefresh::No,
+            cost_at_refresh: f64::INFINITY,
             stop: None,
             evaluations: 0,
         };
@@ -271,7 +271,7 @@ impl Newton {
                 None => RADIUS_BLIND,
             };
             stalled |= self.slow >= SLOW_MAX || self.radius < shortest;
-            if stalled && !self.forget_slopes() {
+            if stalled && !self.reset_slopes() {
                 return;
             }
             let anchor = self.anchor();
@@ -304,26 +304,26 @@ impl Newton {
     /// Refreshes the slopes without an evaluation by resetting them. If that was already done, or
     /// changes nothing, starts to measure them; if that was done too, ends the search. In these two
     /// cases returns false: there is no step to choose now.
-    fn forget_slopes(&mut self) -> bool {
+    fn reset_slopes(&mut self) -> bool {
         let Some(base) = &self.base else {
             self.stop = Some(Stop::Infeasible);
             return false;
         };
-        if base.cost < PROGRESS * self.cost_at_renewal {
-            self.cost_at_renewal = base.cost;
-            self.renewed = Renewed::No;
+        if base.cost < PROGRESS * self.cost_at_refresh {
+            self.cost_at_refresh = base.cost;
+            self.renewed = SlopeRefresh::No;
         }
         self.radius = RADIUS_MAX;
         self.slow = 0;
-        if self.renewed == Renewed::No && self.model.forget_slopes() {
-            self.renewed = Renewed::Forgotten;
+        if self.renewed == SlopeRefresh::No && self.model.reset_slopes() {
+            self.renewed = SlopeRefresh::Forgotten;
             return true;
         }
-        if self.renewed == Renewed::Measured {
+        if self.renewed == SlopeRefresh::Measured {
             self.stop = Some(Stop::Settled);
             return false;
         }
-        self.renewed = Renewed::Measured;
+        self.renewed = SlopeRefresh::Measured;
         self.measure_from(0);
         false
     }

@@ -27,9 +27,9 @@ pub use self::ahead::same_point;
 
 mod advice;
 mod ahead;
+mod dataset_search;
 mod identification;
 mod method;
-mod one_set;
 mod reasons;
 #[cfg(test)]
 mod tests;
@@ -108,12 +108,12 @@ pub struct Search {
     outcomes: Option<Arc<[Outcome]>>,
     /// Assessment of the pending point, if it was made before its outcomes were passed to
     /// [`Search::tell`].
-    judged: Option<Judged>,
+    judged: Option<Assessment>,
 }
 
 /// Assessment of a point, computed from its outcomes.
 #[derive(Debug, Clone)]
-struct Judged {
+struct Assessment {
     outcomes: Arc<[Outcome]>,
     verdict: Verdict,
     /// `None` for a propagation.
@@ -199,7 +199,7 @@ impl Search {
             _ => self.judge(&point, &outcomes),
         };
         let mut row = Evaluation { estimated_error, ..self.row(point, &judged) };
-        let Judged { verdict, outcomes: told, .. } = judged;
+        let Assessment { verdict, outcomes: told, .. } = judged;
         match &mut self.plan {
             Plan::Identification(identification) => {
                 row = identification.tell(&self.specification, row, verdict, outcomes);
@@ -217,7 +217,7 @@ impl Search {
     }
 
     /// Computes moments and cost of the pending point from its outcomes.
-    fn judge(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Judged {
+    fn judge(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Assessment {
         let verdict = Verdict::of(&self.specification.monte_carlo, point, outcomes);
         let cost = match &self.plan {
             Plan::Identification(identification) => {
@@ -225,12 +225,12 @@ impl Search {
             }
             Plan::Propagation { .. } => None,
         };
-        Judged { outcomes: Arc::clone(outcomes), verdict, cost }
+        Assessment { outcomes: Arc::clone(outcomes), verdict, cost }
     }
 
     /// Returns the history row of the pending point with everything but its role and estimated
     /// error.
-    fn row(&self, point: Point, judged: &Judged) -> Evaluation {
+    fn row(&self, point: Point, judged: &Assessment) -> Evaluation {
         Evaluation {
             number: self.evaluations(),
             role: Role::default(),

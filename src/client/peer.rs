@@ -51,7 +51,7 @@ impl Peer {
             let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
             format!("no answer from {} yet; waiting for {left:.0} more seconds", self.endpoint)
         };
-        let answer = unless_silent(timeout(limit, call), notice).await;
+        let answer = with_wait_notice(timeout(limit, call), notice).await;
         let error = match answer {
             Ok(Ok(response)) => {
                 self.ever_answered = true;
@@ -125,7 +125,7 @@ fn hint(status: &Status) -> &'static str {
 }
 
 /// Waits for `call`; after a moment tells the user what is waited for.
-pub(super) async fn unless_silent<T>(
+pub(super) async fn with_wait_notice<T>(
     call: impl Future<Output = T>,
     notice: impl Fn() -> String,
 ) -> T {

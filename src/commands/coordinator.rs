@@ -64,7 +64,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
             tokio::select! {
                 _ = interruption.as_mut() => break Ok(Ending::Done),
                 failed = coordinator.failed() => break Err(Failure::failed(failed)),
-                () = signals::next(&mut reload) => read_again(&coordinator, &arguments, &address),
+                () = signals::next(&mut reload) => reload_credentials(&coordinator, &arguments, &address),
             }
         },
         Err(error) => Err(stdout_failure(error)),
@@ -77,7 +77,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
 }
 
 /// Reloads tokens and certificates; if any of them cannot be used, all stay as they are.
-fn read_again(
+fn reload_credentials(
     coordinator: &Coordinator,
     arguments: &CoordinatorArguments,
     address: &ListenAddress,

@@ -41,7 +41,7 @@ pub(super) async fn submit(
     format: Format,
 ) -> Result<Ending, Failure> {
     let Submission { job, kind, request, options } = submission;
-    let noted = job_file::read_noting(job, kind).map_err(Failure::bad_input)?;
+    let noted = job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
     unsearched_groups::warn(job, &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
     let mut client = Client::connect(coordinator).await?;

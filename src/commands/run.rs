@@ -13,7 +13,7 @@ use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
-use crate::embedded::{Embedded, StorePlace};
+use crate::embedded::{Embedded, StoreLocation};
 use crate::ending::{Ending, Failure, Interruption, stdout_failure};
 use crate::environment::Unused;
 use crate::output::{self, ShownResult};
@@ -26,7 +26,7 @@ use crate::{unsearched_groups, verdict, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
-    let noted = job_file::read_noting(&run.job, run.kind).map_err(Failure::bad_input)?;
+    let noted = job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
     let specification = &noted.specification;
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
@@ -148,8 +148,8 @@ async fn here(
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, Failure> {
-    let store =
-        directory.map_or(StorePlace::Memory, |directory| StorePlace::Directory(directory.store()));
+    let store = directory
+        .map_or(StoreLocation::Memory, |directory| StoreLocation::Directory(directory.store()));
     let progress = Arc::new(AtomicU64::new(0));
     let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
     let endpoint = embedded.endpoint().clone();

@@ -32,7 +32,7 @@ const LINES_KEPT_MAX: usize = 20;
 /// Longest line of a worker's stderr that is kept, bytes.
 const LINE_BYTES_MAX: u64 = 4096;
 /// Longest wait for the rest of a dead worker's stderr, ms.
-const LAST_WORDS_MS: u64 = 500;
+const STDERR_DRAIN_MS: u64 = 500;
 
 /// The worker processes; dropping this ends all of them.
 pub(crate) struct Workers {
@@ -189,7 +189,7 @@ async fn listen(number: u32, stderr: Option<impl AsyncRead + Unpin>) -> VecDeque
 }
 
 async fn last_words(words: tokio::task::JoinHandle<VecDeque<String>>) -> String {
-    match timeout(Duration::from_millis(LAST_WORDS_MS), words).await {
+    match timeout(Duration::from_millis(STDERR_DRAIN_MS), words).await {
         Ok(Ok(lines)) => lines.iter().map(|line| format!("\n  {line}")).collect(),
         _ => String::new(),
     }

@@ -83,7 +83,7 @@ fn what_lay_in_the_machines_may_end_otherwise() {
             "{{\"status\": \"{status}\", \"failure\": {failure}, \"reason\": \"{reason}\"}}"
         );
         let result = identification(&json);
-        assert_eq!(may_end_otherwise(&result), expected, "{json}");
+        assert_eq!(is_worth_repeating(&result), expected, "{json}");
         let failure = (status == "failed" && expected).then_some(reason);
         assert_eq!(machine_failure(&result), failure, "{json}");
     }

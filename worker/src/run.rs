@@ -181,13 +181,13 @@ impl Worker {
                 self.ever_answered = true;
                 responses
             }
-            Err(NotOpened::Unreachable(reason)) => return Ok(End::Lost(reason)),
-            Err(NotOpened::Distrust(failure)) => return self.distrusted(failure),
-            Err(NotOpened::Status(status)) => return self.ended_with(&status),
+            Err(OpenError::Unreachable(reason)) => return Ok(End::Lost(reason)),
+            Err(OpenError::Distrust(failure)) => return self.on_tls_failure(failure),
+            Err(OpenError::Status(status)) => return self.ended_with(&status),
         };
         let mut ticks = interval(Duration::from_millis(TICK_MS));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let greeted_by = Instant::now() + Duration::from_secs(ATTACH_S_MAX);
+        let hello_deadline = Instant::now() + Duration::from_secs(ATTACH_S_MAX);
         let mut draining = false;
         loop {
             let was_attached = self.state.is_attached();
@@ -227,7 +227,7 @@ impl Worker {
                 self.ever_attached = true;
                 info!(endpoint = %self.endpoint, worker = self.state.number(), "attached");
             }
-            if !self.state.is_attached() && Instant::now() > greeted_by {
+            if !self.state.is_attached() && Instant::now() > hello_deadline {
                 return Ok(End::Lost("the coordinator does not answer".to_owned()));
             }
         }
@@ -274,7 +274,7 @@ impl Worker {
         // Only errors of the transport have a source, so one without was sent by a coordinator.
         self.ever_answered |= std::error::Error::source(status).is_none();
         if let Some(failure) = TlsFailure::of(status) {
-            return self.distrusted(failure);
+            return self.on_tls_failure(failure);
         }
         let reason = self.endpoint.explained(status, self.ever_answered);
         match status.code() {
@@ -292,7 +292,7 @@ impl Worker {
 
     /// Handles a TLS failure. A worker that was attached before waits until the certificates are
     /// repaired; one that never was has the wrong ones and ends.
-    fn distrusted(&self, failure: TlsFailure) -> Result<End, WorkerError> {
+    fn on_tls_failure(&self, failure: TlsFailure) -> Result<End, WorkerError> {
         let endpoint = self.endpoint.clone();
         if self.ever_attached {
             return Ok(End::Lost(ConnectError::Tls { endpoint, failure }.to_string()));
@@ -311,7 +311,7 @@ impl Worker {
 }
 
 /// Reason why no stream was opened.
-enum NotOpened {
+enum OpenError {
     Unreachable(String),
     Distrust(TlsFailure),
     Status(Status),
@@ -324,20 +324,20 @@ async fn open(
     hello: Request,
     outbox: &mpsc::Sender<AttachRequest>,
     requests: mpsc::Receiver<AttachRequest>,
-) -> Result<Streaming<AttachResponse>, NotOpened> {
+) -> Result<Streaming<AttachResponse>, OpenError> {
     let limit = Duration::from_secs(ATTACH_S_MAX);
     let connected = endpoint::connect_with(endpoint, credentials, limit).await;
     let channel = connected.map_err(|error| match error {
-        ConnectError::Tls { failure, .. } => NotOpened::Distrust(failure),
-        other => NotOpened::Unreachable(other.to_string()),
+        ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
+        other => OpenError::Unreachable(other.to_string()),
     })?;
-    let unanswered = || NotOpened::Unreachable("the coordinator does not answer".to_owned());
+    let unanswered = || OpenError::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
     let mut client = endpoint::workers_client(channel);
     match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
-        Ok(Err(status)) => Err(NotOpened::Status(status)),
+        Ok(Err(status)) => Err(OpenError::Status(status)),
         Err(_) => Err(unanswered()),
     }
 }

@@ -130,7 +130,7 @@ impl Model {
 
     /// Resets the slopes, so that the Jacobian is the closed form's again. Returns whether this
     /// changed anything.
-    pub(super) fn forget_slopes(&mut self) -> bool {
+    pub(super) fn reset_slopes(&mut self) -> bool {
         let changed = self.slopes.iter().flatten().any(|slope| *slope != 0.0);
         self.slopes.iter_mut().flatten().for_each(|slope| *slope = 0.0);
         changed

@@ -23,7 +23,7 @@ impl Search {
     /// Returns the point that the search will ask for once it is given these outcomes of the
     /// pending point, followed by candidates after that one; at most `most` points, the most
     /// probable first. The assessment of the outcomes is cached until they are passed to `tell`.
-    pub fn likely_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
+    pub fn candidates_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
         let (Plan::Identification(identification), Step::Evaluate(point)) =
             (&self.plan, self.ask())
         else {

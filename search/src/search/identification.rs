@@ -9,7 +9,7 @@ use osteon_common::results::{Evaluation, GroupEnding, Status};
 use osteon_common::statistics::Verdict;
 
 use super::Ending;
-use super::one_set::OneSet;
+use super::dataset_search::DatasetSearch;
 
 /// State of an identification.
 #[derive(Debug, Clone)]
@@ -17,13 +17,13 @@ pub(super) struct Identification {
     /// Endings of the searches for the earlier sets.
     ended: Vec<GroupEnding>,
     /// The search for the current set; the last one when all have ended.
-    present: OneSet,
+    present: DatasetSearch,
 }
 
 impl Identification {
     /// Creates the identification of a specification that has data.
     pub(super) fn new(specification: &JobSpecification) -> Self {
-        let present = OneSet::new(specification, 0);
+        let present = DatasetSearch::new(specification, 0);
         let mut identification = Self { ended: Vec::new(), present };
         identification.begin_next(specification);
         identification
@@ -116,7 +116,7 @@ impl Identification {
                 return;
             }
             self.ended.push(ending.clone());
-            self.present = OneSet::new(specification, next);
+            self.present = DatasetSearch::new(specification, next);
         }
     }
 }

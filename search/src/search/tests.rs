@@ -346,7 +346,7 @@ fn only_what_is_told_counts_whatever_was_looked_at_before() {
     while let Step::Evaluate(point) = plain.ask() {
         let right = outcomes(&point);
         let wrong: Arc<[Outcome]> = right.iter().map(|v| v.map(|v| 1.1 * v)).collect();
-        looked.likely_after(&wrong, 3);
+        looked.candidates_after(&wrong, 3);
         looked.tell(right.clone(), ERRORS);
         plain.tell(right, ERRORS);
     }
@@ -361,7 +361,7 @@ fn where_a_search_goes_is_known_before_it_is_told() {
         while let Step::Evaluate(point) = search.ask() {
             let likely = search.likely(8);
             let outcomes = outcomes(&point);
-            let after = search.likely_after(&outcomes, 8);
+            let after = search.candidates_after(&outcomes, 8);
             assert!(likely.len() <= 8 && after.len() <= 8);
             assert!(likely.iter().all(|at| !same_point(at, &point)), "{point:?} is asked for");
             assert_eq!(search.ask(), Step::Evaluate(point), "a question changes nothing");

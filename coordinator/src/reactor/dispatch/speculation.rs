@@ -67,7 +67,7 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
 pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Arc<[Outcome]>) {
     let config = &turn.state.config;
     if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(config, job)) {
-        let candidates = job.search.likely_after(outcomes, CANDIDATES_MAX);
+        let candidates = job.search.candidates_after(outcomes, CANDIDATES_MAX);
         keep(turn, id, candidates);
     }
 }

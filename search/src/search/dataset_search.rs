@@ -22,7 +22,7 @@ const START_TRIES: u64 = 64;
 
 /// The search for one set of data.
 #[derive(Debug, Clone)]
-pub(super) struct OneSet {
+pub(super) struct DatasetSearch {
     /// Number of the set.
     set: u32,
     data: Moments,
@@ -49,7 +49,7 @@ struct Best {
     outcomes: Arc<[Outcome]>,
 }
 
-impl OneSet {
+impl DatasetSearch {
     /// Creates the search for set number `set` of the data.
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
         let given = specification.data.as_ref();
