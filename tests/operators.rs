@@ -299,7 +299,7 @@ fn tokens_and_certificates_are_read_again_at_sighup() {
     assert_eq!(code(&secure, "read"), Some(0));
     secure.process.signal("HUP");
     eventually("the token is withdrawn", || code(&secure, "read") == Some(1));
-    assert!(secure.client("read", &["jobs"]).stderr.contains("does not know the token"));
+    assert!(secure.client("read", &["jobs"]).stderr.contains("does not accept the token"));
     assert_eq!(code(&secure, "submit"), Some(0));
     // A list that cannot be used changes nothing, and the log gives the reason.
     write_tokens(&secure, "nonsense\n");

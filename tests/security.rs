@@ -191,7 +191,7 @@ async fn every_method_lets_in_whom_it_should_and_tells_the_others_why() {
             let (code, message) = match token {
                 _ if worker => (Code::Unauthenticated, "give --tls-cert and --tls-key"),
                 "none" => (Code::Unauthenticated, "give --token-file"),
-                "stranger" => (Code::Unauthenticated, "does not know the token"),
+                "stranger" => (Code::Unauthenticated, "does not accept the token"),
                 _ if allowed.contains(&"submit") => (
                     Code::PermissionDenied,
                     "`read-holder` has role read, and this needs role submit",

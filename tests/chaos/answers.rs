@@ -200,7 +200,7 @@ fn what_a_worker_answers_after_its_lease_changes_nothing() {
             }
         };
         assert_eq!(end.code(), Code::Aborted, "{end}");
-        assert!(end.message().contains("nothing was heard"), "{end}");
+        assert!(end.message().contains("no message came"), "{end}");
         let mut peer = Peer::attach(&url, hello(1)).await.unwrap();
         peer.answer(batch, &peer::lie(&work)).await;
         peer.batch().await.unwrap();
