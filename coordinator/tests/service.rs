@@ -435,8 +435,7 @@ async fn who_cancels_a_job_whose_end_the_store_refuses_is_told_so() {
     let cancel = client.cancel(CancelRequest { job: job.clone() });
     let told = tokio::time::timeout(TIMEOUT, cancel).await.unwrap().unwrap_err();
     assert_eq!(told.code(), Code::Unavailable, "{told}");
-    let expected =
-        format!("job {job} is cancelled, and has not ended yet: the store does not take");
+    let expected = format!("job {job} is cancelled, and has not ended yet: the store cannot write");
     assert!(told.message().starts_with(&expected), "{told}");
     assert!(told.message().contains("the disk is full"), "{told}");
     coordinator.shutdown().await;

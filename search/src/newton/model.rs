@@ -2,7 +2,9 @@
 //!
 //! The model's logarithms of mean velocity and coefficient of variation at x are
 //!
-//!     y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ),
+//! ```text
+//! y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ),
+//! ```
 //!
 //! where the offset e makes y exact at the evaluated point x_k, and the slopes E are learnt from
 //! the other evaluations. The Jacobian is that of s plus E: structured Broyden (Dennis and Walker,
