@@ -109,7 +109,7 @@ impl ResultFile {
         }
     }
 
-    /// What was found for each group of the data; empty where the data are no groups.
+    /// Returns the result of each group of the data; empty where the data are not grouped.
     pub fn groups(&self) -> &[Group] {
         match self {
             Self::Identification(found) => found.groups.as_deref().unwrap_or_default(),

@@ -1,4 +1,4 @@
-//! What the data determine and what they leave open.
+//! Types of the conclusions: quantities that the data determine, and directions they leave open.
 
 use std::collections::BTreeMap;
 

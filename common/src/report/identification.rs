@@ -94,7 +94,7 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// What the data determine, where the derivatives were measured.
+    /// Returns the quantities that the data determine, where the derivatives were measured.
     pub fn identified(&self) -> Option<&Identified> {
         self.identified.as_ref()?.as_ref()
     }
