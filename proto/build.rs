@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use prost::Message as _;
+use tonic_prost_build::Config;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let files = ["specification", "results", "jobs", "workers"];
@@ -15,6 +16,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let descriptors = protox::compile(files, ["."])?;
     let out_dir = PathBuf::from(env::var("OUT_DIR")?);
     fs::write(out_dir.join("osteon.v1.bin"), descriptors.encode_to_vec())?;
-    tonic_prost_build::configure().compile_fds(descriptors)?;
+    let mut config = Config::new();
+    config.enable_type_names();
+    tonic_prost_build::configure().compile_fds_with_config(descriptors, config)?;
     Ok(())
 }

@@ -6,11 +6,11 @@
 use osteon_common::case::{Bone, Setup};
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::plausible::Warning;
 use osteon_common::reach::{self, Reach};
 use osteon_common::results::Moments;
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
+use osteon_common::warnings::Warning;
 use osteon_solver::{Failure, Solver, Workspace};
 
 use crate::progress::say;

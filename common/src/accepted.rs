@@ -22,11 +22,11 @@ enum Edge {
 
 /// A range of whole numbers, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct WholeRange {
+pub struct WholeRange {
     /// Smallest accepted number.
-    pub(crate) min: u64,
+    pub min: u64,
     /// Largest accepted number.
-    pub(crate) max: u64,
+    pub max: u64,
 }
 
 impl Interval {
@@ -77,6 +77,11 @@ impl Interval {
             Parameter::TransversePoissonRatio => Self::between(-1.0, 1.0, ""),
             Parameter::Dispersion => Self::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
         }
+    }
+
+    /// Returns the unit, or what the numbers are fractions of; empty for pure numbers.
+    pub(crate) const fn unit(&self) -> &'static str {
+        self.unit
     }
 
     /// Returns whether `value` is finite and inside the interval.

@@ -1,6 +1,7 @@
 //! One deterministic problem: layers, probe, criterion, solver, and one bone.
 
 use crate::elasticity::Elasticity;
+use crate::fields::Section;
 use crate::layers::Layers;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
@@ -19,10 +20,22 @@ pub struct Setup {
     pub solver: SolverSettings,
 }
 
+impl Setup {
+    /// Returns each section with its name in a file, in the order of a canonical file.
+    pub fn sections(&mut self) -> [(&'static str, &mut dyn Section); 4] {
+        [
+            ("layers", &mut self.layers),
+            ("probe", &mut self.probe),
+            ("picking", &mut self.picking),
+            ("solver", &mut self.solver),
+        ]
+    }
+}
+
 /// The bone's material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
-    /// Returns the mass density ρ, kg/m³.
+    /// Mass density ρ, kg/m³.
     pub density: f64,
     /// Elasticity, Pa.
     pub elasticity: Elasticity,

@@ -8,11 +8,11 @@ use crate::check;
 use crate::document::{self, Format, Node, Value, element_path};
 use crate::elasticity::{Elasticity, EngineeringConstants};
 use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::job_file;
 use crate::limits;
 use crate::parameters::Parameter;
-use crate::plausible::Quantity;
+use crate::plausible::PlausibleRange;
 use crate::reader::{Reader, Table};
-use crate::setup_section;
 
 pub use crate::toml_text::case as to_toml;
 
@@ -50,7 +50,7 @@ pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
     if !table.is_table() {
         return Err(reader.refuse(&root).into());
     }
-    let setup = setup_section::read(&mut reader, &table);
+    let setup = job_file::setup(&mut reader, &table);
     let bone = bone(&mut reader, &table);
     check::setup(&setup, &mut reader.violations);
     match bone {
@@ -115,7 +115,7 @@ fn required(
     let value = reader.number(table, key)?;
     let path = table.path(key);
     if typed {
-        let kind = Quantity::of(parameter);
+        let kind = PlausibleRange::of(parameter);
         check::quantity(&path, value, accepted, &kind, &mut reader.violations);
     } else {
         check::number(&path, value, accepted, &mut reader.violations);

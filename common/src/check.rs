@@ -4,22 +4,18 @@
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
 mod job;
+mod section;
 mod setup;
-mod solver;
 
 use crate::accepted::{Interval, WholeRange};
 use crate::job::JobSpecification;
-use crate::plausible::Quantity;
+use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
-pub(crate) use self::job::{
-    DATA_FORMS, EVALUATIONS, REALIZATIONS, SCRAMBLES, SEED, STARTS, VELOCITIES_MIN, VELOCITY,
-    job_from, no_data,
-};
+pub(crate) use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, job_from, no_data};
 pub use self::job::{data, job};
+use self::section::section;
 pub use self::setup::setup;
-pub use self::solver::{HYBRID_KEYS, of_hybrid_only};
-pub(crate) use self::{setup::RECEIVERS, solver::ELEMENT_ORDER};
 
 impl JobSpecification {
     /// Returns all violations of the specification, each with its field named as in a job file.
@@ -43,7 +39,7 @@ pub(crate) fn quantity(
     field: &str,
     value: f64,
     accepted: Interval,
-    quantity: &Quantity,
+    quantity: &PlausibleRange,
     violations: &mut Violations,
 ) {
     if known_wrong(field, violations) {
@@ -60,7 +56,7 @@ pub(crate) fn quantity(
 }
 
 /// Records a whole number outside `accepted`, unless `field` is known to be wrong.
-pub(crate) fn whole(field: &str, value: u64, accepted: WholeRange, violations: &mut Violations) {
+fn whole(field: &str, value: u64, accepted: WholeRange, violations: &mut Violations) {
     if !known_wrong(field, violations) && !accepted.contains(value) {
         violations.add(field, accepted.refusal(&value));
     }

@@ -1,12 +1,12 @@
 //! The specification of a job: everything that its result depends on.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Setup;
-use crate::germ_source::{GermScheme, GermSource};
 use crate::parameters::{Parameter, Point};
+
+pub use crate::monte_carlo::{MonteCarlo, Sampling};
+pub use crate::search_settings::{Objective, Prior, Search, SearchMethod};
 
 /// Kind of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,7 +122,7 @@ impl Data {
     }
 }
 
-/// Returns the range of one parameter.
+/// The range of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// Held at a value.
@@ -162,188 +162,6 @@ impl Range {
             Self::Fixed(value) => value,
             Self::Free { start, .. } => start,
         }
-    }
-}
-
-/// Method of drawing realizations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Sampling {
-    /// Independent germs, one ChaCha stream per realization.
-    #[default]
-    MonteCarlo,
-    /// Scrambled Sobol' points.
-    Sobol,
-}
-
-impl Sampling {
-    /// All methods, in the order of a user's file.
-    pub const ALL: [Self; 2] = [Self::MonteCarlo, Self::Sobol];
-
-    /// Returns the name used in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MonteCarlo => "monte_carlo",
-            Self::Sobol => "sobol",
-        }
-    }
-}
-
-/// Settings of the Monte Carlo loop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MonteCarlo {
-    /// Realizations of each evaluation, 1 to 10⁷.
-    pub realizations: u64,
-    /// Seed of the germs, 0 to 2⁶³-1.
-    pub seed: u64,
-    /// Method of drawing the germs.
-    pub sampling: Sampling,
-    /// Number of independent scrambles of the Sobol' points, among which the realizations are
-    /// divided evenly: 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for
-    /// independent germs.
-    pub scrambles: u64,
-    /// Whether the moments are corrected by the control variate √(c1111/ρ), whose moments under the
-    /// law are known.
-    pub control_variate: bool,
-    /// Largest fraction of failures with which an evaluation is feasible; 0 to 1.
-    pub max_failed_fraction: f64,
-}
-
-impl Default for MonteCarlo {
-    fn default() -> Self {
-        Self {
-            realizations: 2747,
-            seed: 1,
-            sampling: Sampling::MonteCarlo,
-            scrambles: 1,
-            control_variate: false,
-            max_failed_fraction: 0.01,
-        }
-    }
-}
-
-impl MonteCarlo {
-    /// Returns the source of the germs.
-    pub fn germs(&self) -> GermSource {
-        let scheme = match self.sampling {
-            Sampling::MonteCarlo => GermScheme::Streams,
-            Sampling::Sobol => GermScheme::Sobol { points: self.points() },
-        };
-        GermSource { seed: self.seed, scheme }
-    }
-
-    /// Returns the number of realizations of each scramble.
-    pub fn points(&self) -> u64 {
-        self.realizations / self.scrambles.max(1)
-    }
-}
-
-/// The function to be minimised.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Objective {
-    /// The paper's cost: relative squared errors of mean and coefficient of variation.
-    #[default]
-    Moments,
-    /// Minus the mean log likelihood of the measured velocities under the law of the model's
-    /// velocities.
-    Likelihood,
-}
-
-impl Objective {
-    /// All objectives, in the order of a user's file.
-    pub const ALL: [Self; 2] = [Self::Moments, Self::Likelihood];
-
-    /// Returns the name used in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Moments => "moments",
-            Self::Likelihood => "likelihood",
-        }
-    }
-}
-
-/// Method of the search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SearchMethod {
-    /// The Nelder-Mead simplex, the paper's method.
-    #[default]
-    Simplex,
-    /// Minimum-norm Gauss-Newton steps with Broyden's updates.
-    Newton,
-}
-
-impl SearchMethod {
-    /// All methods, in the order of a user's file.
-    pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
-
-    /// Returns the name used in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Simplex => "simplex",
-            Self::Newton => "newton",
-        }
-    }
-}
-
-/// A value towards which a free parameter is pulled.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Prior {
-    /// The value, within the parameter's bounds, in its unit.
-    pub value: f64,
-    /// Increase of the cost if the parameter is off by the whole width of its bounds, above 0; for
-    /// smaller distances it decreases with their square.
-    pub weight: f64,
-}
-
-/// Settings of the search loop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search {
-    /// Method of the search.
-    pub method: SearchMethod,
-    /// Maximum number of evaluations (points whose realizations are computed).
-    pub max_evaluations: u64,
-    /// The search ends when the best cost is at most this; not used for a likelihood, whose lowest
-    /// cost is unknown beforehand.
-    pub cost_tolerance: f64,
-    /// The search ends when the simplex, or a step without sufficient gain, is at most this large,
-    /// as a fraction of the box.
-    pub size_tolerance: f64,
-    /// Edge of the first simplex, as a fraction of the box; not used by other methods.
-    pub initial_step: f64,
-    /// Number of searches of each set of data: the first begins at the start of the parameters, the
-    /// others at random points of the box; 1 to [`crate::limits::STARTS_MAX`].
-    pub starts: u64,
-    /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
-    /// free parameter.
-    pub sensitivities: bool,
-    /// Values towards which the free ones of [`Parameter::ALL`] are pulled, in that order.
-    pub priors: [Option<Prior>; 7],
-}
-
-impl Search {
-    /// Returns the default settings of a method.
-    pub fn by(method: SearchMethod) -> Self {
-        Self {
-            method,
-            max_evaluations: 400,
-            cost_tolerance: match method {
-                SearchMethod::Simplex => 1e-10,
-                SearchMethod::Newton => 1e-12,
-            },
-            size_tolerance: 1e-5,
-            initial_step: 0.15,
-            starts: 1,
-            sensitivities: true,
-            priors: [None; 7],
-        }
-    }
-}
-
-impl Default for Search {
-    fn default() -> Self {
-        Self::by(SearchMethod::default())
     }
 }
 

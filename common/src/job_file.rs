@@ -1,20 +1,20 @@
 //! Job files: the specification of a job, in TOML or JSON.
 
 mod data_section;
-mod run_sections;
+mod priors;
 
 use std::path::{Path, PathBuf};
 use std::slice;
 
+use crate::case::Setup;
 use crate::check;
 use crate::document::{self, Format};
 use crate::file_error::{self, Bound, ContentError, FileError};
-use crate::job::{JobKind, JobSpecification, Range};
+use crate::job::{JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use crate::limits;
 use crate::parameters::Parameter;
-use crate::plausible::{self, Warning};
-use crate::reader::{Reader, Table};
-use crate::setup_section;
+use crate::reader::{self, Reader, Table};
+use crate::warnings::{self, Warning};
 
 pub use crate::toml_text::job as to_toml;
 
@@ -94,24 +94,57 @@ fn parse_with_warnings(
     if !table.is_table() {
         return Err(reader.refuse(&root).into());
     }
-    let setup = setup_section::read(&mut reader, &table);
+    let setup = setup(&mut reader, &table);
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let specification = JobSpecification {
         kind,
         setup,
         data,
         parameters: parameters(&mut reader, &table),
-        monte_carlo: run_sections::monte_carlo(&mut reader, &table),
-        objective: run_sections::objective(&mut reader, &table),
-        search: run_sections::search(&mut reader, &table),
+        monte_carlo: monte_carlo(&mut reader, &table),
+        objective: objective(&mut reader, &table),
+        search: search(&mut reader, &table),
     };
     check::job_from(&specification, origin.as_ref(), &mut reader.violations);
     if !reader.violations.is_empty() {
         return Err(reader.refuse(&root).into());
     }
-    let warnings = plausible::job_warnings_from(&specification, origin.as_ref());
+    let warnings = warnings::job_warnings_from(&specification, origin.as_ref());
     let velocities_file = origin.map(|origin| origin.path().to_owned());
     Ok(JobWithWarnings { specification, warnings, velocities_file })
+}
+
+/// Reads the sections that case and job files share.
+pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>) -> Setup {
+    let mut setup = Setup::default();
+    for (name, section) in setup.sections() {
+        reader::section(reader, root, name, section);
+    }
+    setup
+}
+
+fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
+    let mut monte_carlo = MonteCarlo::default();
+    let table = reader::section(reader, root, "monte_carlo", &mut monte_carlo);
+    // If these are misspelt, the scrambles cannot be checked against them, and only the misspelling
+    // is reported.
+    if ["realizations", "sampling"].iter().any(|key| reader.is_misspelt(&table, key)) {
+        monte_carlo.scrambles = MonteCarlo::default().scrambles;
+    }
+    monte_carlo
+}
+
+fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
+    let mut objective = Objective::default();
+    reader::section(reader, root, "objective", &mut objective);
+    objective
+}
+
+fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
+    let mut search = Search::default();
+    let table = reader::section(reader, root, "search", &mut search);
+    search.priors = priors::read(reader, &table);
+    search
 }
 
 /// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no

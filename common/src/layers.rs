@@ -1,5 +1,8 @@
 //! The three layers: coupling fluid, cortical bone, marrow.
 
+use crate::fields::{Fields, Key, Number, Section};
+use crate::plausible::{BONE_THICKNESS, FLUID_DENSITY, FLUID_THICKNESS, SOUND_SPEED};
+
 /// A fluid layer, unbounded along x1 and x2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
@@ -29,5 +32,41 @@ impl Default for Layers {
     fn default() -> Self {
         let water = Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0 };
         Self { coupling: water, bone_thickness: 4e-3, marrow: water }
+    }
+}
+
+impl Section for Layers {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let coupling = "the fluid above the bone, in which source and receivers lie";
+        fields.table(Key { name: "coupling", meaning: coupling }, &mut |fields| {
+            self.coupling.declare(fields);
+        });
+        fields.table(Key { name: "bone", meaning: "the cortical bone" }, &mut |fields| {
+            let key = Key { name: "thickness", meaning: "thickness of the bone" };
+            fields.number(key, &mut self.bone_thickness, Number::above_zero(&BONE_THICKNESS));
+        });
+        fields.table(Key { name: "marrow", meaning: "the fluid below the bone" }, &mut |fields| {
+            self.marrow.declare(fields);
+        });
+    }
+}
+
+impl Section for Fluid {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        fields.number(
+            Key { name: "thickness", meaning: "thickness of the layer" },
+            &mut self.thickness,
+            Number::above_zero(&FLUID_THICKNESS),
+        );
+        fields.number(
+            Key { name: "density", meaning: "mass density" },
+            &mut self.density,
+            Number::above_zero(&FLUID_DENSITY),
+        );
+        fields.number(
+            Key { name: "sound_speed", meaning: "speed of sound" },
+            &mut self.sound_speed,
+            Number::above_zero(&SOUND_SPEED),
+        );
     }
 }

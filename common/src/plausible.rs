@@ -2,15 +2,10 @@
 //! units that people write instead of the required one.
 //!
 //! A physically impossible number is refused if one of these units explains it; one that is only
-//! unusual is accepted with a [warning](Warning).
-
-mod warnings;
+//! unusual is accepted with a [warning](crate::warnings::Warning).
 
 use crate::accepted::Interval;
 use crate::parameters::Parameter;
-
-pub(crate) use self::warnings::job_warnings_from;
-pub use self::warnings::{Warning, case_warnings, job_warnings};
 
 /// A unit that people use instead of the required one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +18,7 @@ pub(crate) struct OtherUnit {
 
 /// Prior knowledge about one kind of number. All of it refers to values above 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Quantity {
+pub struct PlausibleRange {
     /// The required unit; empty for pure numbers.
     pub(crate) unit: &'static str,
     /// Typical value: if several units explain a number, the one that brings it nearest to this is
@@ -52,7 +47,7 @@ const PER_CENT: &[OtherUnit] = &[other("%", -2)];
 const DENSITIES: &[OtherUnit] = &[other("g/cm³", 3)];
 
 /// A measured velocity of the first arriving signal.
-pub(crate) const VELOCITY: Quantity = Quantity {
+pub(crate) const VELOCITY: PlausibleRange = PlausibleRange {
     unit: "m/s",
     typical: 4000.0,
     usual: (1000.0, 8000.0),
@@ -60,10 +55,15 @@ pub(crate) const VELOCITY: Quantity = Quantity {
     units: SPEEDS,
 };
 /// The coefficient of variation of measured velocities.
-pub(crate) const VARIATION: Quantity =
-    Quantity { unit: "", typical: 0.03, usual: (1e-4, 0.5), possible: (0.0, 1.0), units: PER_CENT };
+pub(crate) const VARIATION: PlausibleRange = PlausibleRange {
+    unit: "",
+    typical: 0.03,
+    usual: (1e-4, 0.5),
+    possible: (0.0, 1.0),
+    units: PER_CENT,
+};
 /// Thickness of the bone.
-pub(crate) const BONE_THICKNESS: Quantity = Quantity {
+pub(crate) const BONE_THICKNESS: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 4e-3,
     usual: (0.2e-3, 30e-3),
@@ -71,7 +71,7 @@ pub(crate) const BONE_THICKNESS: Quantity = Quantity {
     units: LENGTHS,
 };
 /// Thickness of a fluid. A layer that is far too thick has no echo and does no harm.
-pub(crate) const FLUID_THICKNESS: Quantity = Quantity {
+pub(crate) const FLUID_THICKNESS: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 10e-3,
     usual: (0.0, 0.3),
@@ -79,7 +79,7 @@ pub(crate) const FLUID_THICKNESS: Quantity = Quantity {
     units: LENGTHS,
 };
 /// Density of a fluid; a very small one represents a vacuum.
-pub(crate) const FLUID_DENSITY: Quantity = Quantity {
+pub(crate) const FLUID_DENSITY: PlausibleRange = PlausibleRange {
     unit: "kg/m³",
     typical: 1000.0,
     usual: (100.0, 15_000.0),
@@ -87,7 +87,7 @@ pub(crate) const FLUID_DENSITY: Quantity = Quantity {
     units: DENSITIES,
 };
 /// Speed of sound in a fluid.
-pub(crate) const SOUND_SPEED: Quantity = Quantity {
+pub(crate) const SOUND_SPEED: PlausibleRange = PlausibleRange {
     unit: "m/s",
     typical: 1500.0,
     usual: (300.0, 3500.0),
@@ -95,7 +95,7 @@ pub(crate) const SOUND_SPEED: Quantity = Quantity {
     units: SPEEDS,
 };
 /// Centre frequency of the pulse.
-pub(crate) const FREQUENCY: Quantity = Quantity {
+pub(crate) const FREQUENCY: PlausibleRange = PlausibleRange {
     unit: "Hz",
     typical: 1e6,
     usual: (20e3, 20e6),
@@ -103,7 +103,7 @@ pub(crate) const FREQUENCY: Quantity = Quantity {
     units: &[other("MHz", 6), other("kHz", 3)],
 };
 /// Height of source or receivers above the bone.
-pub(crate) const HEIGHT: Quantity = Quantity {
+pub(crate) const HEIGHT: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 2e-3,
     usual: (0.0, 50e-3),
@@ -111,7 +111,7 @@ pub(crate) const HEIGHT: Quantity = Quantity {
     units: &[other("mm", -3)],
 };
 /// Distance of the first receiver from the source, along the bone.
-pub(crate) const DISTANCE: Quantity = Quantity {
+pub(crate) const DISTANCE: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 15e-3,
     usual: (1e-3, 0.5),
@@ -119,7 +119,7 @@ pub(crate) const DISTANCE: Quantity = Quantity {
     units: LENGTHS,
 };
 /// Distance of neighbouring receivers.
-pub(crate) const PITCH: Quantity = Quantity {
+pub(crate) const PITCH: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 1e-3,
     usual: (50e-6, 20e-3),
@@ -127,7 +127,7 @@ pub(crate) const PITCH: Quantity = Quantity {
     units: LENGTHS,
 };
 /// Size of the hybrid method's elements.
-pub(crate) const ELEMENT_SIZE: Quantity = Quantity {
+pub(crate) const ELEMENT_SIZE: PlausibleRange = PlausibleRange {
     unit: "m",
     typical: 0.5e-3,
     usual: (0.0, 10e-3),
@@ -135,14 +135,15 @@ pub(crate) const ELEMENT_SIZE: Quantity = Quantity {
     units: LENGTHS,
 };
 /// Time step of the hybrid method. A step that is far too long fails at once.
-pub(crate) const TIME_STEP: Quantity = Quantity {
+pub(crate) const TIME_STEP: PlausibleRange = PlausibleRange {
     unit: "s",
     typical: 1e-8,
     usual: (1e-12, 1e-6),
     possible: (0.0, f64::INFINITY),
     units: &[other("ns", -9), other("µs", -6)],
 };
-const DENSITY: Quantity = Quantity {
+/// Density of the bone.
+pub(crate) const DENSITY: PlausibleRange = PlausibleRange {
     unit: "kg/m³",
     typical: 1800.0,
     usual: (300.0, 6000.0),
@@ -150,19 +151,29 @@ const DENSITY: Quantity = Quantity {
     units: DENSITIES,
 };
 /// Young and shear moduli.
-pub(crate) const MODULUS: Quantity = Quantity {
+pub(crate) const MODULUS: PlausibleRange = PlausibleRange {
     unit: "Pa",
     typical: 10e9,
     usual: (100e6, 1e12),
     possible: (1e6, f64::INFINITY),
     units: &[other("GPa", 9), other("MPa", 6)],
 };
-const POISSON_RATIO: Quantity =
-    Quantity { unit: "", typical: 0.35, usual: (-0.5, 1.0), possible: (0.0, 5.0), units: PER_CENT };
-const DISPERSION: Quantity =
-    Quantity { unit: "", typical: 0.1, usual: (2e-3, 0.7), possible: (0.0, 1.0), units: PER_CENT };
+const POISSON_RATIO: PlausibleRange = PlausibleRange {
+    unit: "",
+    typical: 0.35,
+    usual: (-0.5, 1.0),
+    possible: (0.0, 5.0),
+    units: PER_CENT,
+};
+const DISPERSION: PlausibleRange = PlausibleRange {
+    unit: "",
+    typical: 0.1,
+    usual: (2e-3, 0.7),
+    possible: (0.0, 1.0),
+    units: PER_CENT,
+};
 
-impl Quantity {
+impl PlausibleRange {
     /// Returns the prior knowledge about a parameter of the mean model, or the dispersion.
     pub(crate) fn of(parameter: Parameter) -> Self {
         match parameter {

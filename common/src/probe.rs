@@ -1,5 +1,12 @@
 //! The axial-transmission probe: one line source, a row of receivers, one pulse.
 
+use crate::accepted::{Interval, WholeRange};
+use crate::fields::{Fields, Key, Number, Section};
+use crate::limits::{RECEIVERS_MAX, RECEIVERS_MIN};
+use crate::plausible::{FREQUENCY, HEIGHT, PITCH};
+
+const RECEIVERS: WholeRange = WholeRange::new(RECEIVERS_MIN as u64, RECEIVERS_MAX as u64);
+
 /// A line source, invariant along x2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
@@ -61,5 +68,71 @@ impl Default for Probe {
             source: Source { x1: 0.0, x3: 2e-3 },
             receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
         }
+    }
+}
+
+impl Section for Probe {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        fields.number(
+            Key { name: "center_frequency", meaning: "centre frequency fc of the pulse" },
+            &mut self.center_frequency,
+            Number::above_zero(&FREQUENCY),
+        );
+        fields.number(
+            Key { name: "amplitude", meaning: "amplitude F1 of the pulse" },
+            &mut self.amplitude,
+            Number::within(Interval::above(0.0, "N")),
+        );
+        let source = "the line source; inside the coupling fluid";
+        fields.table(Key { name: "source", meaning: source }, &mut |fields| {
+            self.source.declare(fields);
+        });
+        let receivers = "the receivers; all on one side of the source, inside the coupling fluid";
+        fields.table(Key { name: "receivers", meaning: receivers }, &mut |fields| {
+            self.receivers.declare(fields);
+        });
+    }
+}
+
+/// Positions along the bone: only differences matter.
+const ANYWHERE: Number = Number::within(Interval::finite("m"));
+
+impl Section for Source {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        fields.number(
+            Key { name: "x1", meaning: "position along the bone" },
+            &mut self.x1,
+            ANYWHERE,
+        );
+        fields.number(
+            Key { name: "x3", meaning: "height above the bone" },
+            &mut self.x3,
+            Number::above_zero(&HEIGHT),
+        );
+    }
+}
+
+impl Section for Receivers {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        fields.number(
+            Key { name: "first_x1", meaning: "position of the first receiver along the bone" },
+            &mut self.first_x1,
+            ANYWHERE,
+        );
+        fields.number(
+            Key { name: "pitch", meaning: "distance between neighbours" },
+            &mut self.pitch,
+            Number::above_zero(&PITCH),
+        );
+        fields.whole(
+            Key { name: "count", meaning: "number of receivers" },
+            &mut self.count,
+            RECEIVERS,
+        );
+        fields.number(
+            Key { name: "x3", meaning: "height above the bone" },
+            &mut self.x3,
+            Number::above_zero(&HEIGHT),
+        );
     }
 }

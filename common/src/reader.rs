@@ -3,13 +3,18 @@
 //! Ranges of numbers are not checked here but in [`crate::check`], which also serves specifications
 //! that do not come from a file.
 
+mod section;
+
 use std::fmt;
 use std::slice;
 
 use crate::accepted::WholeRange;
 use crate::document::{Node, Value, element_path, entry_path, quoted};
+use crate::fields::Choice;
 use crate::file_error::Invalid;
 use crate::violations::{Violation, Violations};
+
+pub(crate) use self::section::section;
 
 /// Maximum number of violations reported for one list, and of unknown keys for one table.
 const REPORTED_MAX: usize = 10;
@@ -31,17 +36,6 @@ pub(crate) struct Table<'a> {
     path: String,
     entries: &'a [(String, Node)],
     is_table: bool,
-}
-
-/// A closed set of names that a key may have as its value.
-#[derive(Debug)]
-pub(crate) struct Choice<'c, T> {
-    /// All values.
-    pub(crate) all: &'c [T],
-    /// Returns the name of a value in a file.
-    pub(crate) name: fn(T) -> &'static str,
-    /// Names that the file format defines but this version does not support.
-    pub(crate) reserved: &'c [&'static str],
 }
 
 impl<'a> Table<'a> {
@@ -178,29 +172,18 @@ impl Reader {
         Some(truth)
     }
 
-    /// Reads the choice that the string `key` names.
-    pub(crate) fn choice<T: Copy>(
-        &mut self,
-        table: &Table<'_>,
-        key: &str,
-        choice: &Choice<'_, T>,
-    ) -> Option<T> {
-        let names: Vec<_> =
-            choice.all.iter().map(|&item| format!("\"{}\"", (choice.name)(item))).collect();
+    /// Sets `field` to the choice that the string `key` names.
+    pub(crate) fn choice(&mut self, table: &Table<'_>, key: &str, field: &mut dyn Choice) {
+        let names: Vec<_> = field.names().iter().map(|name| format!("\"{name}\"")).collect();
         let names = names.join(" or ");
-        let node = table.get(key)?;
+        let Some(node) = table.get(key) else { return };
         let Value::Text(text) = &node.value else {
-            self.wrong_type(table.path(key), &names, &node.value);
-            return None;
+            return self.wrong_type(table.path(key), &names, &node.value);
         };
-        let chosen = choice.all.iter().copied().find(|&item| (choice.name)(item) == text);
-        if chosen.is_none() {
-            let reserved = choice.reserved.contains(&text.as_str());
-            let why = if reserved { ", which this version does not offer" } else { "" };
-            let message = format!("is {}{why}; it must be {names}", quoted(text));
+        if !field.choose(text) {
+            let message = format!("is {}; it must be {names}", quoted(text));
             self.violations.add(table.path(key), message);
         }
-        chosen
     }
 
     /// Reads the elements of the list `key`.

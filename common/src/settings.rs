@@ -3,6 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::accepted::{Interval, WholeRange};
+use crate::fields::{self, Condition, Fields, Key, Number, Section};
+use crate::limits;
+use crate::plausible::{ELEMENT_SIZE, TIME_STEP};
+
+fields::choices!(Extremum, Method);
+
 /// The extremum of the first arriving packet that gives the time of flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -94,5 +101,81 @@ impl Default for SolverSettings {
             element_order: 8,
             time_step: None,
         }
+    }
+}
+
+impl Section for Picking {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let extremum = "the extremum of the packet that gives the time of flight";
+        fields.choice(Key { name: "extremum", meaning: extremum }, &mut self.extremum);
+        fields.number(
+            Key {
+                name: "threshold",
+                meaning: "an extremum opens the packet if its ratio to the packet's peak is above \
+                          this",
+            },
+            &mut self.threshold,
+            Number::within(Interval::between(0.0, 1.0, "of the packet's peak")),
+        );
+    }
+}
+
+impl Section for SolverSettings {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let method = "`\"exact\"`: exact layers in (frequency, wavenumber); `\"hybrid\"`: the \
+                      paper's solver, Fourier along the bone, spectral elements across it, time steps";
+        fields.choice(Key { name: "method", meaning: method }, &mut self.method);
+        let refinement = "larger is more accurate and slower; for `\"hybrid\"` it divides element \
+                          size and time step by its square root";
+        let accepted = Interval::from_to(limits::REFINEMENT_MIN, limits::REFINEMENT_MAX, "");
+        fields.number(
+            Key { name: "refinement", meaning: refinement },
+            &mut self.refinement,
+            Number::within(accepted),
+        );
+        fields.only_if(&only_hybrid(self.method), &mut |fields| self.declare_hybrid(fields));
+    }
+}
+
+impl SolverSettings {
+    fn declare_hybrid(&mut self, fields: &mut dyn Fields) {
+        let size = Interval::from_to(limits::ELEMENT_SIZE_MIN, limits::ELEMENT_SIZE_MAX, "m");
+        fields.number(
+            Key {
+                name: "element_size",
+                meaning: "largest element across the layers, in all passes except the first",
+            },
+            &mut self.element_size,
+            Number::plausible(size, &ELEMENT_SIZE),
+        );
+        fields.whole(
+            Key { name: "element_order", meaning: "polynomial degree of the elements" },
+            &mut self.element_order,
+            WholeRange::new(limits::ELEMENT_ORDER_MIN.into(), limits::ELEMENT_ORDER_MAX.into()),
+        );
+        fields.optional_number(
+            Key {
+                name: "time_step",
+                meaning: "time step of the first pass; later passes use proportionally smaller \
+                          ones. Default: the stability limit of each bone. A larger step causes the \
+                          failure `no_convergence`",
+            },
+            &mut self.time_step,
+            Number::above_zero(&TIME_STEP),
+        );
+    }
+}
+
+/// Returns the condition of keys that only the hybrid method has.
+fn only_hybrid(method: Method) -> Condition {
+    let (given, hybrid) = (method.name(), Method::Hybrid.name());
+    Condition {
+        holds: method == Method::Hybrid,
+        decided_by: "method",
+        description: "for `\"hybrid\"`",
+        refusal: format!(
+            "belongs to the method \"{hybrid}\", and solver.method is \"{given}\"; leave it out, or \
+             set solver.method = \"{hybrid}\""
+        ),
     }
 }

@@ -5,10 +5,9 @@ use std::fmt::{self, Write as _};
 
 use crate::case::{Case, Setup};
 use crate::elasticity::Elasticity;
+use crate::fields::{Entry, Section, Value, entries};
 use crate::job::{Data, JobSpecification, Prior, Range, Search};
-use crate::layers::Fluid;
 use crate::parameters::Parameter;
-use crate::settings::{Method, SolverSettings};
 
 /// Number of velocities per line of an inlined data set.
 const VELOCITIES_PER_LINE: usize = 6;
@@ -50,47 +49,61 @@ fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
 }
 
 fn setup(out: &mut String, setup: &Setup) -> fmt::Result {
-    let (layers, probe) = (&setup.layers, &setup.probe);
-    let (source, receivers) = (&probe.source, &probe.receivers);
-    writeln!(out, "[layers]  # thickness m, density kg/m³, sound speed m/s")?;
-    fluid(out, "coupling", &layers.coupling)?;
-    writeln!(out, "bone = {{ thickness = {:?} }}", layers.bone_thickness)?;
-    fluid(out, "marrow", &layers.marrow)?;
-    writeln!(out, "\n[probe]  # m, Hz, N")?;
-    writeln!(out, "center_frequency = {:?}", probe.center_frequency)?;
-    writeln!(out, "amplitude = {:?}", probe.amplitude)?;
-    writeln!(out, "source = {{ x1 = {:?}, x3 = {:?} }}", source.x1, source.x3)?;
-    writeln!(
-        out,
-        "receivers = {{ first_x1 = {:?}, pitch = {:?}, count = {}, x3 = {:?} }}",
-        receivers.first_x1, receivers.pitch, receivers.count, receivers.x3
-    )?;
-    writeln!(out, "\n[picking]")?;
-    writeln!(out, "extremum = \"{}\"", setup.picking.extremum.name())?;
-    writeln!(out, "threshold = {:?}  # of the packet's peak", setup.picking.threshold)?;
-    solver(out, &setup.solver)
-}
-
-fn solver(out: &mut String, solver: &SolverSettings) -> fmt::Result {
-    writeln!(out, "\n[solver]")?;
-    writeln!(out, "method = \"{}\"", solver.method.name())?;
-    writeln!(out, "refinement = {:?}", solver.refinement)?;
-    if solver.method == Method::Hybrid {
-        writeln!(out, "element_size = {:?}  # m", solver.element_size)?;
-        writeln!(out, "element_order = {}", solver.element_order)?;
-        if let Some(time_step) = solver.time_step {
-            writeln!(out, "time_step = {time_step:?}  # s")?;
+    let mut setup = *setup;
+    for (index, (name, declared)) in setup.sections().into_iter().enumerate() {
+        if index > 0 {
+            writeln!(out)?;
         }
+        section(out, name, declared)?;
     }
     Ok(())
 }
 
-fn fluid(out: &mut String, key: &str, fluid: &Fluid) -> fmt::Result {
-    let Fluid { thickness, density, sound_speed } = fluid;
-    writeln!(
-        out,
-        "{key} = {{ thickness = {thickness:?}, density = {density:?}, sound_speed = {sound_speed:?} }}"
-    )
+/// Writes a section: each key on a line, with its unit as a comment.
+fn section(out: &mut String, name: &str, section: &mut dyn Section) -> fmt::Result {
+    writeln!(out, "[{name}]")?;
+    for entry in entries(section).iter().filter(|entry| entry.applies()) {
+        let Some(value) = value(&entry.value) else { continue };
+        write!(out, "{} = {value}", entry.key.name)?;
+        let mut units = Vec::new();
+        units_of(&entry.value, &mut units);
+        if units.is_empty() { writeln!(out)? } else { writeln!(out, "  # {}", units.join(", "))? }
+    }
+    Ok(())
+}
+
+/// Returns the text of a value; `None` if it is absent or written elsewhere.
+fn value(value: &Value) -> Option<String> {
+    Some(match value {
+        Value::Number(number, _) => format!("{:?}", (*number)?),
+        Value::Whole(whole, _) => whole.to_string(),
+        Value::Truth(truth) => truth.to_string(),
+        Value::Choice { chosen, .. } => format!("\"{chosen}\""),
+        Value::Table(entries) => inline_table(entries),
+        Value::Special => return None,
+    })
+}
+
+/// Returns a table on one line, as it may be typed.
+pub(crate) fn inline_table(entries: &[Entry]) -> String {
+    let keys = entries.iter().filter(|entry| entry.applies());
+    let keys = keys.filter_map(|entry| Some((entry.key.name, value(&entry.value)?)));
+    let keys: Vec<_> = keys.map(|(name, value)| format!("{name} = {value}")).collect();
+    format!("{{ {} }}", keys.join(", "))
+}
+
+/// Adds the units of a value, each once.
+fn units_of(value: &Value, units: &mut Vec<&'static str>) {
+    match value {
+        Value::Number(_, accepted) => {
+            let unit = accepted.interval.unit();
+            if !unit.is_empty() && !units.contains(&unit) {
+                units.push(unit);
+            }
+        }
+        Value::Table(entries) => entries.iter().for_each(|entry| units_of(&entry.value, units)),
+        _ => {}
+    }
 }
 
 fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {
@@ -147,25 +160,14 @@ fn range(out: &mut String, parameter: Parameter, range: Range) -> fmt::Result {
 }
 
 fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
-    let (monte_carlo, search) = (&specification.monte_carlo, &specification.search);
-    writeln!(out, "\n[monte_carlo]")?;
-    writeln!(out, "realizations = {}", monte_carlo.realizations)?;
-    writeln!(out, "seed = {}", monte_carlo.seed)?;
-    writeln!(out, "sampling = \"{}\"", monte_carlo.sampling.name())?;
-    writeln!(out, "scrambles = {}", monte_carlo.scrambles)?;
-    writeln!(out, "control_variate = {}", monte_carlo.control_variate)?;
-    writeln!(out, "max_failed_fraction = {:?}", monte_carlo.max_failed_fraction)?;
-    writeln!(out, "\n[objective]")?;
-    writeln!(out, "kind = \"{}\"", specification.objective.name())?;
-    writeln!(out, "\n[search]  # size and step as fractions of the box")?;
-    writeln!(out, "method = \"{}\"", search.method.name())?;
-    writeln!(out, "max_evaluations = {}", search.max_evaluations)?;
-    writeln!(out, "cost_tolerance = {:?}", search.cost_tolerance)?;
-    writeln!(out, "size_tolerance = {:?}", search.size_tolerance)?;
-    writeln!(out, "initial_step = {:?}", search.initial_step)?;
-    writeln!(out, "starts = {}", search.starts)?;
-    writeln!(out, "sensitivities = {}", search.sensitivities)?;
-    priors(out, search)
+    let JobSpecification { mut monte_carlo, mut objective, mut search, .. } = *specification;
+    let sections: [(_, &mut dyn Section); 3] =
+        [("monte_carlo", &mut monte_carlo), ("objective", &mut objective), ("search", &mut search)];
+    for (name, declared) in sections {
+        writeln!(out)?;
+        section(out, name, declared)?;
+    }
+    priors(out, &specification.search)
 }
 
 fn priors(out: &mut String, search: &Search) -> fmt::Result {

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use osteon_common::document::Format;
 use osteon_common::job::{Data, Group, JobKind, NoVariation};
 use osteon_common::job_file;
-use osteon_common::plausible::Warning;
+use osteon_common::warnings::Warning;
 
 /// What the job of `files/job.toml` gets from a file with these bytes.
 fn read(bytes: &[u8]) -> Result<Option<Data>, String> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use osteon_common::document::Format;
 use osteon_common::job::JobKind;
-use osteon_common::plausible::{Warning, case_warnings, job_warnings};
+use osteon_common::warnings::{Warning, case_warnings, job_warnings};
 use osteon_common::{case_file, job_file};
 
 const JOB: &str = include_str!("files/job.toml");

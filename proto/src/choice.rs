@@ -1,11 +1,9 @@
 //! Mapping between enumerations of messages and types of `osteon-common`.
 
-use osteon_common::job::{JobKind, Objective, Sampling, SearchMethod};
+use osteon_common::job::{JobKind, Objective, Sampling};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::{JobFailure, PointMeaning, Status};
-use osteon_common::settings::{Extremum, Method};
-use osteon_common::violations::Violations;
 
 use crate::malformed::Malformed;
 use crate::v1;
@@ -49,25 +47,6 @@ impl<T: Copy, M: Into<i32>> Choice<T, M> {
         }
     }
 
-    /// Returns the value of a number of a specification, or `default` if it is unspecified. An
-    /// unknown number is added to `violations`.
-    pub fn or_default(
-        &self,
-        number: i32,
-        default: T,
-        field: &str,
-        violations: &mut Violations,
-    ) -> T {
-        match (number, self.value(number)) {
-            (_, Some(value)) => value,
-            (0, None) => default,
-            (_, None) => {
-                violations.add(field, self.refusal(number));
-                default
-            }
-        }
-    }
-
     /// Returns the reason why a number is refused.
     pub fn refusal(&self, number: i32) -> String {
         let names = self.all.iter().map(|&value| (self.name)(&(self.message)(value)));
@@ -84,26 +63,6 @@ pub static JOB_KIND: Choice<JobKind, v1::JobKind> = Choice {
         JobKind::Propagation => v1::JobKind::Propagation,
     },
     name: v1::JobKind::as_str_name,
-};
-
-/// The criterion of the first arriving signal.
-pub static EXTREMUM: Choice<Extremum, v1::Extremum> = Choice {
-    all: &Extremum::ALL,
-    message: |extremum| match extremum {
-        Extremum::First => v1::Extremum::First,
-        Extremum::Second => v1::Extremum::Second,
-    },
-    name: v1::Extremum::as_str_name,
-};
-
-/// Method of computing waves.
-pub static SOLVER_METHOD: Choice<Method, v1::SolverMethod> = Choice {
-    all: &Method::ALL,
-    message: |method| match method {
-        Method::Exact => v1::SolverMethod::Exact,
-        Method::Hybrid => v1::SolverMethod::Hybrid,
-    },
-    name: v1::SolverMethod::as_str_name,
 };
 
 /// Sampling of the germs.
@@ -124,16 +83,6 @@ pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
         Objective::Likelihood => v1::ObjectiveKind::Likelihood,
     },
     name: v1::ObjectiveKind::as_str_name,
-};
-
-/// Method of the search.
-pub static SEARCH_METHOD: Choice<SearchMethod, v1::SearchMethod> = Choice {
-    all: &SearchMethod::ALL,
-    message: |method| match method {
-        SearchMethod::Simplex => v1::SearchMethod::Simplex,
-        SearchMethod::Newton => v1::SearchMethod::Newton,
-    },
-    name: v1::SearchMethod::as_str_name,
 };
 
 /// One of the seven parameters.
@@ -211,20 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_refused_by_name() {
-        let mut violations = Violations::new();
-        let read = |number, violations: &mut Violations| {
-            SAMPLING.or_default(number, Sampling::Sobol, "monte_carlo.sampling", violations)
-        };
-        assert_eq!(read(0, &mut violations), Sampling::Sobol);
-        assert_eq!(read(1, &mut violations), Sampling::MonteCarlo);
-        assert!(violations.is_empty());
-        read(17, &mut violations);
-        assert_eq!(
-            violations.to_string(),
-            "monte_carlo.sampling: is 17, which is not known; it must be SAMPLING_MONTE_CARLO or \
-             SAMPLING_SOBOL"
-        );
+    fn a_number_that_is_not_known_is_refused_by_its_field() {
         let field = "status";
         assert_eq!(JOB_STATUS.required(0, field), Err(Malformed::Missing { field }));
         assert_eq!(JOB_STATUS.optional(0, field), Ok(None));

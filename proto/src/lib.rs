@@ -11,6 +11,7 @@ mod conclusions;
 pub mod credential_file;
 pub mod credentials;
 pub mod endpoint;
+mod fields;
 pub mod identity;
 pub mod malformed;
 pub mod parameter_values;

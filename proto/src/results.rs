@@ -261,7 +261,7 @@ fn settings_from_message(message: &v1::JobResult) -> Result<Settings, Malformed>
     let mut violations = Violations::new();
     let settings = Settings {
         objective: OBJECTIVE.required(objective.kind, "kind")?,
-        search: search_from_message(Some(search), &mut violations),
+        search: search_from_message(search, &mut violations),
         solver: setup::solver_from_message(solver, &mut violations),
         picking: setup::picking_from_message(picking, &mut violations),
     };

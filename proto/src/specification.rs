@@ -3,12 +3,12 @@
 use osteon_common::check;
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Search,
-    SearchMethod,
 };
 use osteon_common::parameters::Parameter;
 use osteon_common::violations::Violations;
 
-use crate::choice::{JOB_KIND, OBJECTIVE, PARAMETER, SAMPLING, SEARCH_METHOD};
+use crate::choice::{JOB_KIND, PARAMETER};
+use crate::fields;
 use crate::setup;
 use crate::v1;
 
@@ -23,8 +23,8 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         solver: Some(messages.solver),
         data: specification.data.as_ref().map(data_to_message),
         parameters: Some(parameters_to_message(&specification.parameters)),
-        monte_carlo: Some(monte_carlo_to_message(&specification.monte_carlo)),
-        objective: Some(v1::Objective { kind: OBJECTIVE.number(specification.objective) }),
+        monte_carlo: Some(fields::to_message(&mut specification.monte_carlo.clone())),
+        objective: Some(fields::to_message(&mut specification.objective.clone())),
         search: Some(search_to_message(&specification.search)),
     }
 }
@@ -58,6 +58,13 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         violations.add("kind", JOB_KIND.refusal(message.kind));
         JobKind::Identification
     });
+    let (mut monte_carlo, mut objective) = (MonteCarlo::default(), Objective::default());
+    if let Some(message) = &message.monte_carlo {
+        fields::from_message("monte_carlo", message, &mut monte_carlo, violations);
+    }
+    if let Some(message) = &message.objective {
+        fields::from_message("objective", message, &mut objective, violations);
+    }
     JobSpecification {
         kind,
         setup: setup::from_messages(
@@ -69,14 +76,12 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         ),
         data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
         parameters: parameters_from_message(message.parameters.as_ref(), violations),
-        monte_carlo: monte_carlo_from_message(message.monte_carlo.as_ref(), violations),
-        objective: OBJECTIVE.or_default(
-            message.objective.map_or(0, |objective| objective.kind),
-            Objective::default(),
-            "objective.kind",
-            violations,
-        ),
-        search: search_from_message(message.search.as_ref(), violations),
+        monte_carlo,
+        objective,
+        search: message
+            .search
+            .as_ref()
+            .map_or_else(Search::default, |message| search_from_message(message, violations)),
     }
 }
 
@@ -193,76 +198,18 @@ fn parameter_message(
     }
 }
 
-fn monte_carlo_to_message(monte_carlo: &MonteCarlo) -> v1::MonteCarlo {
-    v1::MonteCarlo {
-        realizations: Some(monte_carlo.realizations),
-        seed: Some(monte_carlo.seed),
-        sampling: SAMPLING.number(monte_carlo.sampling),
-        max_failed_fraction: Some(monte_carlo.max_failed_fraction),
-        scrambles: Some(monte_carlo.scrambles),
-        control_variate: Some(monte_carlo.control_variate),
-    }
-}
-
-fn monte_carlo_from_message(
-    message: Option<&v1::MonteCarlo>,
-    violations: &mut Violations,
-) -> MonteCarlo {
-    let default = MonteCarlo::default();
-    let Some(message) = message else { return default };
-    MonteCarlo {
-        realizations: message.realizations.unwrap_or(default.realizations),
-        seed: message.seed.unwrap_or(default.seed),
-        sampling: SAMPLING.or_default(
-            message.sampling,
-            default.sampling,
-            "monte_carlo.sampling",
-            violations,
-        ),
-        scrambles: message.scrambles.unwrap_or(default.scrambles),
-        control_variate: message.control_variate.unwrap_or(default.control_variate),
-        max_failed_fraction: message.max_failed_fraction.unwrap_or(default.max_failed_fraction),
-    }
-}
-
 /// Returns the complete message of a search.
 pub(crate) fn search_to_message(search: &Search) -> v1::Search {
-    v1::Search {
-        method: SEARCH_METHOD.number(search.method),
-        max_evaluations: Some(search.max_evaluations),
-        cost_tolerance: Some(search.cost_tolerance),
-        size_tolerance: Some(search.size_tolerance),
-        initial_step: Some(search.initial_step),
-        starts: Some(search.starts),
-        sensitivities: Some(search.sensitivities),
-        priors: priors_to_message(&search.priors),
-    }
+    let message: v1::Search = fields::to_message(&mut search.clone());
+    v1::Search { priors: priors_to_message(&search.priors), ..message }
 }
 
 /// Returns the search of a message, with defaults filled in.
-pub(crate) fn search_from_message(
-    message: Option<&v1::Search>,
-    violations: &mut Violations,
-) -> Search {
-    let nothing = v1::Search::default();
-    let message = message.unwrap_or(&nothing);
-    let method = SEARCH_METHOD.or_default(
-        message.method,
-        SearchMethod::default(),
-        "search.method",
-        violations,
-    );
-    let default = Search::by(method);
-    Search {
-        method,
-        max_evaluations: message.max_evaluations.unwrap_or(default.max_evaluations),
-        cost_tolerance: message.cost_tolerance.unwrap_or(default.cost_tolerance),
-        size_tolerance: message.size_tolerance.unwrap_or(default.size_tolerance),
-        initial_step: message.initial_step.unwrap_or(default.initial_step),
-        starts: message.starts.unwrap_or(default.starts),
-        sensitivities: message.sensitivities.unwrap_or(default.sensitivities),
-        priors: priors_from_message(&message.priors, violations),
-    }
+pub(crate) fn search_from_message(message: &v1::Search, violations: &mut Violations) -> Search {
+    let mut search = Search::default();
+    fields::from_message("search", message, &mut search, violations);
+    search.priors = priors_from_message(&message.priors, violations);
+    search
 }
 
 fn priors_to_message(priors: &[Option<Prior>; 7]) -> Vec<v1::Prior> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::accepted::{Interval, WholeRange, written};
+use crate::accepted::{Interval, written};
 use crate::document::{element_path, entry_path};
 use crate::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
@@ -11,25 +11,15 @@ use crate::job::{
 use crate::limits;
 use crate::origin::Origin;
 use crate::parameters::Parameter;
-use crate::plausible::{self, Quantity, short};
+use crate::plausible::{self, PlausibleRange, short};
 use crate::quantile::quantile;
 use crate::reach;
 use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
 
-use super::{known_wrong, number, quantity, setup, whole};
+use super::{known_wrong, number, quantity, section, setup};
 
-/// Range of `monte_carlo.realizations`.
-pub(crate) const REALIZATIONS: WholeRange = WholeRange::new(1, limits::REALIZATIONS_MAX);
-/// Range of `monte_carlo.seed`.
-pub(crate) const SEED: WholeRange = WholeRange::new(0, limits::SEED_MAX);
-/// Range of `monte_carlo.scrambles`.
-pub(crate) const SCRAMBLES: WholeRange = WholeRange::new(1, limits::SCRAMBLES_MAX);
-/// Range of `search.max_evaluations`.
-pub(crate) const EVALUATIONS: WholeRange = WholeRange::new(1, limits::EVALUATIONS_MAX);
-/// Range of `search.starts`.
-pub(crate) const STARTS: WholeRange = WholeRange::new(1, limits::STARTS_MAX);
 /// Accepted values of a measured velocity.
 pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");
 /// Accepted values of the data's coefficient of variation.
@@ -74,8 +64,11 @@ pub(crate) fn job_from(
     }
     admissible_start(specification, violations);
     something_to_search(specification, violations);
-    monte_carlo(&specification.monte_carlo, violations);
-    search(&specification.search, violations);
+    let (mut checked, mut default) = (specification.monte_carlo, MonteCarlo::default());
+    section("monte_carlo", &mut checked, &mut default, violations);
+    scrambles(&specification.monte_carlo, violations);
+    let (mut checked, mut default) = (specification.search, Search::default());
+    section("search", &mut checked, &mut default, violations);
     priors(specification, violations);
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
@@ -271,7 +264,7 @@ fn impossible(
 
 fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
     let path = format!("parameters.{}", parameter.name());
-    let (accepted, kind) = (Interval::of(parameter), Quantity::of(parameter));
+    let (accepted, kind) = (Interval::of(parameter), PlausibleRange::of(parameter));
     match range {
         Range::Fixed(value) => {
             quantity(&format!("{path}.fixed"), value, accepted, &kind, violations);
@@ -292,7 +285,7 @@ fn bounds(
     path: &str,
     [lower, upper]: [f64; 2],
     accepted: Interval,
-    kind: &Quantity,
+    kind: &PlausibleRange,
     violations: &mut Violations,
 ) {
     if known_wrong(path, violations) {
@@ -365,22 +358,9 @@ fn something_to_search(specification: &JobSpecification, violations: &mut Violat
     }
 }
 
-fn monte_carlo(monte_carlo: &MonteCarlo, violations: &mut Violations) {
-    whole("monte_carlo.realizations", monte_carlo.realizations, REALIZATIONS, violations);
-    whole("monte_carlo.seed", monte_carlo.seed, SEED, violations);
-    scrambles(monte_carlo, violations);
-    number(
-        "monte_carlo.max_failed_fraction",
-        monte_carlo.max_failed_fraction,
-        Interval::from_to(0.0, 1.0, ""),
-        violations,
-    );
-}
-
 fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
     const FIELD: &str = "monte_carlo.scrambles";
     let MonteCarlo { realizations, scrambles, .. } = *monte_carlo;
-    whole(FIELD, scrambles, SCRAMBLES, violations);
     let around = [FIELD, "monte_carlo.sampling", "monte_carlo.realizations"];
     if around.iter().any(|field| known_wrong(field, violations)) {
         return;
@@ -502,18 +482,5 @@ fn priors(specification: &JobSpecification, violations: &mut Violations) {
             "cannot be had with the method \"newton\", whose answer is nearest to the starts of \
              the parameters: make the prior values the starts, or use \"simplex\"",
         );
-    }
-}
-
-fn search(search: &Search, violations: &mut Violations) {
-    whole("search.max_evaluations", search.max_evaluations, EVALUATIONS, violations);
-    // A step of at most half the box fits from any start, upwards or downwards.
-    whole("search.starts", search.starts, STARTS, violations);
-    for (key, value, accepted) in [
-        ("cost_tolerance", search.cost_tolerance, Interval::from(0.0, "")),
-        ("size_tolerance", search.size_tolerance, Interval::from_below(0.0, 1.0, "of the box")),
-        ("initial_step", search.initial_step, Interval::above_to(0.0, 0.5, "of the box")),
-    ] {
-        number(&format!("search.{key}"), value, accepted, violations);
     }
 }

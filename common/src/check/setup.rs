@@ -1,8 +1,7 @@
 //! Rules on layers, probe, picking and solver.
 
-use crate::accepted::{Interval, WholeRange};
+use crate::accepted::Interval;
 use crate::case::Setup;
-use crate::layers::{Fluid, Layers};
 use crate::limits;
 use crate::plausible;
 use crate::probe::Probe;
@@ -10,73 +9,21 @@ use crate::sampling::pair_count;
 use crate::settings::Method;
 use crate::violations::Violations;
 
-use super::{known_wrong, number, quantity, whole};
-
-/// Range of `probe.receivers.count`.
-pub(crate) const RECEIVERS: WholeRange =
-    WholeRange::new(limits::RECEIVERS_MIN as u64, limits::RECEIVERS_MAX as u64);
+use super::{known_wrong, quantity};
 
 /// Records all violations of `setup`.
 pub fn setup(setup: &Setup, violations: &mut Violations) {
-    layers(&setup.layers, violations);
-    probe(&setup.probe, violations);
-    heights(setup, violations);
+    let (mut checked, mut default) = (*setup, Setup::default());
+    for ((name, section), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
+        if name == "probe" {
+            // The range of the heights is narrower than that of their keys.
+            heights(setup, violations);
+        }
+        super::section(name, section, default, violations);
+    }
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
-    number(
-        "picking.threshold",
-        setup.picking.threshold,
-        Interval::between(0.0, 1.0, ""),
-        violations,
-    );
-    super::solver::solver(&setup.solver, violations);
     sampling(setup, violations);
-}
-
-fn layers(layers: &Layers, violations: &mut Violations) {
-    fluid("layers.coupling", &layers.coupling, violations);
-    quantity(
-        "layers.bone.thickness",
-        layers.bone_thickness,
-        Interval::above(0.0, "m"),
-        &plausible::BONE_THICKNESS,
-        violations,
-    );
-    fluid("layers.marrow", &layers.marrow, violations);
-}
-
-fn fluid(path: &str, fluid: &Fluid, violations: &mut Violations) {
-    for (key, value, kind) in [
-        ("thickness", fluid.thickness, plausible::FLUID_THICKNESS),
-        ("density", fluid.density, plausible::FLUID_DENSITY),
-        ("sound_speed", fluid.sound_speed, plausible::SOUND_SPEED),
-    ] {
-        let accepted = Interval::above(0.0, kind.unit);
-        quantity(&format!("{path}.{key}"), value, accepted, &kind, violations);
-    }
-}
-
-fn probe(probe: &Probe, violations: &mut Violations) {
-    let (source, receivers) = (&probe.source, &probe.receivers);
-    let above_zero = |unit| Interval::above(0.0, unit);
-    quantity(
-        "probe.center_frequency",
-        probe.center_frequency,
-        above_zero("Hz"),
-        &plausible::FREQUENCY,
-        violations,
-    );
-    number("probe.amplitude", probe.amplitude, above_zero("N"), violations);
-    number("probe.source.x1", source.x1, Interval::finite("m"), violations);
-    number("probe.receivers.first_x1", receivers.first_x1, Interval::finite("m"), violations);
-    quantity(
-        "probe.receivers.pitch",
-        receivers.pitch,
-        above_zero("m"),
-        &plausible::PITCH,
-        violations,
-    );
-    whole("probe.receivers.count", receivers.count.into(), RECEIVERS, violations);
 }
 
 /// Checks that source and receivers lie inside fluid 1: 0 < x3 < h1.

@@ -1,7 +1,7 @@
 use super::*;
 
 /// Checks the question asked about a refused value; `None` if it is not refused.
-fn check(kind: &Quantity, values: &[f64], expected: Option<&str>) {
+fn check(kind: &PlausibleRange, values: &[f64], expected: Option<&str>) {
     let question = kind.question(values, Interval::finite(kind.unit));
     assert_eq!(question.as_deref(), expected, "{values:?} {}", kind.unit);
 }
@@ -77,7 +77,7 @@ fn a_number_that_is_refused_anyway_is_asked_about_only_if_the_other_is_accepted(
 
 #[test]
 fn what_is_unusual_is_worth_a_doubt() {
-    let check = |kind: &Quantity, value: f64, expected: Option<&str>| {
+    let check = |kind: &PlausibleRange, value: f64, expected: Option<&str>| {
         assert_eq!(kind.doubt(value).as_deref(), expected, "{value}");
     };
     check(&BONE_THICKNESS, 4e-3, None);

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::document::Format;
-use osteon_common::job::Sampling;
+use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::job_file;
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_fuzz::properties;
@@ -368,13 +368,21 @@ fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecifica
     // The default method is left out.
     if search != SearchMethod::default() {
         text.push_str(&format!("[search]\nmethod = \"{}\"\n", search.name()));
-        let method = SEARCH_METHOD.number(search);
-        message.search = Some(v1::Search { method, ..v1::Search::default() });
+        let mut search_message = v1::Search::default();
+        search_message.set_method(match search {
+            SearchMethod::Simplex => v1::SearchMethod::Simplex,
+            SearchMethod::Newton => v1::SearchMethod::Newton,
+        });
+        message.search = Some(search_message);
     }
     if solver != Method::default() {
         text.push_str(&format!("[solver]\nmethod = \"{}\"\n", solver.name()));
-        let method = crate::choice::SOLVER_METHOD.number(solver);
-        message.solver = Some(v1::SolverSettings { method, ..v1::SolverSettings::default() });
+        let mut solver_message = v1::SolverSettings::default();
+        solver_message.set_method(match solver {
+            Method::Exact => v1::SolverMethod::Exact,
+            Method::Hybrid => v1::SolverMethod::Hybrid,
+        });
+        message.solver = Some(solver_message);
     }
     if kind == JobKind::Identification {
         text.push_str("[data]\nmean = 3906.0\ncoefficient_of_variation = 0.027\n");

@@ -2,9 +2,9 @@
 
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::FailureKind;
-use osteon_common::plausible;
 use osteon_common::results::Evaluation;
 use osteon_common::settings::Method;
+use osteon_common::warnings;
 
 /// If at least this fraction of the realizations fails in the same way, neither more accuracy nor a
 /// larger failure limit helps: the cause lies in layers, probe or parameters.
@@ -22,7 +22,7 @@ pub(super) fn after_failures(row: &Evaluation, specification: &JobSpecification)
             .to_owned();
     };
     let likely = likely(kind, specification.setup.solver.method);
-    let warnings = plausible::job_warnings(specification);
+    let warnings = warnings::job_warnings(specification);
     let unusual: Vec<String> =
         warnings.iter().take(UNUSUAL_MAX).map(|warning| format!("; {warning}")).collect();
     format!("{likely}{}", unusual.concat())

@@ -4,14 +4,13 @@ use std::fmt;
 
 use crate::case::{Case, Setup};
 use crate::document::entry_path;
+use crate::fields::{self, Entry, Number, Value};
 use crate::job::{Data, JobSpecification, Range};
-use crate::layers::Fluid;
 use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
-use crate::settings::Method;
 
-use super::{Quantity, short};
+use crate::plausible::{self, PlausibleRange, short};
 
 /// A velocity that differs from the median by more than this factor is an outlier.
 const OUTLIER: f64 = 3.0;
@@ -39,10 +38,10 @@ impl fmt::Display for Warning {
 pub fn case_warnings(case: &Case) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&case.setup);
-    warnings.number("bone.density", case.bone.density, &super::DENSITY);
+    warnings.number("bone.density", case.bone.density, &plausible::DENSITY);
     let diagonal = (0..6).map(|i| case.bone.elasticity.rows()[i][i]);
     let largest = diagonal.fold(0.0, f64::max);
-    if let Some(doubt) = super::MODULUS.doubt(largest) {
+    if let Some(doubt) = plausible::MODULUS.doubt(largest) {
         warnings.add("bone", format!("the largest stiffness {doubt}"));
     }
     warnings.0
@@ -77,34 +76,35 @@ impl Warnings {
         self.0.push(Warning { field: field.to_owned(), message: message.into() });
     }
 
-    fn number(&mut self, field: &str, value: f64, kind: &Quantity) {
+    fn number(&mut self, field: &str, value: f64, kind: &PlausibleRange) {
         if let Some(doubt) = kind.doubt(value) {
             self.add(field, doubt);
         }
     }
 
     fn setup(&mut self, setup: &Setup) {
-        let (layers, probe, solver) = (&setup.layers, &setup.probe, &setup.solver);
-        self.fluid("layers.coupling", &layers.coupling);
-        self.number("layers.bone.thickness", layers.bone_thickness, &super::BONE_THICKNESS);
-        self.fluid("layers.marrow", &layers.marrow);
-        self.number("probe.center_frequency", probe.center_frequency, &super::FREQUENCY);
-        self.number("probe.source.x3", probe.source.x3, &super::HEIGHT);
-        self.number("probe.receivers.x3", probe.receivers.x3, &super::HEIGHT);
-        let distance = (probe.receivers.first_x1 - probe.source.x1).abs();
-        if let Some(doubt) = super::DISTANCE.doubt(distance) {
-            self.add("probe.receivers.first_x1", format!("its distance from the source {doubt}"));
+        let mut setup = *setup;
+        for (name, section) in setup.sections() {
+            self.entries(name, &fields::entries(section));
         }
-        self.number("probe.receivers.pitch", probe.receivers.pitch, &super::PITCH);
-        if let (Method::Hybrid, Some(time_step)) = (solver.method, solver.time_step) {
-            self.number("solver.time_step", time_step, &super::TIME_STEP);
+        let probe = &setup.probe;
+        let distance = (probe.receivers.first_x1 - probe.source.x1).abs();
+        if let Some(doubt) = plausible::DISTANCE.doubt(distance) {
+            self.add("probe.receivers.first_x1", format!("its distance from the source {doubt}"));
         }
     }
 
-    fn fluid(&mut self, path: &str, fluid: &Fluid) {
-        self.number(&format!("{path}.thickness"), fluid.thickness, &super::FLUID_THICKNESS);
-        self.number(&format!("{path}.density"), fluid.density, &super::FLUID_DENSITY);
-        self.number(&format!("{path}.sound_speed"), fluid.sound_speed, &super::SOUND_SPEED);
+    fn entries(&mut self, table: &str, entries: &[Entry]) {
+        for entry in entries.iter().filter(|entry| entry.applies()) {
+            let field = entry_path(table, entry.key.name);
+            match &entry.value {
+                Value::Number(Some(value), Number { plausible: Some(range), .. }) => {
+                    self.number(&field, *value, range);
+                }
+                Value::Table(entries) => self.entries(&field, entries),
+                _ => {}
+            }
+        }
     }
 
     /// Checks only a fixed value or the start: bounds may be arbitrarily wide.
@@ -114,15 +114,15 @@ impl Warnings {
             Range::Free { .. } => "start",
         };
         let field = format!("parameters.{}.{key}", parameter.name());
-        self.number(&field, range.start(), &Quantity::of(parameter));
+        self.number(&field, range.start(), &PlausibleRange::of(parameter));
     }
 
     fn data(&mut self, data: &Data, origin: Option<&Origin>) {
         match data {
             Data::Moments { mean, coefficient_of_variation } => {
-                self.number("data.mean", *mean, &super::VELOCITY);
+                self.number("data.mean", *mean, &plausible::VELOCITY);
                 let variation = *coefficient_of_variation;
-                self.number("data.coefficient_of_variation", variation, &super::VARIATION);
+                self.number("data.coefficient_of_variation", variation, &plausible::VARIATION);
             }
             Data::Velocities(velocities) => {
                 self.velocities("data.velocities", velocities, (origin, 0));
@@ -156,7 +156,7 @@ impl Warnings {
         let mut ascending = velocities.to_vec();
         ascending.sort_unstable_by(f64::total_cmp);
         let Some(median) = quantile(&ascending, 0.5) else { return };
-        if let Some(doubt) = super::VELOCITY.doubt(median) {
+        if let Some(doubt) = plausible::VELOCITY.doubt(median) {
             self.add(field, format!("their median {doubt}"));
         }
         let outside = |velocity: f64| velocity > OUTLIER * median || velocity < median / OUTLIER;

@@ -1,0 +1,161 @@
+//! Declarations of the keys of job and case files.
+//!
+//! A [`Section`] declares each of its keys once: name, meaning, field, and accepted values. From
+//! this follow reading and the refusal of unknown keys, checks of ranges and units, warnings, the
+//! canonical text, the tables of `docs/job-files.md`, the JSON Schema of job files, and the messages
+//! on the wire (in `osteon-proto`). Relations between several keys are rules of their own, in
+//! [`crate::check`].
+
+mod collect;
+
+use crate::accepted::Interval;
+use crate::plausible::PlausibleRange;
+
+pub use self::collect::{Entry, Value, entries, names};
+pub use crate::accepted::WholeRange;
+
+/// Name and meaning of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Key {
+    /// Name in a file and on the wire.
+    pub name: &'static str,
+    /// Meaning, and relations to other keys, in Markdown as part of a sentence. Default and
+    /// accepted values are not repeated here.
+    pub meaning: &'static str,
+}
+
+/// A part of a file with keys of its own.
+pub trait Section {
+    /// Declares every key to `fields`, in the order of a canonical file.
+    ///
+    /// Must declare the same keys whatever the values are. If the default of a key depends on an
+    /// earlier one, the section sets it when that one has changed.
+    fn declare(&mut self, fields: &mut dyn Fields);
+}
+
+/// One use of declared keys: it may read the fields or set them.
+pub trait Fields {
+    /// Declares a number.
+    fn number(&mut self, key: Key, field: &mut f64, accepted: Number);
+
+    /// Declares a number that may be absent.
+    fn optional_number(&mut self, key: Key, field: &mut Option<f64>, accepted: Number);
+
+    /// Declares a whole number.
+    fn whole(&mut self, key: Key, field: &mut dyn Whole, accepted: WholeRange);
+
+    /// Declares a Boolean.
+    fn truth(&mut self, key: Key, field: &mut bool);
+
+    /// Declares a choice from a closed set of names.
+    fn choice(&mut self, key: Key, field: &mut dyn Choice);
+
+    /// Declares a table with keys of its own. `declare` may be called several times.
+    fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields));
+
+    /// Declares keys that are meaningful only under a condition on an earlier key.
+    fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields));
+
+    /// Declares a table that has code of its own for each use.
+    fn special(&mut self, key: Key);
+}
+
+/// Condition under which keys are meaningful. If it does not hold, they keep their defaults.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Condition {
+    /// Whether it holds.
+    pub holds: bool,
+    /// Name of the key that decides.
+    pub decided_by: &'static str,
+    /// The condition as part of a sentence, after "only".
+    pub description: &'static str,
+    /// Message that refuses one of the keys if it does not hold.
+    pub refusal: String,
+}
+
+/// The numbers that a key accepts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Number {
+    pub(crate) interval: Interval,
+    pub(crate) plausible: Option<&'static PlausibleRange>,
+}
+
+impl Number {
+    /// Accepts an interval.
+    pub(crate) const fn within(interval: Interval) -> Self {
+        Self { interval, plausible: None }
+    }
+
+    /// Accepts an interval, with the unit and the prior knowledge of `plausible`.
+    pub(crate) const fn plausible(interval: Interval, plausible: &'static PlausibleRange) -> Self {
+        Self { interval, plausible: Some(plausible) }
+    }
+
+    /// Accepts numbers above 0, with the unit and the prior knowledge of `plausible`.
+    pub(crate) const fn above_zero(plausible: &'static PlausibleRange) -> Self {
+        Self::plausible(Interval::above(0.0, plausible.unit), plausible)
+    }
+}
+
+/// The type of a whole number.
+pub trait Whole {
+    /// Returns the number.
+    fn get(&self) -> u64;
+
+    /// Sets the number; one that does not fit is replaced by the largest.
+    fn set(&mut self, value: u64);
+}
+
+impl Whole for u64 {
+    fn get(&self) -> u64 {
+        *self
+    }
+
+    fn set(&mut self, value: u64) {
+        *self = value;
+    }
+}
+
+impl Whole for u32 {
+    fn get(&self) -> u64 {
+        u64::from(*self)
+    }
+
+    fn set(&mut self, value: u64) {
+        *self = Self::try_from(value).unwrap_or(Self::MAX);
+    }
+}
+
+/// A value of a closed set, each with a name.
+pub trait Choice {
+    /// Returns the names of all values, in the order of the documentation.
+    fn names(&self) -> Vec<&'static str>;
+
+    /// Returns the name of the value.
+    fn name(&self) -> &'static str;
+
+    /// Sets the value with this name; returns whether there is one.
+    fn choose(&mut self, name: &str) -> bool;
+}
+
+/// Implements [`Choice`] for types with a constant `ALL` and a method `name`.
+macro_rules! choices {
+    ($($type:ty),+) => {$(
+        impl crate::fields::Choice for $type {
+            fn names(&self) -> Vec<&'static str> {
+                Self::ALL.map(Self::name).to_vec()
+            }
+
+            fn name(&self) -> &'static str {
+                Self::name(*self)
+            }
+
+            fn choose(&mut self, name: &str) -> bool {
+                let chosen = Self::ALL.into_iter().find(|value| Self::name(*value) == name);
+                chosen.inspect(|&value| *self = value).is_some()
+            }
+        }
+    )+};
+}
+
+pub(crate) use choices;

@@ -1,0 +1,109 @@
+//! The declared keys of a section with their values, as a list.
+
+use crate::accepted::WholeRange;
+
+use super::{Choice, Condition, Fields, Key, Number, Section, Whole};
+
+/// A declared key with its value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Name and meaning.
+    pub key: Key,
+    /// Value, and the values that are accepted.
+    pub value: Value,
+    /// Condition under which the key is meaningful, if it has one.
+    pub condition: Option<Condition>,
+}
+
+/// The value of a declared key, and the values that it accepts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A number; `None` if it is absent.
+    Number(Option<f64>, Number),
+    /// A whole number.
+    Whole(u64, WholeRange),
+    /// A Boolean.
+    Truth(bool),
+    /// One of several names.
+    Choice {
+        /// The name of the value.
+        chosen: &'static str,
+        /// All names.
+        names: Vec<&'static str>,
+    },
+    /// A table.
+    Table(Vec<Entry>),
+    /// A table that has code of its own.
+    Special,
+}
+
+impl Entry {
+    /// Returns whether the key is meaningful with the values of the section.
+    pub fn applies(&self) -> bool {
+        self.condition.as_ref().is_none_or(|condition| condition.holds)
+    }
+}
+
+/// Returns all keys of a section with their values.
+pub fn entries(section: &mut dyn Section) -> Vec<Entry> {
+    let mut collector = Collector::default();
+    section.declare(&mut collector);
+    collector.entries
+}
+
+/// Returns the names of declared keys.
+pub fn names(declare: &mut dyn FnMut(&mut dyn Fields)) -> Vec<&'static str> {
+    let mut collector = Collector::default();
+    declare(&mut collector);
+    collector.entries.iter().map(|entry| entry.key.name).collect()
+}
+
+#[derive(Debug, Default)]
+struct Collector {
+    entries: Vec<Entry>,
+    condition: Option<Condition>,
+}
+
+impl Collector {
+    fn push(&mut self, key: Key, value: Value) {
+        self.entries.push(Entry { key, value, condition: self.condition.clone() });
+    }
+}
+
+impl Fields for Collector {
+    fn number(&mut self, key: Key, field: &mut f64, accepted: Number) {
+        self.push(key, Value::Number(Some(*field), accepted));
+    }
+
+    fn optional_number(&mut self, key: Key, field: &mut Option<f64>, accepted: Number) {
+        self.push(key, Value::Number(*field, accepted));
+    }
+
+    fn whole(&mut self, key: Key, field: &mut dyn Whole, accepted: WholeRange) {
+        self.push(key, Value::Whole(field.get(), accepted));
+    }
+
+    fn truth(&mut self, key: Key, field: &mut bool) {
+        self.push(key, Value::Truth(*field));
+    }
+
+    fn choice(&mut self, key: Key, field: &mut dyn Choice) {
+        self.push(key, Value::Choice { chosen: field.name(), names: field.names() });
+    }
+
+    fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields)) {
+        let mut inner = Self::default();
+        declare(&mut inner);
+        self.push(key, Value::Table(inner.entries));
+    }
+
+    fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
+        self.condition = Some(condition.clone());
+        declare(self);
+        self.condition = None;
+    }
+
+    fn special(&mut self, key: Key) {
+        self.push(key, Value::Special);
+    }
+}

@@ -1,0 +1,28 @@
+//! `[search.priors]`.
+
+use crate::job::Prior;
+use crate::parameters::Parameter;
+use crate::reader::{Reader, Table};
+
+/// Reads a table `{ value, weight }` for each parameter that has one; numbers that cannot be read
+/// are recorded and become NaN.
+pub(super) fn read(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; 7] {
+    let table = reader.table(search, "priors", &Parameter::ALL.map(Parameter::name));
+    Parameter::ALL.map(|parameter| {
+        if !table.has(parameter.name()) {
+            return None;
+        }
+        let prior = reader.table(&table, parameter.name(), &["value", "weight"]);
+        if !prior.is_table() {
+            return None;
+        }
+        let [value, weight] = ["value", "weight"].map(|key| {
+            if !prior.has(key) {
+                let expected = "a number; a prior has a value and a weight";
+                reader.missing(&prior, key, expected);
+            }
+            reader.number(&prior, key).unwrap_or(f64::NAN)
+        });
+        Some(Prior { value, weight })
+    })
+}

@@ -1,0 +1,202 @@
+//! Settings of the search: objective, method, limits, priors.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::accepted::{Interval, WholeRange};
+use crate::fields::{self, Fields, Key, Number, Section};
+use crate::limits::{EVALUATIONS_MAX, STARTS_MAX};
+
+fields::choices!(Objective, SearchMethod);
+
+/// The function to be minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Objective {
+    /// The paper's cost: relative squared errors of mean and coefficient of variation.
+    #[default]
+    Moments,
+    /// Minus the mean log likelihood of the measured velocities under the law of the model's
+    /// velocities.
+    Likelihood,
+}
+
+impl Objective {
+    /// All objectives, in the order of a user's file.
+    pub const ALL: [Self; 2] = [Self::Moments, Self::Likelihood];
+
+    /// Returns the name used in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Moments => "moments",
+            Self::Likelihood => "likelihood",
+        }
+    }
+}
+
+/// Method of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SearchMethod {
+    /// The Nelder-Mead simplex, the paper's method.
+    #[default]
+    Simplex,
+    /// Minimum-norm Gauss-Newton steps with Broyden's updates.
+    Newton,
+}
+
+impl SearchMethod {
+    /// All methods, in the order of a user's file.
+    pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
+
+    /// Returns the name used in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Simplex => "simplex",
+            Self::Newton => "newton",
+        }
+    }
+}
+
+/// A value towards which a free parameter is pulled.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Prior {
+    /// The value, within the parameter's bounds, in its unit.
+    pub value: f64,
+    /// Increase of the cost if the parameter is off by the whole width of its bounds, above 0; for
+    /// smaller distances it decreases with their square.
+    pub weight: f64,
+}
+
+/// Settings of the search loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Method of the search.
+    pub method: SearchMethod,
+    /// Maximum number of evaluations (points whose realizations are computed).
+    pub max_evaluations: u64,
+    /// The search ends when the best cost is at most this; not used for a likelihood, whose lowest
+    /// cost is unknown beforehand.
+    pub cost_tolerance: f64,
+    /// The search ends when the simplex, or a step without sufficient gain, is at most this large,
+    /// as a fraction of the box.
+    pub size_tolerance: f64,
+    /// Edge of the first simplex, as a fraction of the box; not used by other methods.
+    pub initial_step: f64,
+    /// Number of searches of each set of data: the first begins at the start of the parameters, the
+    /// others at random points of the box; 1 to [`crate::limits::STARTS_MAX`].
+    pub starts: u64,
+    /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
+    /// free parameter.
+    pub sensitivities: bool,
+    /// Values towards which the free ones of
+    /// [`Parameter::ALL`](crate::parameters::Parameter::ALL) are pulled, in that order.
+    pub priors: [Option<Prior>; 7],
+}
+
+impl Search {
+    /// Returns the default settings of a method.
+    pub fn by(method: SearchMethod) -> Self {
+        Self {
+            method,
+            max_evaluations: 400,
+            cost_tolerance: match method {
+                SearchMethod::Simplex => 1e-10,
+                SearchMethod::Newton => 1e-12,
+            },
+            size_tolerance: 1e-5,
+            initial_step: 0.15,
+            starts: 1,
+            sensitivities: true,
+            priors: [None; 7],
+        }
+    }
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Self::by(SearchMethod::default())
+    }
+}
+
+impl Section for Objective {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let kind = "`\"moments\"`: the paper's cost; `\"likelihood\"`: minus the mean log likelihood \
+                    of the measured velocities under the model's distribution \
+                    ([searches.md](searches.md#likelihood)); it requires velocities, the search \
+                    `\"simplex\"` and at least two realizations";
+        fields.choice(Key { name: "kind", meaning: kind }, self);
+    }
+}
+
+impl Section for Search {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        self.declare_method(fields);
+        let max_evaluations = "largest number of evaluations in each search (from one start, for one \
+                               group); all searches of a job together are limited likewise";
+        fields.whole(
+            Key { name: "max_evaluations", meaning: max_evaluations },
+            &mut self.max_evaluations,
+            WholeRange::new(1, EVALUATIONS_MAX),
+        );
+        self.declare_tolerances(fields);
+        let starts = "number of searches for each set of data: the first from the starts of the \
+                      parameters, the others from random points of the box \
+                      ([searches.md](searches.md#several-starts))";
+        fields.whole(
+            Key { name: "starts", meaning: starts },
+            &mut self.starts,
+            WholeRange::new(1, STARTS_MAX),
+        );
+        let sensitivities = "after the search the derivatives of both moments are computed at the \
+                             best point, with one evaluation for each free parameter; `identified` in \
+                             the result requires them \
+                             ([searches.md](searches.md#identifiability-and-intervals))";
+        fields
+            .truth(Key { name: "sensitivities", meaning: sensitivities }, &mut self.sensitivities);
+        let priors = "for each free parameter that has one: `{ value = …, weight = … }`; the cost \
+                      grows by weight × ((p - value)/(upper - lower))² \
+                      ([searches.md](searches.md#priors)). The value must be within the bounds, the \
+                      weight above 0; not available with `\"newton\"`";
+        fields.special(Key { name: "priors", meaning: priors });
+    }
+}
+
+impl Search {
+    fn declare_method(&mut self, fields: &mut dyn Fields) {
+        let before = self.method;
+        let method = "`\"simplex\"`: Nelder-Mead with the standard coefficients; `\"newton\"`: \
+                      Gauss-Newton steps to the matching point nearest to the start \
+                      ([searches.md](searches.md)), which requires at least two realizations";
+        fields.choice(Key { name: "method", meaning: method }, &mut self.method);
+        if self.method != before {
+            *self = Self::by(self.method);
+        }
+    }
+
+    fn declare_tolerances(&mut self, fields: &mut dyn Fields) {
+        let cost_tolerance = "the search ends at a cost of at most this (default with `\"newton\"`: \
+                              1e-12); `\"likelihood\"` ignores it, and ends by `size_tolerance`";
+        fields.number(
+            Key { name: "cost_tolerance", meaning: cost_tolerance },
+            &mut self.cost_tolerance,
+            Number::within(Interval::from(0.0, "")),
+        );
+        let size_tolerance = "the search also ends when the simplex has shrunk to this fraction of \
+                              the box, or a step of `\"newton\"` is this short, without improvement";
+        fields.number(
+            Key { name: "size_tolerance", meaning: size_tolerance },
+            &mut self.size_tolerance,
+            Number::within(Interval::from_below(0.0, 1.0, "of the box")),
+        );
+        // A step of at most half the box fits from any start, upwards or downwards.
+        fields.number(
+            Key {
+                name: "initial_step",
+                meaning: "edge of the first simplex; `\"newton\"` ignores it",
+            },
+            &mut self.initial_step,
+            Number::within(Interval::above_to(0.0, 0.5, "of the box")),
+        );
+    }
+}
