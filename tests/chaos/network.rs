@@ -102,13 +102,20 @@ fn half_closed_connections_are_given_up_and_made_anew() {
 fn connections_that_are_silent_one_way_are_given_up_and_made_anew() {
     let mut network = Network::start(12);
     let job = network.submit();
-    for (fault, way) in [Way::Up, Way::Down].into_iter().enumerate() {
+    let stall = |proxy: usize, way| {
         let before = network.attachments();
-        network.proxies[fault].stall(way);
+        network.proxies[proxy].stall(way);
         eventually("the worker attaches again", || network.attachments() > before);
         // The delayed messages arrive after the lease has ended.
-        network.proxies[fault].release(way);
-    }
-    assert!(network.service.expirations() > 0);
+        network.proxies[proxy].release(way);
+    };
+    // On a loaded machine a worker may give up before the coordinator does, as both wait equally
+    // long; then the fault is repeated.
+    let expired = (0..5).any(|_| {
+        stall(0, Way::Up);
+        network.service.expirations() > 0
+    });
+    assert!(expired, "the coordinator ended no lease of a silent worker");
+    stall(1, Way::Down);
     assert_eq!(network.api.end(&job).digest, network.digest);
 }
