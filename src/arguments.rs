@@ -377,7 +377,7 @@ pub(crate) struct TokenArguments {
 /// Of `schema`.
 #[derive(Debug, Args)]
 pub(crate) struct SchemaArguments {
-    /// The file: result is result.json and what --json prints of a run
+    /// The file: job is a job file, result is result.json and what --json prints of a run
     #[arg(value_enum, value_name = "FILE")]
     pub(crate) file: SchemaFile,
 }
@@ -385,6 +385,9 @@ pub(crate) struct SchemaArguments {
 /// A file that has a schema.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum SchemaFile {
+    /// A job file.
+    #[value(help = None)]
+    Job,
     /// `result.json`.
     #[value(help = None)]
     Result,

@@ -9,6 +9,8 @@ mod support;
 use std::fs;
 use std::path::Path;
 
+use osteon_common::job_file;
+
 use support::{Owned, Scratch, osteon};
 
 /// Returns the commands in the `console` blocks of a page, in order, without the program's name.
@@ -170,5 +172,26 @@ fn the_grpc_pages_code_is_the_tested_clients() {
     // The page shows all of it.
     for function in client.lines().filter(|line| line.starts_with("def ")) {
         assert!(blocks.iter().any(|block| block.contains(function)), "{function} is not shown");
+    }
+}
+
+/// Returns `page` with the text between the two marks replaced.
+fn with_keys(page: &str, name: &str, table: &str) -> String {
+    let (begin, end) = (format!("<!-- keys of {name} -->\n"), "<!-- end of keys -->");
+    let (before, rest) = page.split_once(&begin).unwrap();
+    let (_, after) = rest.split_once(end).unwrap();
+    format!("{before}{begin}{table}{end}{after}")
+}
+
+#[test]
+fn the_tables_of_keys_are_those_of_the_program() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/job-files.md");
+    let page = fs::read_to_string(&path).unwrap();
+    let current = with_keys(&page, "setup", &job_file::setup_table());
+    let current = with_keys(&current, "job", &job_file::job_table());
+    if std::env::var_os("OSTEON_WRITE_DOCS").is_some() {
+        fs::write(&path, &current).unwrap();
+    } else {
+        assert!(page == current, "after a change: cargo xtask docs");
     }
 }

@@ -284,20 +284,63 @@ fn provenance_tells_of_every_file(runs: &Runs) {
     }
 }
 
-/// Editors and programs use the schema from the repository.
-#[test]
-fn the_schema_is_the_committed_one_and_describes_every_key() {
-    let printed = run(&["schema", "result"]);
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/result.schema.json");
+/// Checks that a committed schema is the printed one, and returns it. With `OSTEON_WRITE_DOCS` the
+/// committed one is written instead.
+fn committed_schema(file: &str) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/{file}.schema.json"));
+    let printed = run(&["schema", file]);
+    if std::env::var_os("OSTEON_WRITE_DOCS").is_some() {
+        fs::write(&path, printed.succeeded()).unwrap();
+    }
     let committed = fs::read_to_string(path).unwrap();
-    let hint = "after a change: cargo run -- schema result > docs/result.schema.json";
-    assert_eq!(printed.succeeded(), committed, "{hint}");
+    assert_eq!(printed.succeeded(), committed, "after a change: cargo xtask reference");
     let schema: Value = serde_json::from_str(&committed).unwrap();
     assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
-    let mut undescribed = Vec::new();
-    let count = undescribed_keys(&schema, "", &mut undescribed);
-    assert!(count > 100, "only {count} keys were found");
-    assert!(undescribed.is_empty(), "without a description: {undescribed:?}");
+    schema
+}
+
+/// Editors and programs use the schemas from the repository.
+#[test]
+fn the_schemas_are_the_committed_ones_and_describe_every_key() {
+    for (file, least) in [("job", 50), ("result", 100)] {
+        let mut undescribed = Vec::new();
+        let count = undescribed_keys(&committed_schema(file), "", &mut undescribed);
+        assert!(count > least, "{file}: only {count} keys were found");
+        assert!(undescribed.is_empty(), "{file}: without a description: {undescribed:?}");
+    }
+}
+
+/// Lists the keys of `value` that `schema` does not know, or that it lacks.
+fn unlike(schema: &Value, value: &Value, path: &str, found: &mut Vec<String>) {
+    let Some(entries) = value.as_object() else { return };
+    for (name, value) in entries {
+        let path = format!("{path}.{name}");
+        match (&schema["properties"][name], &schema["additionalProperties"]) {
+            (Value::Null, Value::Object(_)) => {}
+            (Value::Null, _) => found.push(path),
+            (known, _) => unlike(known, value, &path, found),
+        }
+    }
+}
+
+#[test]
+fn the_schema_of_job_files_knows_every_key_of_the_examples() {
+    let schema = committed_schema("job");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for file in [
+        "fuzz/corpus/jobs/every-key.json",
+        "fuzz/corpus/jobs/every-key.toml",
+        "examples/paper.toml",
+    ] {
+        let text = fs::read_to_string(root.join(file)).unwrap();
+        let job: Value = match file.ends_with(".json") {
+            true => serde_json::from_str(&text).unwrap(),
+            false => toml::from_str(&text).unwrap(),
+        };
+        let mut found = Vec::new();
+        unlike(&schema, &job, "", &mut found);
+        assert!(found.is_empty(), "{file}: {found:?}");
+    }
 }
 
 /// Counts the keys in a schema, and lists those without a description.

@@ -13,10 +13,14 @@ pub(crate) struct Interval {
     unit: &'static str,
 }
 
+/// End of an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Edge {
+pub(crate) enum Edge {
+    /// No limit.
     None,
+    /// The limit does not belong to the interval.
     Open(f64),
+    /// The limit belongs to the interval.
     Closed(f64),
 }
 
@@ -82,6 +86,11 @@ impl Interval {
     /// Returns the unit, or what the numbers are fractions of; empty for pure numbers.
     pub(crate) const fn unit(&self) -> &'static str {
         self.unit
+    }
+
+    /// Returns the lower and the upper end.
+    pub(crate) const fn edges(&self) -> (Edge, Edge) {
+        (self.lower, self.upper)
     }
 
     /// Returns whether `value` is finite and inside the interval.

@@ -1,7 +1,7 @@
 //! One deterministic problem: layers, probe, criterion, solver, and one bone.
 
 use crate::elasticity::Elasticity;
-use crate::fields::Section;
+use crate::fields::{Key, Section};
 use crate::layers::Layers;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
@@ -21,13 +21,16 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns each section with its name in a file, in the order of a canonical file.
-    pub fn sections(&mut self) -> [(&'static str, &mut dyn Section); 4] {
+    /// Returns each section with its key, in the order of a canonical file.
+    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 4] {
         [
-            ("layers", &mut self.layers),
-            ("probe", &mut self.probe),
-            ("picking", &mut self.picking),
-            ("solver", &mut self.solver),
+            (Key { name: "layers", meaning: "the three layers" }, &mut self.layers),
+            (Key { name: "probe", meaning: "source, receivers, pulse" }, &mut self.probe),
+            (
+                Key { name: "picking", meaning: "criterion of the first arriving signal" },
+                &mut self.picking,
+            ),
+            (Key { name: "solver", meaning: "settings of the wave solver" }, &mut self.solver),
         ]
     }
 }

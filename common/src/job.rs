@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::case::Setup;
+use crate::fields::{Key, Section};
 use crate::parameters::{Parameter, Point};
 
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
@@ -184,7 +185,41 @@ pub struct JobSpecification {
     pub search: Search,
 }
 
+/// The settings of a run that are sections of a job file.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RunSettings {
+    /// Settings of the Monte Carlo loop.
+    pub monte_carlo: MonteCarlo,
+    /// The function to be minimised.
+    pub objective: Objective,
+    /// Settings of the search loop.
+    pub search: Search,
+}
+
+impl RunSettings {
+    /// Returns each section with its key, in the order of a canonical file.
+    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 3] {
+        [
+            (
+                Key { name: "monte_carlo", meaning: "settings of the Monte Carlo loop" },
+                &mut self.monte_carlo,
+            ),
+            (
+                Key { name: "objective", meaning: "the function to be minimised" },
+                &mut self.objective,
+            ),
+            (Key { name: "search", meaning: "settings of the search" }, &mut self.search),
+        ]
+    }
+}
+
 impl JobSpecification {
+    /// Returns the settings of the run.
+    pub fn run_settings(&self) -> RunSettings {
+        let &Self { monte_carlo, objective, search, .. } = self;
+        RunSettings { monte_carlo, objective, search }
+    }
+
     /// Returns the range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]

@@ -86,6 +86,8 @@ pub struct Search {
     /// Number of searches of each set of data: the first begins at the start of the parameters, the
     /// others at random points of the box; 1 to [`crate::limits::STARTS_MAX`].
     pub starts: u64,
+    /// Number of the first start: 0 is the start of the parameters, k the k-th random point.
+    pub first_start: u64,
     /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
     /// free parameter.
     pub sensitivities: bool,
@@ -107,6 +109,7 @@ impl Search {
             size_tolerance: 1e-5,
             initial_step: 0.15,
             starts: 1,
+            first_start: 0,
             sensitivities: true,
             priors: [None; 7],
         }
@@ -147,6 +150,14 @@ impl Section for Search {
             Key { name: "starts", meaning: starts },
             &mut self.starts,
             WholeRange::new(1, STARTS_MAX),
+        );
+        let first_start = "number of the first start: 0 is the start of the parameters, k the k-th \
+                           random point. With `first_start = 10` a job goes on where one with \
+                           `starts = 10` ended";
+        fields.whole(
+            Key { name: "first_start", meaning: first_start },
+            &mut self.first_start,
+            WholeRange::new(0, STARTS_MAX),
         );
         let sensitivities = "after the search the derivatives of both moments are computed at the \
                              best point, with one evaluation for each free parameter; `identified` in \

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 
 use crate::case::{Case, Setup};
 use crate::elasticity::Elasticity;
-use crate::fields::{Entry, Section, Value, entries};
+use crate::fields::{Entry, Key, Section, Value, entries};
 use crate::job::{Data, JobSpecification, Prior, Range, Search};
 use crate::parameters::Parameter;
 
@@ -50,18 +50,18 @@ fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
 
 fn setup(out: &mut String, setup: &Setup) -> fmt::Result {
     let mut setup = *setup;
-    for (index, (name, declared)) in setup.sections().into_iter().enumerate() {
+    for (index, (key, declared)) in setup.sections().into_iter().enumerate() {
         if index > 0 {
             writeln!(out)?;
         }
-        section(out, name, declared)?;
+        section(out, key, declared)?;
     }
     Ok(())
 }
 
 /// Writes a section: each key on a line, with its unit as a comment.
-fn section(out: &mut String, name: &str, section: &mut dyn Section) -> fmt::Result {
-    writeln!(out, "[{name}]")?;
+fn section(out: &mut String, key: Key, section: &mut dyn Section) -> fmt::Result {
+    writeln!(out, "[{}]", key.name)?;
     for entry in entries(section).iter().filter(|entry| entry.applies()) {
         let Some(value) = value(&entry.value) else { continue };
         write!(out, "{} = {value}", entry.key.name)?;
@@ -73,7 +73,7 @@ fn section(out: &mut String, name: &str, section: &mut dyn Section) -> fmt::Resu
 }
 
 /// Returns the text of a value; `None` if it is absent or written elsewhere.
-fn value(value: &Value) -> Option<String> {
+pub(crate) fn value(value: &Value) -> Option<String> {
     Some(match value {
         Value::Number(number, _) => format!("{:?}", (*number)?),
         Value::Whole(whole, _) => whole.to_string(),
@@ -84,8 +84,8 @@ fn value(value: &Value) -> Option<String> {
     })
 }
 
-/// Returns a table on one line, as it may be typed.
-pub(crate) fn inline_table(entries: &[Entry]) -> String {
+/// Returns a table on one line.
+fn inline_table(entries: &[Entry]) -> String {
     let keys = entries.iter().filter(|entry| entry.applies());
     let keys = keys.filter_map(|entry| Some((entry.key.name, value(&entry.value)?)));
     let keys: Vec<_> = keys.map(|(name, value)| format!("{name} = {value}")).collect();
@@ -160,12 +160,9 @@ fn range(out: &mut String, parameter: Parameter, range: Range) -> fmt::Result {
 }
 
 fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
-    let JobSpecification { mut monte_carlo, mut objective, mut search, .. } = *specification;
-    let sections: [(_, &mut dyn Section); 3] =
-        [("monte_carlo", &mut monte_carlo), ("objective", &mut objective), ("search", &mut search)];
-    for (name, declared) in sections {
+    for (key, declared) in specification.run_settings().sections() {
         writeln!(out)?;
-        section(out, name, declared)?;
+        section(out, key, declared)?;
     }
     priors(out, &specification.search)
 }

@@ -84,8 +84,8 @@ impl Warnings {
 
     fn setup(&mut self, setup: &Setup) {
         let mut setup = *setup;
-        for (name, section) in setup.sections() {
-            self.entries(name, &fields::entries(section));
+        for (key, section) in setup.sections() {
+            self.entries(key.name, &fields::entries(section));
         }
         let probe = &setup.probe;
         let distance = (probe.receivers.first_x1 - probe.source.x1).abs();

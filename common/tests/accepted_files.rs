@@ -97,6 +97,7 @@ fn a_minimal_job_has_the_documented_defaults() {
             size_tolerance: 1e-5,
             initial_step: 0.15,
             starts: 1,
+            first_start: 0,
             sensitivities: true,
             priors: [None; 7],
         },

@@ -230,6 +230,8 @@ fn run() {
             ("initial_step = 0.1", "initial_step = 0.6"),
             ("initial_step = 0.1", "starts = 0"),
             ("initial_step = 0.1", "starts = 1001"),
+            ("initial_step = 0.1", "first_start = -1"),
+            ("initial_step = 0.1", "first_start = 1001"),
             ("max_evaluations = 300", "max_evaluations = 10000\nstarts = 200"),
             ("sensitivities = false", "sensitivities = 1"),
             ("sensitivities = false", "sensitivity = true"),

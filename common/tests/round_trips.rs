@@ -148,14 +148,16 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
     let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
-    (method, 1_u64..=1000, numbers, 1_u64..=100, any::<bool>()).prop_map(
-        |(method, max_evaluations, numbers, starts, sensitivities)| Search {
+    let starts = (1_u64..=100, 0_u64..=1000);
+    (method, 1_u64..=1000, numbers, starts, any::<bool>()).prop_map(
+        |(method, max_evaluations, numbers, (starts, first_start), sensitivities)| Search {
             method,
             max_evaluations,
             cost_tolerance: numbers.0,
             size_tolerance: numbers.1,
             initial_step: numbers.2,
             starts,
+            first_start,
             sensitivities,
             priors: [None; 7],
         },

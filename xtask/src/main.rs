@@ -5,6 +5,7 @@ mod deny;
 mod digests;
 mod python;
 mod random;
+mod reference;
 mod tables;
 
 use std::env;
@@ -73,6 +74,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "tables",
         "makes the tables of docs/validation.md again: all, or those of the studies named",
         Action::Function(tables::rewrite),
+    ),
+    (
+        "reference",
+        "writes what docs/ takes from the program: tables of keys, JSON Schemas",
+        Action::Function(reference::write),
     ),
     (
         "digests",

@@ -14,12 +14,12 @@ use super::{known_wrong, quantity};
 /// Records all violations of `setup`.
 pub fn setup(setup: &Setup, violations: &mut Violations) {
     let (mut checked, mut default) = (*setup, Setup::default());
-    for ((name, section), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
-        if name == "probe" {
+    for ((key, section), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
+        if key.name == "probe" {
             // The range of the heights is narrower than that of their keys.
             heights(setup, violations);
         }
-        super::section(name, section, default, violations);
+        super::section(key.name, section, default, violations);
     }
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);

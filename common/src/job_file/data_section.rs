@@ -4,12 +4,37 @@ use std::path::Path;
 
 use crate::check::{self, DATA_FORMS};
 use crate::document::{Value, entry_path};
+use crate::fields::Key;
 use crate::job::{Data, Group, JobKind};
 use crate::origin::Origin;
 use crate::reader::{Reader, Table};
 use crate::velocities::{self, Measured};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
+
+/// The keys of `[data]`.
+pub(super) const KEYS: [Key; 5] = [
+    Key {
+        name: "velocities",
+        meaning: "for `identify`: a CSV file relative to the job file, with a header and a column \
+                  `velocity` in m/s (other columns, and lines that start with `#`, are ignored); or \
+                  a list of the numbers",
+    },
+    Key {
+        name: "group",
+        meaning: "the column of that file that names the group (bone, patient, site) of each \
+                  velocity; at most 1000 groups, see [below](#groups-of-velocities)",
+    },
+    Key {
+        name: "groups",
+        meaning: "instead of a file: a table with a list of velocities for each group name",
+    },
+    Key {
+        name: MOMENTS[0],
+        meaning: "instead of velocities, together with the next key: their mean, m/s, above 0",
+    },
+    Key { name: MOMENTS[1], meaning: "their coefficient of variation, above 0" },
+];
 
 /// Returns the measured data, or `None` after recording the violation, and their file, if any. For
 /// a propagation it is always `None`, and `[data]` is checked as far as possible without another
@@ -37,8 +62,7 @@ fn given(
     kind: JobKind,
     from_file: impl FnOnce(&str, Option<&str>) -> Result<Data, Vec<velocities::CsvError>>,
 ) -> Option<Data> {
-    let keys = ["velocities", "group", "groups", MOMENTS[0], MOMENTS[1]];
-    let table = reader.table(root, "data", &keys);
+    let table = reader.table(root, "data", &KEYS.map(|key| key.name));
     if !table.is_table() {
         if kind == JobKind::Identification && !root.has("data") {
             reader.lacks("data", &["data".to_owned()], check::no_data());

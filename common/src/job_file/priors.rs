@@ -1,8 +1,21 @@
 //! `[search.priors]`.
 
+use crate::fields::Key;
 use crate::job::Prior;
 use crate::parameters::Parameter;
 use crate::reader::{Reader, Table};
+
+/// The keys of a prior.
+pub(super) const KEYS: [Key; 2] = [
+    Key {
+        name: "value",
+        meaning: "value towards which the parameter is pulled; within its bounds",
+    },
+    Key {
+        name: "weight",
+        meaning: "increase of the cost at a distance of the whole width of the bounds; above 0",
+    },
+];
 
 /// Reads a table `{ value, weight }` for each parameter that has one; numbers that cannot be read
 /// are recorded and become NaN.
@@ -12,11 +25,11 @@ pub(super) fn read(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; 7
         if !table.has(parameter.name()) {
             return None;
         }
-        let prior = reader.table(&table, parameter.name(), &["value", "weight"]);
+        let prior = reader.table(&table, parameter.name(), &KEYS.map(|key| key.name));
         if !prior.is_table() {
             return None;
         }
-        let [value, weight] = ["value", "weight"].map(|key| {
+        let [value, weight] = KEYS.map(|Key { name: key, .. }| {
             if !prior.has(key) {
                 let expected = "a number; a prior has a value and a weight";
                 reader.missing(&prior, key, expected);

@@ -85,6 +85,7 @@ prop_compose! {
         max_evaluations in 1_u64..1000,
         initial_step in 0.01..0.5,
         starts in 1_u64..100,
+        first_start in 0_u64..=1000,
         sensitivities: bool,
         weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
         solver in solver(),
@@ -112,6 +113,7 @@ prop_compose! {
                 max_evaluations,
                 initial_step,
                 starts,
+                first_start,
                 sensitivities,
                 priors,
                 ..Search::by(method)

@@ -54,7 +54,7 @@ impl DatasetSearch {
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
         let given = specification.data.as_ref();
         let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
-        let space = SearchBox::new(specification.parameters);
+        let space = space_of_start(specification, 0);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
@@ -202,7 +202,7 @@ impl DatasetSearch {
         }
         self.start += 1;
         if u64::from(self.start) < specification.search.starts {
-            self.space = random_start(specification, self.start.into());
+            self.space = space_of_start(specification, self.start);
             let measured = measured(specification, self.set as usize);
             self.method = Method::new(specification, self.data, measured, self.space);
             return;
@@ -239,9 +239,14 @@ fn measured(specification: &JobSpecification, set: usize) -> Option<&[f64]> {
     specification.data.as_ref().and_then(|data| data.velocities(set))
 }
 
-/// Returns the box with its start at a random point, which is the same for every set of data.
-fn random_start(specification: &JobSpecification, start: u64) -> SearchBox {
+/// Returns the box for one of a job's searches. Its start is that of the parameters, or a random
+/// point, which is the same for every set of data.
+fn space_of_start(specification: &JobSpecification, start: u32) -> SearchBox {
     let space = SearchBox::new(specification.parameters);
+    let start = specification.search.first_start + u64::from(start);
+    if start == 0 {
+        return space;
+    }
     let tries = (0..START_TRIES).map(|attempt| {
         // No realization has an index this large, so these germs are used for nothing else.
         let index = u64::MAX - (start * START_TRIES + attempt);

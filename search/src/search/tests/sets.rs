@@ -174,6 +174,19 @@ fn several_starts_give_several_answers() {
     assert_eq!(search.summary(), again.summary());
 }
 
+#[test]
+fn more_starts_go_on_after_those_of_another_job() {
+    let started_at = |first_start, starts: u32| -> Vec<Point> {
+        let mut specification = by_newton(60);
+        specification.search = Search { first_start, starts: starts.into(), ..specification.search };
+        let (search, _) = run(&specification);
+        let first = |start| search.history().iter().find(|row| row.role.start == start);
+        (0..starts).map(|start| first(start).unwrap().point).collect()
+    };
+    let all = started_at(0, 4);
+    assert_eq!(started_at(2, 2), all[2..]);
+}
+
 /// A job with these groups, some of which have nothing to match.
 fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
     let group = |(name, velocities): &(&str, &[f64])| Group {
