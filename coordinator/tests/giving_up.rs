@@ -93,7 +93,7 @@ async fn a_cancellation_frees_the_place_of_a_submission() {
 /// A worker that answers every batch.
 async fn work(channel: Channel) {
     let (outbound, messages) = mpsc::channel(16);
-    let hello = WorkerHello { threads: 2, ..fake::wire_hello(1) };
+    let hello = WorkerHello { slots: 2, ..fake::wire_hello(1) };
     outbound.send(AttachRequest { message: Some(Sent::Hello(hello)) }).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await.unwrap();
     let mut stream = attached.into_inner();

@@ -52,7 +52,7 @@ async fn channel(coordinator: &Coordinator) -> Channel {
 }
 
 fn hello(fingerprint: String) -> AttachRequest {
-    let hello = WorkerHello { fingerprint, threads: 2, ..fake::wire_hello(1) };
+    let hello = WorkerHello { fingerprint, slots: 2, ..fake::wire_hello(1) };
     AttachRequest { message: Some(Request::Hello(hello)) }
 }
 

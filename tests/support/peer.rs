@@ -29,7 +29,7 @@ pub(crate) fn hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
-        threads: 1,
+        slots: 1,
         host: "peer".to_owned(),
         process,
         instance: process.into(),

@@ -140,8 +140,7 @@ impl State {
         Request::Hello(v1::WorkerHello {
             version: version::VERSION.to_owned(),
             fingerprint: version::fingerprint(),
-            // The field has this name because threads were at first the only kind of slots.
-            threads: self.identity.slots,
+            slots: self.identity.slots,
             host: self.identity.host.clone(),
             process: self.identity.process,
             instance: self.identity.instance,

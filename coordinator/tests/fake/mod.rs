@@ -81,9 +81,8 @@ pub(crate) fn attached(process: u32) -> Event {
 
 /// Returns the introduction of a worker with one thread.
 pub(crate) fn hello(process: u32) -> Hello {
-    let WorkerHello { version, fingerprint, threads, host, process, instance } =
-        wire_hello(process);
-    Hello { version, fingerprint, slots: threads, host, process, instance }
+    let WorkerHello { version, fingerprint, slots, host, process, instance } = wire_hello(process);
+    Hello { version, fingerprint, slots, host, process, instance }
 }
 
 /// Returns the same introduction as a message.
@@ -91,7 +90,7 @@ pub(crate) fn wire_hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: VERSION.to_owned(),
         fingerprint: version::fingerprint(),
-        threads: 1,
+        slots: 1,
         host: "node".to_owned(),
         process,
         instance: mix(process.into()),

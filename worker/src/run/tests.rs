@@ -179,7 +179,7 @@ async fn a_device_is_told_what_to_compute_and_what_to_forget() {
     timeout(Duration::from_secs(60), ended).await.unwrap().unwrap();
     let heard = scene.heard.lock().unwrap().clone();
     let Some(Request::Hello(hello)) = heard.first() else { panic!("{heard:?}") };
-    assert_eq!(hello.threads, 4096);
+    assert_eq!(hello.slots, 4096);
     let results = heard.iter().filter_map(|message| match message {
         Request::Result(result) => {
             Some((result.batch, batch::answer_from_message(result).unwrap()))

@@ -109,7 +109,7 @@ const DRAIN: Effect = Effect::Send(Request::Drain(v1::WorkerDrain {}));
 #[test]
 fn hello_says_who_it_is() {
     let Request::Hello(hello) = Recorder::new().state.attach() else { panic!("no hello") };
-    assert_eq!((hello.threads, hello.host.as_str(), hello.process), (2, "host", 7));
+    assert_eq!((hello.slots, hello.host.as_str(), hello.process), (2, "host", 7));
     assert_eq!(hello.instance, 9);
     assert_eq!(hello.fingerprint, version::fingerprint());
 }
