@@ -58,7 +58,7 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     });
     let workers = listed()["workers"].clone();
     assert_eq!(workers[0]["process"], first.id());
-    assert_eq!((&workers[0]["threads"], &workers[1]["threads"]), (&1.into(), &2.into()));
+    assert_eq!((&workers[0]["slots"], &workers[1]["slots"]), (&1.into(), &2.into()));
     assert_eq!(workers[0]["version"], env!("CARGO_PKG_VERSION"));
     assert!(is_recent(&workers[0]["attached"]), "{workers}");
     assert!(workers[0]["silent_s"].as_f64() < Some(60.0), "{workers}");
@@ -154,7 +154,7 @@ fn the_log_tells_what_happened_to_every_job_and_worker() {
     };
     for (what, fields) in [
         ("listening", &["url=http://127.0.0.1:"] as &[&str]),
-        ("worker attached", &["worker=1", "host=", "process=", "threads=1"]),
+        ("worker attached", &["worker=1", "host=", "process=", "slots=1"]),
         ("worker disconnected", &["worker=1", "host=", "process=", "drained"]),
         ("job accepted", &["job=1", "user=", "name=\"knee\"", "kind=\"identification\""]),
         ("job started", &["job=1"]),

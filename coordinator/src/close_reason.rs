@@ -32,7 +32,7 @@ pub enum CloseReason {
         reason: String,
     },
     /// It announced an invalid number of slots.
-    #[error("this worker announces {slots} threads; 1 to {max} are allowed")]
+    #[error("this worker announces {slots} slots; 1 to {max} are allowed")]
     Slots {
         /// Announced number of slots.
         slots: u32,

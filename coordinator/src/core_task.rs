@@ -12,7 +12,7 @@ use crate::effect::{Answer, Effect, Refusal};
 use crate::event::{Event, Hello, ReadFailure, Request};
 use crate::failing::{Failed, Failing};
 use crate::ids::{JobId, Token, WorkerId};
-use crate::outbound::{self, Outbound};
+use crate::outbound::{self, NotReading, Outbound};
 use crate::reactor::react;
 use crate::snapshot;
 use crate::state::State;
@@ -154,7 +154,7 @@ impl Core {
                     self.send(worker, welcome, followups);
                 }
                 Effect::Send { worker, batch, work } => {
-                    self.send(worker, outbound::batch(batch, &work), followups);
+                    self.queue(worker, followups, |outbound| outbound.send_batch(batch, &work));
                 }
                 Effect::Revoke { worker, batch } => {
                     self.send(worker, outbound::revoke(batch), followups);
@@ -211,8 +211,17 @@ impl Core {
         message: v1::AttachResponse,
         followups: &mut VecDeque<Event>,
     ) {
-        if let Some(outbound) = self.outbound.get(&worker)
-            && outbound.send(Ok(message)).is_err()
+        self.queue(worker, followups, |outbound| outbound.send(Ok(message)));
+    }
+
+    fn queue(
+        &mut self,
+        worker: WorkerId,
+        followups: &mut VecDeque<Event>,
+        send: impl FnOnce(&mut Outbound) -> Result<(), NotReading>,
+    ) {
+        if let Some(outbound) = self.outbound.get_mut(&worker)
+            && send(outbound).is_err()
         {
             // The messages in flight are bounded, so the queue is full only if the worker does not
             // read or has gone.

@@ -169,7 +169,7 @@ pub struct Hello {
     /// Fingerprint of its numerics.
     pub fingerprint: String,
     /// Number of realizations that it computes at the same time: threads of a processor, or the
-    /// equivalent of another device. The field of the message is called `threads`.
+    /// equivalent of another device.
     pub slots: u32,
     /// Host name, for people.
     pub host: String,

@@ -113,7 +113,7 @@ impl Notice {
     pub(crate) fn write(&self) {
         match self {
             Self::WorkerAttached { worker, name, slots, version } => tracing::info!(
-                %worker, host = name.host(), process = name.process(), threads = slots,
+                %worker, host = name.host(), process = name.process(), slots,
                 version = version.as_str(), "worker attached"
             ),
             Self::WorkerRefused { worker, name, reason } => tracing::warn!(

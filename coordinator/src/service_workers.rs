@@ -113,8 +113,8 @@ async fn forward(
 }
 
 fn introduce(hello: WorkerHello) -> Hello {
-    let WorkerHello { version, fingerprint, threads, host, process, instance } = hello;
-    Hello { version, fingerprint, slots: threads, host, process, instance }
+    let WorkerHello { version, fingerprint, slots, host, process, instance } = hello;
+    Hello { version, fingerprint, slots, host, process, instance }
 }
 
 fn event(worker: WorkerId, message: AttachRequest) -> Event {

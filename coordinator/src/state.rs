@@ -4,10 +4,12 @@
 //! Times are durations since the Unix epoch, given with each event.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::limits::WORKERS_MAX;
 use osteon_proto::batch::Work;
+use osteon_proto::evaluation;
 
 use crate::batch::{Assignment, Batch, Purpose};
 use crate::config::Config;
@@ -214,10 +216,15 @@ impl State {
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
         let evaluation = self.evaluation_of(assignment)?;
         let specification = &self.jobs.get(&assignment.job)?.record.specification;
-        Some(Work {
+        let shared = evaluation::Evaluation {
+            // Attempts are numbered over all jobs.
+            id: evaluation.attempt,
             setup: specification.setup,
             point: evaluation.point,
             germs: specification.monte_carlo.germs(),
+        };
+        Some(Work {
+            evaluation: Arc::new(shared),
             first: assignment.indices.first,
             count: u32::try_from(assignment.indices.count).ok()?,
         })

@@ -37,7 +37,7 @@ fn snapshot(state: &State, id: WorkerId, worker: &Worker, now: Duration) -> Work
         worker: id.0,
         host: worker.name.host().to_owned(),
         process: worker.name.process(),
-        threads: worker.hello.slots,
+        slots: worker.hello.slots,
         version: worker.hello.version.clone(),
         attach_time: Some(timestamp::to_message(worker.attached)),
         silent_s: now.saturating_sub(worker.last_seen).as_secs_f64(),

@@ -20,7 +20,7 @@ use osteon_proto::v1::attach_response::Message as Received;
 use osteon_proto::v1::{
     AttachRequest, FetchRequest, FetchResponse, SubmitRequest, WatchRequest, WorkerHello,
 };
-use osteon_proto::{batch, specification};
+use osteon_proto::{announced, batch, specification};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
@@ -93,13 +93,17 @@ async fn a_cancellation_frees_the_place_of_a_submission() {
 /// A worker that answers every batch.
 async fn work(channel: Channel) {
     let (outbound, messages) = mpsc::channel(16);
-    let hello = WorkerHello { threads: 2, ..fake::wire_hello(1) };
+    let hello = WorkerHello { slots: 2, ..fake::wire_hello(1) };
     outbound.send(AttachRequest { message: Some(Sent::Hello(hello)) }).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await.unwrap();
     let mut stream = attached.into_inner();
+    let mut evaluations = announced::Received::default();
     while let Ok(Some(message)) = stream.message().await {
+        if let Some(Received::Evaluation(message)) = &message.message {
+            evaluations.receive(message).unwrap();
+        }
         if let Some(Received::Batch(message)) = message.message {
-            let work = batch::from_message(&message).unwrap();
+            let work = batch::from_message(&message, &evaluations).unwrap();
             let result = batch::answer_to_message(message.batch, &fake::solved(&work), 0.001);
             outbound.send(AttachRequest { message: Some(Sent::Result(result)) }).await.unwrap();
         }

@@ -11,6 +11,7 @@ use std::time::Duration;
 use osteon_common::results::Status as JobEnd;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_proto::announced::Received;
 use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
@@ -43,9 +44,13 @@ async fn work(channel: Channel, process: u32) -> Result<(), Status> {
     outbound.send(AttachRequest { message: Some(Request::Hello(hello)) }).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await?;
     let mut stream = attached.into_inner();
+    let mut evaluations = Received::default();
     while let Some(message) = stream.message().await? {
+        if let Some(Response::Evaluation(message)) = &message.message {
+            evaluations.receive(message).unwrap();
+        }
         if let Some(Response::Batch(message)) = message.message {
-            let mut solved = fake::solved(&batch::from_message(&message).unwrap());
+            let mut solved = fake::solved(&batch::from_message(&message, &evaluations).unwrap());
             if process == LIAR
                 && message.batch.is_multiple_of(5)
                 && let Ok(velocity) = &mut solved[0].outcome

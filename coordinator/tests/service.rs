@@ -17,6 +17,7 @@ use osteon_coordinator::store::{
 };
 use osteon_coordinator::worker_name::WorkerName;
 use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
+use osteon_proto::announced::Received;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
@@ -52,22 +53,36 @@ async fn channel(coordinator: &Coordinator) -> Channel {
 }
 
 fn hello(fingerprint: String) -> AttachRequest {
-    let hello = WorkerHello { fingerprint, threads: 2, ..fake::wire_hello(1) };
+    let hello = WorkerHello { fingerprint, slots: 2, ..fake::wire_hello(1) };
     AttachRequest { message: Some(Request::Hello(hello)) }
 }
 
 /// A worker that answers at most `batches_max` batches, then disappears without notice.
 async fn work(channel: Channel, batches_max: usize) -> Result<usize, Status> {
+    work_with(channel, batches_max, |_| {}).await
+}
+
+/// As [`work`], and shows each message of the coordinator to `see`.
+async fn work_with(
+    channel: Channel,
+    batches_max: usize,
+    mut see: impl FnMut(&Response),
+) -> Result<usize, Status> {
     let (outbound, messages) = mpsc::channel(16);
     outbound.send(hello(version::fingerprint())).await.unwrap();
     let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await?;
     let mut stream = attached.into_inner();
+    let mut evaluations = Received::default();
     let mut answered = 0;
     while answered < batches_max
         && let Some(message) = stream.message().await?
     {
+        message.message.iter().for_each(&mut see);
+        if let Some(Response::Evaluation(message)) = &message.message {
+            evaluations.receive(message).unwrap();
+        }
         if let Some(Response::Batch(message)) = message.message {
-            let work = batch::from_message(&message).unwrap();
+            let work = batch::from_message(&message, &evaluations).unwrap();
             let result = batch::answer_to_message(message.batch, &fake::solved(&work), 0.001);
             let result = AttachRequest { message: Some(Request::Result(result)) };
             outbound.send(result).await.unwrap();
@@ -169,6 +184,34 @@ async fn a_job_goes_from_submission_to_result() {
     for worker in workers {
         assert_eq!(worker.await.unwrap().unwrap_err().code(), Code::Unavailable);
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_evaluation_comes_once_on_each_stream() {
+    const BATCHES: usize = 4;
+    let coordinator = coordinator("127.0.0.1:0", Box::new(MemoryStore::new())).await;
+    let mut client = client(&coordinator).await;
+    submit(&mut client, &fake::propagation(100_000, 7), "").await.unwrap();
+    let mut streams = Vec::new();
+    // A worker attaches, disappears, and attaches again.
+    for _ in 0..2 {
+        let (mut evaluations, mut batches) = (Vec::new(), Vec::new());
+        let worker = work_with(channel(&coordinator).await, BATCHES, |message| match message {
+            Response::Evaluation(message) => {
+                assert!(batches.is_empty(), "an evaluation came after its first batch");
+                evaluations.push(*message);
+            }
+            Response::Batch(message) => batches.push(message.evaluation),
+            _ => {}
+        });
+        let worked = tokio::time::timeout(TIMEOUT, worker).await.unwrap();
+        assert_eq!(worked.unwrap(), BATCHES);
+        assert_eq!(evaluations.len(), 1, "{evaluations:?}");
+        assert_eq!(batches, [evaluations[0].evaluation; BATCHES]);
+        streams.push(evaluations.remove(0));
+    }
+    assert_eq!(streams[0], streams[1]);
+    coordinator.shutdown().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

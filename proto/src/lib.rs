@@ -5,12 +5,14 @@
 //! [`osteon_common::violations::Violations`] is reported at once. A message from a coordinator or a
 //! worker is either well formed or a typed [`malformed::Malformed`].
 
+pub mod announced;
 pub mod batch;
 pub mod choice;
 mod conclusions;
 pub mod credential_file;
 pub mod credentials;
 pub mod endpoint;
+pub mod evaluation;
 mod fields;
 pub mod identity;
 pub mod malformed;

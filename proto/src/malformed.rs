@@ -61,12 +61,25 @@ pub enum Malformed {
         /// The number found.
         value: f64,
     },
-    /// The setup of a batch lacks a field, so its result would depend on the worker's defaults.
-    #[error("the setup of a batch is incomplete")]
+    /// The setup of an evaluation lacks a field, so its results would depend on the worker's
+    /// defaults.
+    #[error("the setup of an evaluation is incomplete")]
     IncompleteSetup,
-    /// The setup of a batch violates a rule.
-    #[error("the setup of a batch is not valid: {0}")]
+    /// The setup of an evaluation violates a rule.
+    #[error("the setup of an evaluation is not valid: {0}")]
     InvalidSetup(Violations),
+    /// A batch refers to an evaluation that is not among those its worker keeps.
+    #[error("a batch refers to evaluation {evaluation}, which this worker does not have")]
+    UnknownEvaluation {
+        /// Number of the evaluation.
+        evaluation: u64,
+    },
+    /// An evaluation that a worker keeps comes again.
+    #[error("evaluation {evaluation} comes a second time")]
+    RepeatedEvaluation {
+        /// Number of the evaluation.
+        evaluation: u64,
+    },
     /// A stored specification violates a rule.
     #[error("the specification is not valid: {0}")]
     InvalidSpecification(Violations),

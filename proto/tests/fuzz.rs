@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
 use std::path::Path;
+use std::sync::Arc;
 
 use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
@@ -20,9 +21,12 @@ use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;
 use osteon_common::{job_file, results_csv};
 use osteon_fuzz::{bounded, damaged, properties, texts};
+use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::v1::fetch_response::Part;
-use osteon_proto::{parameter_values, realizations, results, specification, status, v1};
+use osteon_proto::{
+    evaluation, parameter_values, realizations, results, specification, status, v1,
+};
 use proptest::prelude::*;
 use prost::Message as _;
 use tonic::{Code, Status};
@@ -67,23 +71,49 @@ fn check_specification(bytes: &[u8]) {
     }
 }
 
-fn batches() -> Vec<Vec<u8>> {
-    let work = |job: &JobSpecification| Work {
-        setup: job.setup,
-        point: job.start(),
-        germs: job.monte_carlo.germs(),
-        first: 17,
-        count: 5,
-    };
-    jobs().iter().map(|job| batch::to_message(3, &work(job)).encode_to_vec()).collect()
+/// The evaluation at the start of a job.
+fn evaluation_of(job: &JobSpecification) -> evaluation::Evaluation {
+    let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
+    evaluation::Evaluation { id: 7, setup, point, germs }
 }
 
-fn check_batch(bytes: &[u8]) {
+fn evaluations() -> Vec<Vec<u8>> {
+    jobs().iter().map(|job| evaluation::to_message(&evaluation_of(job)).encode_to_vec()).collect()
+}
+
+fn check_evaluation(bytes: &[u8]) {
+    let Ok(message) = bounded(bytes.len(), || v1::Evaluation::decode(bytes)) else { return };
+    match bounded(bytes.len(), || evaluation::from_message(&message)) {
+        Ok(evaluation) => {
+            let written = evaluation::to_message(&evaluation);
+            assert_eq!(evaluation::from_message(&written), Ok(evaluation));
+            // A worker guesses nothing: what it took is all that was said.
+            assert_eq!(written, message);
+        }
+        Err(malformed) => assert!(malformed.to_string().len() < DETAILS_BYTES_MAX),
+    }
+}
+
+/// A stream on which the evaluation of [`batches`] came.
+fn received() -> Received {
+    let mut received = Received::default();
+    received.receive(&evaluation::to_message(&evaluation_of(&jobs()[0]))).unwrap();
+    received
+}
+
+fn batches() -> Vec<Vec<u8>> {
+    let evaluation = Arc::new(evaluation_of(&jobs()[0]));
+    let work = |(first, count)| Work { evaluation: Arc::clone(&evaluation), first, count };
+    let ranges = [(17, 5), (0, 65_536), (9_999_999, 1)];
+    ranges.map(|range| batch::to_message(3, &work(range)).encode_to_vec()).to_vec()
+}
+
+fn check_batch(bytes: &[u8], received: &Received) {
     let Ok(message) = bounded(bytes.len(), || v1::Batch::decode(bytes)) else { return };
-    match bounded(bytes.len(), || batch::from_message(&message)) {
+    match bounded(bytes.len(), || batch::from_message(&message, received)) {
         Ok(work) => {
             let written = batch::to_message(message.batch, &work);
-            assert_eq!(batch::from_message(&written), Ok(work));
+            assert_eq!(batch::from_message(&written, received), Ok(work));
             // A worker guesses nothing: what it took is all that was said.
             assert_eq!(written, message);
         }
@@ -318,9 +348,16 @@ fn every_seed_is_taken() {
         specification::from_message(&message).unwrap();
         check_specification(&bytes);
     }
+    for bytes in evaluations() {
+        let message = v1::Evaluation::decode(bytes.as_slice()).unwrap();
+        evaluation::from_message(&message).unwrap();
+        check_evaluation(&bytes);
+    }
+    let received = received();
     for bytes in batches() {
-        batch::from_message(&v1::Batch::decode(bytes.as_slice()).unwrap()).unwrap();
-        check_batch(&bytes);
+        let message = v1::Batch::decode(bytes.as_slice()).unwrap();
+        batch::from_message(&message, &received).unwrap();
+        check_batch(&bytes, &received);
     }
     for bytes in answers() {
         let message = v1::BatchResult::decode(bytes.as_slice()).unwrap();
@@ -371,8 +408,12 @@ properties! {
         check_specification(&bytes);
     }
 
+    fn damaged_evaluations_are_read_or_refused(bytes in damaged(evaluations())) {
+        check_evaluation(&bytes);
+    }
+
     fn damaged_batches_are_read_or_refused(bytes in damaged(batches())) {
-        check_batch(&bytes);
+        check_batch(&bytes, &received());
     }
 
     fn damaged_answers_are_read_or_refused(bytes in damaged(answers())) {

@@ -146,7 +146,7 @@ fn worker_value(worker: &WorkerSnapshot) -> Value {
         "number": worker.worker,
         "host": worker.host,
         "process": worker.process,
-        "threads": worker.threads,
+        "slots": worker.slots,
         "version": worker.version,
         "attached": attached.and_then(utc),
         "silent_s": worker.silent_s,

@@ -220,7 +220,7 @@ async fn mortals(url: String, process: u32, deadly: (u64, u64)) {
         attached += 1;
         while let Ok((batch, work)) = peer.batch().await {
             let (seed, index) = deadly;
-            if work.germs.seed == seed
+            if work.evaluation.germs.seed == seed
                 && (work.first..work.first + u64::from(work.count)).contains(&index)
             {
                 break;

@@ -80,8 +80,8 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
     assert_eq!(points.len(), evaluations as usize);
     let computed = computed.lock().unwrap();
     for (life, work) in computed.iter().filter(|(life, _)| *life > 0) {
-        let number =
-            points.iter().position(|point| *point == Some(point_to_message(&work.point))).unwrap();
+        let point = Some(point_to_message(&work.evaluation.point));
+        let number = points.iter().position(|known| *known == point).unwrap();
         let known = stored[life - 1];
         assert!(number >= known, "seed {SEED}: {number} of {known} stored again in life {life}");
     }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::realization::Ensemble;
 use osteon_common::version;
+use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::endpoint::{connect, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
@@ -22,6 +23,7 @@ use crate::support::DEADLINE;
 pub(crate) struct Peer {
     outbound: mpsc::Sender<AttachRequest>,
     stream: Streaming<AttachResponse>,
+    evaluations: Received,
 }
 
 /// Returns the hello of a worker of this version.
@@ -29,7 +31,7 @@ pub(crate) fn hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: version::VERSION.to_owned(),
         fingerprint: version::fingerprint(),
-        threads: 1,
+        slots: 1,
         host: "peer".to_owned(),
         process,
         instance: process.into(),
@@ -45,7 +47,8 @@ impl Peer {
         let (outbound, messages) = mpsc::channel(64);
         outbound.send(AttachRequest { message: Some(Request::Hello(hello)) }).await.unwrap();
         let attached = workers_client(channel).attach(ReceiverStream::new(messages)).await?;
-        let mut peer = Self { outbound, stream: attached.into_inner() };
+        let stream = attached.into_inner();
+        let mut peer = Self { outbound, stream, evaluations: Received::default() };
         match peer.message().await? {
             Response::Welcome(_) => Ok(peer),
             other => panic!("{other:?} instead of a welcome"),
@@ -64,8 +67,10 @@ impl Peer {
     pub(crate) async fn batch(&mut self) -> Result<(u64, Work), Status> {
         loop {
             match self.message().await? {
+                Response::Evaluation(message) => self.evaluations.receive(&message).unwrap(),
                 Response::Batch(message) => {
-                    return Ok((message.batch, batch::from_message(&message).unwrap()));
+                    let work = batch::from_message(&message, &self.evaluations).unwrap();
+                    return Ok((message.batch, work));
                 }
                 _ => self.send(Request::Heartbeat(Heartbeat {})).await,
             }
@@ -86,10 +91,10 @@ impl Peer {
 
 /// Computes all realizations of a batch, as every worker does.
 pub(crate) fn solve(work: &Work) -> Vec<Solved> {
-    let solver = Solver::new(&work.setup);
+    let solver = Solver::new(&work.evaluation.setup);
     let mut workspace = Workspace::default();
     let indices = work.first..work.first + u64::from(work.count);
-    let Ok(ensemble) = Ensemble::drawn(&work.point, work.germs) else {
+    let Ok(ensemble) = Ensemble::drawn(&work.evaluation.point, work.evaluation.germs) else {
         return indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect();
     };
     let realization = |index| {

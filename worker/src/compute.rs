@@ -114,15 +114,16 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved
     if stop.is_raised() {
         return Err(Interrupted::Stopped);
     }
-    let indices = work.first..work.first + u64::from(work.count);
+    let Work { evaluation, first, count } = work;
+    let indices = *first..first + u64::from(*count);
     let panicked = |index: u64, payload: Box<dyn std::any::Any + Send>| Interrupted::Panicked {
-        case: Box::new(PanickedCase { index, germs: work.germs, point: work.point }),
+        case: Box::new(PanickedCase { index, germs: evaluation.germs, point: evaluation.point }),
         message: panic_message(payload.as_ref()),
     };
     let prepared = catch_unwind(AssertUnwindSafe(|| {
-        (solvers.get(&work.setup), Ensemble::drawn(&work.point, work.germs))
+        (solvers.get(&evaluation.setup), Ensemble::drawn(&evaluation.point, evaluation.germs))
     }));
-    let (solver, ensemble) = prepared.map_err(|payload| panicked(work.first, payload))?;
+    let (solver, ensemble) = prepared.map_err(|payload| panicked(*first, payload))?;
     let Ok(ensemble) = ensemble else {
         return Ok(indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect());
     };

@@ -62,12 +62,12 @@ pub enum WorkerError {
         /// Error of the last attempt.
         last: String,
     },
-    /// A batch cannot be read; a guess could give wrong numbers.
-    #[error("the coordinator at {endpoint} sent a batch that cannot be read: {source}")]
+    /// A batch or an evaluation cannot be read; a guess could give wrong numbers.
+    #[error("the coordinator at {endpoint} sent a message that cannot be read: {source}")]
     Malformed {
         /// Returns the address of the coordinator.
         endpoint: Endpoint,
-        /// The defect of the batch.
+        /// The defect of the message.
         source: Malformed,
     },
     /// The solver panicked: a bug in the program, never an outcome.

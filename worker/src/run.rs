@@ -55,7 +55,7 @@ pub struct WorkerConfig {
 /// again.
 ///
 /// # Errors
-/// If the coordinator refuses the worker, is away for longer than allowed or sends a batch that
+/// If the coordinator refuses the worker, is away for longer than allowed or sends a message that
 /// cannot be read, or if the solver panics.
 pub async fn run(
     config: WorkerConfig,
@@ -258,7 +258,7 @@ impl Worker {
                         // Fails only if the worker has ended; the result is then not needed.
                         drop(sender.blocking_send((task, computed)));
                     };
-                    self.backend.start(task, *work, Box::new(done));
+                    self.backend.start(task, work, Box::new(done));
                 }
                 Effect::Abandon(task) => self.backend.forget(task),
                 Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use osteon_common::version;
+use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::v1;
@@ -58,14 +59,14 @@ pub(crate) enum Effect {
     /// Send this message to the coordinator.
     Send(Request),
     /// Start a computation.
-    Compute(Task, Box<Work>),
+    Compute(Task, Work),
     /// Stop a computation.
     Abandon(Task),
     /// Close the stream and attach again.
     Detach(Detached),
     /// End the worker: nothing is left to do.
     Leave,
-    /// End the worker with an error: a batch is malformed, or the solver panicked.
+    /// End the worker with an error: a message is malformed, or the solver panicked.
     Fail(Failure),
 }
 
@@ -83,7 +84,7 @@ pub(crate) enum Detached {
 /// An error that attaching again would not cure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Failure {
-    /// The coordinator sent a batch that cannot be read.
+    /// The coordinator sent a batch or an evaluation that cannot be read.
     Malformed(Malformed),
     /// The solver panicked.
     Panicked {
@@ -103,6 +104,8 @@ pub(crate) struct State {
     number: u64,
     link: Link,
     held: BTreeSet<u64>,
+    /// Evaluations of this attachment that batches may refer to.
+    evaluations: Received,
     /// Time at which draining began.
     draining_since: Option<Duration>,
 }
@@ -129,6 +132,7 @@ impl State {
             number: 0,
             link: Link::Down,
             held: BTreeSet::new(),
+            evaluations: Received::default(),
             draining_since: None,
         }
     }
@@ -140,8 +144,7 @@ impl State {
         Request::Hello(v1::WorkerHello {
             version: version::VERSION.to_owned(),
             fingerprint: version::fingerprint(),
-            // The field has this name because threads were at first the only kind of slots.
-            threads: self.identity.slots,
+            slots: self.identity.slots,
             host: self.identity.host.clone(),
             process: self.identity.process,
             instance: self.identity.instance,
@@ -190,6 +193,7 @@ impl State {
         }
         match (self.link, message) {
             (Link::Greeting, Response::Welcome(welcome)) => self.on_welcome(now, &welcome),
+            (Link::Attached { .. }, Response::Evaluation(message)) => self.on_evaluation(&message),
             (Link::Attached { .. }, Response::Batch(message)) => self.on_batch(&message),
             (Link::Attached { .. }, Response::Revoke(revoke)) => {
                 let held = self.held.remove(&revoke.batch);
@@ -224,15 +228,22 @@ impl State {
         }
     }
 
+    fn on_evaluation(&mut self, message: &v1::Evaluation) -> Vec<Effect> {
+        match self.evaluations.receive(message) {
+            Ok(()) => Vec::new(),
+            Err(malformed) => vec![Effect::Fail(Failure::Malformed(malformed))],
+        }
+    }
+
     fn on_batch(&mut self, message: &v1::Batch) -> Vec<Effect> {
-        let work = match batch::from_message(message) {
+        let work = match batch::from_message(message, &self.evaluations) {
             Ok(work) => work,
             Err(malformed) => return vec![Effect::Fail(Failure::Malformed(malformed))],
         };
         if self.held.len() >= BATCHES_HELD_MAX || !self.held.insert(message.batch) {
             return vec![Effect::Detach(Detached::Overrun)];
         }
-        vec![Effect::Compute(self.task(message.batch), Box::new(work))]
+        vec![Effect::Compute(self.task(message.batch), work)]
     }
 
     fn on_computed(&mut self, task: Task, computed: Computed) -> Vec<Effect> {
@@ -253,6 +264,7 @@ impl State {
 
     fn on_lost(&mut self) -> Vec<Effect> {
         self.link = Link::Down;
+        self.evaluations = Received::default();
         let held = std::mem::take(&mut self.held);
         let mut effects: Vec<_> =
             held.into_iter().map(|batch| Effect::Abandon(self.task(batch))).collect();

@@ -276,7 +276,8 @@ impl Clockwork {
 /// Returns the time of the realization of a batch that has `left` realizations after it.
 fn time(times: Times, realization: Duration, work: &Work, left: u32) -> Duration {
     let index = work.first + u64::from(work.count - 1 - left);
-    let noise = work.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));
+    let noise =
+        work.evaluation.point.0.iter().fold(index, |mixed, x| fake::mix(mixed ^ x.to_bits()));
     match times {
         Times::Equal => realization,
         Times::Spread => realization / 2 + realization * (noise % 1024) as u32 / 1024,

@@ -16,6 +16,7 @@ use osteon_coordinator::event::{Event, Hello, Request};
 use osteon_coordinator::ids::{JobId, WorkerId};
 use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
+use osteon_proto::evaluation::Evaluation;
 use osteon_proto::v1::WorkerHello;
 use osteon_search::{Ending, Search as Driven, Step};
 
@@ -81,9 +82,8 @@ pub(crate) fn attached(process: u32) -> Event {
 
 /// Returns the introduction of a worker with one thread.
 pub(crate) fn hello(process: u32) -> Hello {
-    let WorkerHello { version, fingerprint, threads, host, process, instance } =
-        wire_hello(process);
-    Hello { version, fingerprint, slots: threads, host, process, instance }
+    let WorkerHello { version, fingerprint, slots, host, process, instance } = wire_hello(process);
+    Hello { version, fingerprint, slots, host, process, instance }
 }
 
 /// Returns the same introduction as a message.
@@ -91,7 +91,7 @@ pub(crate) fn wire_hello(process: u32) -> WorkerHello {
     WorkerHello {
         version: VERSION.to_owned(),
         fingerprint: version::fingerprint(),
-        threads: 1,
+        slots: 1,
         host: "node".to_owned(),
         process,
         instance: mix(process.into()),
@@ -123,12 +123,12 @@ pub(crate) fn solved(work: &Work) -> Vec<Solved> {
 
 /// Returns the realization at one index.
 fn realization(work: &Work, index: u64) -> Solved {
-    let noise = mix(work.germs.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let noise = mix(work.evaluation.germs.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if noise.is_multiple_of(29) {
         return Solved::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
     }
     let uniform = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.point.0;
+    let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.evaluation.point.0;
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
     let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
@@ -183,13 +183,13 @@ pub(crate) fn evaluation(
     specification: &JobSpecification,
     point: Point,
 ) -> (Arc<[Outcome]>, Option<EstimatedError>) {
-    let work = |first| Work {
+    let evaluation = Arc::new(Evaluation {
+        id: 1,
         setup: specification.setup,
         point,
         germs: specification.monte_carlo.germs(),
-        first,
-        count: 1,
-    };
+    });
+    let work = |first| Work { evaluation: Arc::clone(&evaluation), first, count: 1 };
     let indices = 0..specification.monte_carlo.realizations;
     let solved: Vec<_> = indices.map(|index| realization(&work(index), index)).collect();
     let successes = solved.iter().filter(|solved| solved.outcome.is_ok());

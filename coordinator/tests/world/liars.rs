@@ -74,6 +74,6 @@ impl World {
 
     fn note_lie(&mut self, process: u32, work: &Work) {
         self.counts.lies += 1;
-        self.lies.insert((process, work.germs.seed));
+        self.lies.insert((process, work.evaluation.germs.seed));
     }
 }

@@ -318,7 +318,8 @@ impl World {
 
     fn answer_all(&mut self, worker: WorkerId) {
         let known = &self.workers[&worker];
-        let holds: Vec<_> = known.holds.iter().map(|(batch, work)| (*batch, *work)).collect();
+        let holds: Vec<_> =
+            known.holds.iter().map(|(batch, work)| (*batch, work.clone())).collect();
         for (batch, work) in holds {
             let answer = self.answer(worker, batch, &work);
             self.within(50, Occurrence::Message(worker, answer));
@@ -357,8 +358,8 @@ impl World {
     fn message(&mut self, worker: WorkerId, event: Event) {
         let known = self.workers.get_mut(&worker).unwrap();
         if let Event::Answered { batch, solved, .. } = &event {
-            let held = known.holds.get(batch).copied();
-            let malformed = held.is_some_and(|work| solved.len() != work.count as usize);
+            let held = known.holds.get(batch).cloned();
+            let malformed = held.as_ref().is_some_and(|work| solved.len() != work.count as usize);
             if malformed && !self.may_die(worker) {
                 let answer = self.answer(worker, *batch, &held.unwrap());
                 self.message(worker, answer);
@@ -382,7 +383,8 @@ impl World {
         else {
             return true;
         };
-        let key = work.point.0.iter().fold(work.germs.seed, |key, x| fake::mix(key ^ x.to_bits()));
+        let (seed, point) = (work.evaluation.germs.seed, work.evaluation.point);
+        let key = point.0.iter().fold(seed, |key, x| fake::mix(key ^ x.to_bits()));
         let lost = self.lost_alone.entry((key, work.first)).or_default();
         *lost += 1;
         *lost <= LOST_ALONE_MAX
@@ -518,7 +520,7 @@ impl World {
         self.first_sent.entry((seed, point)).or_insert(durable);
         let known = self.workers.get_mut(&worker).unwrap();
         let bad = known.bad;
-        assert!(known.holds.insert(batch, work).is_none(), "a number was given twice");
+        assert!(known.holds.insert(batch, work.clone()).is_none(), "a number was given twice");
         assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
         if bad {
             self.within(50, Occurrence::Break(worker));
@@ -556,7 +558,7 @@ impl World {
 
 /// Returns seed, point and indices of a batch.
 fn key(work: &Work) -> (u64, u64, u64, u32) {
-    (work.germs.seed, point_key(&work.point), work.first, work.count)
+    (work.evaluation.germs.seed, point_key(&work.evaluation.point), work.first, work.count)
 }
 
 fn point_key(point: &Point) -> u64 {

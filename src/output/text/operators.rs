@@ -65,7 +65,7 @@ pub(super) fn workers(list: &ListWorkersResponse) -> String {
 /// A table of attached workers.
 pub(super) fn attached(workers: &[WorkerSnapshot]) -> String {
     let header = [
-        "NUMBER", "HOST", "PROCESS", "THREADS", "VERSION", "ATTACHED", "HEARD", "RATE", "BATCHES",
+        "NUMBER", "HOST", "PROCESS", "SLOTS", "VERSION", "ATTACHED", "HEARD", "RATE", "BATCHES",
         "OLDEST", "STANDING",
     ];
     let row = |worker: &WorkerSnapshot| {
@@ -74,7 +74,7 @@ pub(super) fn attached(workers: &[WorkerSnapshot]) -> String {
             worker.worker.to_string(),
             worker.host.clone(),
             worker.process.to_string(),
-            worker.threads.to_string(),
+            worker.slots.to_string(),
             worker.version.clone(),
             attached.and_then(utc).unwrap_or_default(),
             format!("{} ago", span(worker.silent_s)),
@@ -153,7 +153,7 @@ mod tests {
             worker: number,
             host: "node-7".to_owned(),
             process: 4711,
-            threads: 64,
+            slots: 64,
             version: "0.1.0".to_owned(),
             attach_time: Some(timestamp::to_message(Duration::from_secs(1_790_000_000))),
             silent_s: 0.5,
@@ -183,9 +183,9 @@ mod tests {
         };
         let list = ListWorkersResponse { workers: vec![worker(1), idle], departed: vec![gone] };
         let expected = "\
-NUMBER  HOST    PROCESS  THREADS  VERSION  ATTACHED              HEARD      RATE    BATCHES  OLDEST  STANDING
-1       node-7  4711     64       0.1.0    2026-09-21T14:13:20Z  0.5 s ago  2811/s  2        0.2 s   ok
-12      node-7  4711     64       0.1.0    2026-09-21T14:13:20Z  0.5 s ago  0/s     0                draining
+NUMBER  HOST    PROCESS  SLOTS  VERSION  ATTACHED              HEARD      RATE    BATCHES  OLDEST  STANDING
+1       node-7  4711     64     0.1.0    2026-09-21T14:13:20Z  0.5 s ago  2811/s  2        0.2 s   ok
+12      node-7  4711     64     0.1.0    2026-09-21T14:13:20Z  0.5 s ago  0/s     0                draining
 left 2026-09-21T14:14:20Z: node-8 (process 5), worker 3: its connection ended;
   others compute the 2 batches it held
 ";

@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
+use osteon_proto::evaluation::Evaluation;
 
 use super::*;
 
@@ -11,7 +12,12 @@ const TASK: Task = Task { attachment: 1, batch: 1 };
 const DEADLINE: Duration = Duration::from_secs(60);
 
 fn work(point: Point, first: u64, count: u32) -> Work {
-    Work { setup: Setup::default(), point, germs: GermSource::streams(5), first, count }
+    drawn(point, GermSource::streams(5), first, count)
+}
+
+fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
+    let evaluation = Evaluation { id: 1, setup: Setup::default(), point, germs };
+    Work { evaluation: Arc::new(evaluation), first, count }
 }
 
 fn solved(threads: u32, work: Work) -> Vec<Solved> {
@@ -48,7 +54,7 @@ fn outcomes_are_those_of_the_solver_alone() {
                 Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
             })
             .collect();
-        assert_eq!(solved(2, Work { germs, ..work(POINT, 3, 4) }), expected, "{scheme:?}");
+        assert_eq!(solved(2, drawn(POINT, germs, 3, 4)), expected, "{scheme:?}");
     }
 }
 

@@ -11,6 +11,7 @@ use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::Solved;
 use osteon_common::parameters::Point;
 use osteon_proto::batch::{self, Work};
+use osteon_proto::evaluation::{self, Evaluation};
 use osteon_proto::v1::attach_response::Message as Reply;
 use osteon_proto::v1::workers_server::{Workers, WorkersServer};
 use osteon_proto::v1::{Batch, BatchRevoke, WorkerDrain, WorkerWelcome};
@@ -57,7 +58,7 @@ impl Workers for FalseCoordinator {
         let mut requests = call.into_inner();
         let hello = requests.message().await?.and_then(|request| request.message);
         self.heard.lock().unwrap().extend(hello);
-        let (sender, stream) = mpsc::channel(4);
+        let (sender, stream) = mpsc::channel(5);
         // Only a silent coordinator should be abandoned soon.
         let expiry_s = if matches!(self.script, Script::Work) { 60.0 } else { 0.5 };
         let welcome = WorkerWelcome { worker: 1, lease: 1, heartbeat_s: 0.2, expiry_s };
@@ -79,6 +80,7 @@ impl Workers for FalseCoordinator {
         }
         if matches!(self.script, Script::Work) {
             script.push(Reply::Welcome(welcome));
+            script.push(Reply::Evaluation(evaluation::to_message(&work().evaluation)));
             script.extend((1..=3).map(|number| Reply::Batch(batch::to_message(number, &work()))));
             tokio::spawn(take_answers(requests, sender.clone(), Arc::clone(&self.heard)));
         }
@@ -112,7 +114,8 @@ async fn take_answers(
 
 fn work() -> Work {
     let (setup, germs) = (Setup::default(), GermSource::streams(5));
-    Work { setup, point: Point([1.0; 7]), germs, first: 7, count: 2 }
+    let evaluation = Evaluation { id: 1, setup, point: Point([1.0; 7]), germs };
+    Work { evaluation: Arc::new(evaluation), first: 7, count: 2 }
 }
 
 /// A device that computes nothing. It completes a batch when the next one is started or another one
@@ -179,7 +182,7 @@ async fn a_device_is_told_what_to_compute_and_what_to_forget() {
     timeout(Duration::from_secs(60), ended).await.unwrap().unwrap();
     let heard = scene.heard.lock().unwrap().clone();
     let Some(Request::Hello(hello)) = heard.first() else { panic!("{heard:?}") };
-    assert_eq!(hello.threads, 4096);
+    assert_eq!(hello.slots, 4096);
     let results = heard.iter().filter_map(|message| match message {
         Request::Result(result) => {
             Some((result.batch, batch::answer_from_message(result).unwrap()))

@@ -1,10 +1,16 @@
+use std::sync::Arc;
+
 use osteon_common::case::Setup;
 use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::{FailureKind, Solved};
 use osteon_common::parameters::Point;
+use osteon_proto::announced::EVALUATIONS_KEPT_MAX;
+use osteon_proto::evaluation::{self, Evaluation};
 
 use super::*;
 
+/// The evaluation of all batches.
+const EVALUATION: u64 = 6;
 const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 /// A worker under test, which checks that every effect is taken before the next event.
@@ -26,7 +32,13 @@ impl Recorder {
         recorder
     }
 
+    /// Attaches, and receives the evaluation of all batches.
     fn attach(&mut self) {
+        self.greet();
+        self.evaluation(EVALUATION);
+    }
+
+    fn greet(&mut self) {
         self.state.attach();
         self.message(Response::Welcome(v1::WorkerWelcome {
             worker: 1,
@@ -44,6 +56,13 @@ impl Recorder {
 
     fn message(&mut self, message: Response) {
         self.event(Event::Message(Box::new(message)));
+    }
+
+    /// Receives an evaluation that can be read.
+    fn evaluation(&mut self, id: u64) {
+        let sent = Evaluation { id, ..*work().evaluation };
+        self.message(Response::Evaluation(evaluation::to_message(&sent)));
+        self.nothing_else();
     }
 
     fn batch(&mut self, number: u64) {
@@ -71,17 +90,13 @@ impl Recorder {
 }
 
 fn work() -> Work {
-    Work {
-        setup: Setup::default(),
-        point: POINT,
-        germs: GermSource::streams(1),
-        first: 10,
-        count: 2,
-    }
+    let (setup, germs) = (Setup::default(), GermSource::streams(1));
+    let evaluation = Evaluation { id: EVALUATION, setup, point: POINT, germs };
+    Work { evaluation: Arc::new(evaluation), first: 10, count: 2 }
 }
 
 fn compute(attachment: u64, batch: u64) -> Effect {
-    Effect::Compute(Task { attachment, batch }, Box::new(work()))
+    Effect::Compute(Task { attachment, batch }, work())
 }
 
 fn abandon(attachment: u64, batch: u64) -> Effect {
@@ -109,7 +124,7 @@ const DRAIN: Effect = Effect::Send(Request::Drain(v1::WorkerDrain {}));
 #[test]
 fn hello_says_who_it_is() {
     let Request::Hello(hello) = Recorder::new().state.attach() else { panic!("no hello") };
-    assert_eq!((hello.threads, hello.host.as_str(), hello.process), (2, "host", 7));
+    assert_eq!((hello.slots, hello.host.as_str(), hello.process), (2, "host", 7));
     assert_eq!(hello.instance, 9);
     assert_eq!(hello.fingerprint, version::fingerprint());
 }
@@ -286,8 +301,8 @@ fn one_number_twice_ends_the_lease() {
 #[test]
 fn what_cannot_be_read_or_computed_ends_the_worker() {
     let mut worker = Recorder::attached();
-    worker.message(Response::Batch(v1::Batch { batch: 1, count: 1, ..Default::default() }));
-    worker.expect(&[Effect::Fail(Failure::Malformed(Malformed::IncompleteSetup))]);
+    worker.message(Response::Evaluation(v1::Evaluation::default()));
+    worker.expect(&[malformed(Malformed::IncompleteSetup)]);
 
     let mut worker = Recorder::attached();
     worker.batch(4);
@@ -300,6 +315,36 @@ fn what_cannot_be_read_or_computed_ends_the_worker() {
         Computed::Panicked { case: panicked, message: message() },
     ));
     worker.expect(&[Effect::Fail(Failure::Panicked { case: failed, message: message() })]);
+}
+
+fn malformed(defect: Malformed) -> Effect {
+    Effect::Fail(Failure::Malformed(defect))
+}
+
+#[test]
+fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
+    let of = |evaluation| Response::Batch(v1::Batch { batch: 1, evaluation, first: 0, count: 1 });
+    let unknown = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
+    let mut worker = Recorder::attached();
+    worker.message(of(7));
+    worker.expect(&unknown(7));
+
+    // Each stream has its own evaluations.
+    let mut worker = Recorder::attached();
+    worker.event(Event::Lost);
+    worker.greet();
+    worker.message(of(EVALUATION));
+    worker.expect(&unknown(EVALUATION));
+
+    // The oldest is forgotten, but not what a worker computes of it.
+    let mut worker = Recorder::attached();
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    (100..100 + EVALUATIONS_KEPT_MAX as u64).for_each(|id| worker.evaluation(id));
+    worker.complete(1, 4);
+    worker.expect(&[answer(4)]);
+    worker.message(of(EVALUATION));
+    worker.expect(&unknown(EVALUATION));
 }
 
 #[test]

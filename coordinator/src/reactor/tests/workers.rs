@@ -27,11 +27,11 @@ fn a_worker_that_cannot_be_used_is_refused_with_the_reason() {
         (with(|hello| hello.fingerprint = "other".to_owned()), fingerprint.as_str()),
         (
             with(|hello| hello.slots = 0),
-            "close 1: this worker announces 0 threads; 1 to 4096 are allowed",
+            "close 1: this worker announces 0 slots; 1 to 4096 are allowed",
         ),
         (
             with(|hello| hello.slots = 4097),
-            "close 1: this worker announces 4097 threads; 1 to 4096 are allowed",
+            "close 1: this worker announces 4097 slots; 1 to 4096 are allowed",
         ),
         (
             with(|hello| hello.host = "x".repeat(257)),
@@ -158,9 +158,7 @@ fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
     let shown: Vec<_> = list
         .workers
         .iter()
-        .map(|it| {
-            (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.standing())
-        })
+        .map(|it| (it.worker, it.slots, it.silent_s, it.batches, it.oldest_batch_s, it.standing()))
         .collect();
     let ok = osteon_proto::v1::WorkerStanding::Ok;
     assert_eq!(shown, [(1, 1, 4.0, 2, Some(4.0), ok), (2, 2, 1.0, 2, Some(4.0), ok)]);
