@@ -47,12 +47,12 @@ pub(crate) struct ShownSimulation<'a> {
 fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     let error = arrival.map(|arrival| arrival.estimated_error);
     let mut solver = Solver::new(&setup.solver, NominalSampling::of(setup), error);
-    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, looks, .. }) =
-        (arrival.and_then(|arrival| arrival.looks), &mut solver)
+    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, passes, .. }) =
+        (arrival.and_then(|arrival| arrival.passes), &mut solver)
     {
         (*band, *period) = (Some(used.last.band), Some(used.last.period));
         (*pairs, *pairs_computed) = (Some(used.last.pairs), Some(used.pairs_computed));
-        *looks = Some(used.count);
+        *passes = Some(used.count);
     }
     solver
 }

@@ -18,7 +18,7 @@ mod measure;
 
 use measure::draws::{bones, ensemble, setup};
 
-/// Bones that are computed in turn, so that a mean holds second looks in their share.
+/// Bones that are computed in turn, so that a mean includes second passes in their share.
 const BONES: u64 = 200;
 
 fn one_after_another(criterion: &mut Criterion, method: Method, isa: Isa, bones: &[Bone]) {

@@ -189,7 +189,7 @@ fn print_rows(rows: &[Row], peak: f64) {
 }
 
 fn print_stages(times: &[[f64; STAGES.len()]], pairs: usize, peak: f64) {
-    println!("| stage of a first look, {} | mean | share | Mflop |", Isa::fastest().name());
+    println!("| stage of a first pass, {} | mean | share | Mflop |", Isa::fastest().name());
     println!("|:--|--:|--:|--:|");
     let means: [f64; STAGES.len()] =
         std::array::from_fn(|stage| mean(times.iter().map(|times| times[stage])));

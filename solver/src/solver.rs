@@ -7,7 +7,7 @@ use osteon_common::sampling;
 use osteon_common::settings::Method;
 
 use crate::exact::Exact;
-use crate::exact::look::ExactWorkspace;
+use crate::exact::pass::ExactWorkspace;
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 
@@ -38,21 +38,21 @@ pub struct Arrival {
     pub estimated_error: f64,
     /// Sampling of the exact method; `None` for the hybrid method, whose discretisation is in the
     /// setup.
-    pub looks: Option<Looks>,
+    pub passes: Option<PassSummary>,
 }
 
 /// Sampling of the exact method for one bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Looks {
-    /// Number of looks (refinement passes) at the bone.
+pub struct PassSummary {
+    /// Number of passes.
     pub count: u32,
     /// Total number of (frequency, wavenumber) pairs computed.
     pub pairs_computed: u64,
-    /// Sampling of the last look that contributed.
+    /// Sampling of the last pass that contributed.
     pub last: Sampled,
 }
 
-/// Sampling of one look.
+/// Sampling of one pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled {
     /// Highest frequency, Hz.

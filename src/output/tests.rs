@@ -6,7 +6,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
 use osteon_solver::check::{Difference, Solution};
-use osteon_solver::{Looks, Sampled};
+use osteon_solver::{PassSummary, Sampled};
 
 use super::*;
 use crate::sample_result::{identification, propagation};
@@ -355,7 +355,7 @@ fn arrival() -> Arrival {
         velocity: 3908.75,
         times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
         estimated_error: 2e-5,
-        looks: None,
+        passes: None,
     }
 }
 
@@ -397,15 +397,15 @@ fn a_simulation_without_velocity_says_why() {
 #[test]
 fn the_sampling_that_decided_is_shown() {
     let last = Sampled { band: 12.5e6, period: 1.1e-5, pairs: 9000 };
-    let looks = Some(Looks { count: 3, pairs_computed: 17_000, last });
-    let arrival = Ok(Arrival { looks, ..arrival() });
+    let passes = Some(PassSummary { count: 3, pairs_computed: 17_000, last });
+    let arrival = Ok(Arrival { passes, ..arrival() });
     let setup = setup(Method::Exact);
     let shown = ShownSimulation { setup: &setup, arrival: &arrival, traces: None, check: None };
     let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
     let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
     assert!(unwrapped(&text(Format::Text)).contains(line), "{}", text(Format::Text));
     let value: serde_json::Value = serde_json::from_str(&text(Format::Json)).unwrap();
-    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("looks", 3)];
+    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("passes", 3)];
     for (key, number) in expected {
         assert_eq!(value["solver"][key], number, "{value:#}");
     }

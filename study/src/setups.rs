@@ -313,7 +313,7 @@ mod tests {
     }
 
     /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin
-    /// plate needs the refined look. Without these measures each had an error of 3e-4 to 2e-3.
+    /// plate needs the refined pass. Without these measures each had an error of 3e-4 to 2e-3.
     #[test]
     fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
         for index in [53, 101, 111, 149, 173, 177, 381] {

@@ -1,5 +1,5 @@
 //! Tables that all realizations of one setup share: they depend only on layers, probe, solver
-//! settings and the rung of the speed ladder.
+//! settings and the speed bin.
 
 use std::f64::consts::PI;
 use std::ops::Range;

@@ -117,7 +117,7 @@ impl Passes<'_> {
             times: pick.times,
             // Passes that do not resolve the waves can agree by accident.
             estimated_error: estimate.max(dispersion.min(1.0)),
-            looks: None,
+            passes: None,
         })
     }
 

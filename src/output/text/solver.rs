@@ -70,7 +70,7 @@ mod tests {
             pairs: Some(1900),
             estimated_error: errors,
             pairs_computed: None,
-            looks: None,
+            passes: None,
         };
         let errors = EstimatedErrors { median: Some(2.04e-5), largest: Some(0.000123) };
         assert_eq!(

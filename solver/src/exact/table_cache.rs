@@ -1,5 +1,5 @@
-//! A ladder: a geometric grid of speeds, each rung with the sampling for waves up to its speed, and
-//! a cache of the tables of those rungs that bones need.
+//! Caches of the tables of one solver. Speeds are divided into bins, a geometric grid; each bin has
+//! a sampling for waves up to its upper edge, and its tables are made when a bone first needs them.
 
 use std::ops::Deref;
 use std::sync::OnceLock;
@@ -7,81 +7,81 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use osteon_common::case::Setup;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{Grade, RUNGS, Sampling};
+use osteon_common::sampling::{Grade, SPEED_BINS, Sampling};
 
-use crate::exact::look::Rung;
+use crate::exact::pass::BinTables;
 
 /// A bone may need this many times the maximum number of pairs of the setup's usual sampling before
 /// it fails.
 pub(crate) const PAIRS_MARGIN: f64 = 8.0;
-/// Memory for tables that one solver keeps, bytes; those of further rungs are recomputed when
+/// Memory for tables that one solver keeps, bytes; those of further bins are recomputed when
 /// needed.
-const KEPT_BYTES_MAX: u64 = 24_000_000;
+const CACHE_BYTES_MAX: u64 = 24_000_000;
 
 /// Samplings of one grade, by speed.
 #[derive(Debug)]
-pub(crate) struct Ladder {
+pub(crate) struct TableCache {
     setup: Setup,
     grade: Grade,
     /// Each slot is filled when a bone first needs it.
-    slots: [OnceLock<Slot>; RUNGS],
+    slots: [OnceLock<Slot>; SPEED_BINS],
 }
 
-/// Memory of the tables that all ladders of a solver keep, bytes.
+/// Memory of the tables that all caches of a solver keep, bytes.
 #[derive(Debug, Default)]
-pub(crate) struct KeptBytes(AtomicU64);
+pub(crate) struct CacheBytes(AtomicU64);
 
-/// A rung that is kept, or was created for one look.
+/// Tables that are cached, or that were made for one pass.
 #[derive(Debug)]
-pub(crate) enum Held<'a> {
-    Kept(&'a Rung),
-    Made(Box<Rung>),
+pub(crate) enum TablesRef<'a> {
+    Cached(&'a BinTables),
+    Temporary(Box<BinTables>),
 }
 
-/// The cached data of a rung.
+/// The cached data of a speed bin.
 #[derive(Debug)]
 enum Slot {
-    Rung(Box<Rung>),
+    Tables(Box<BinTables>),
     /// Only the sampling; its tables are recomputed whenever they are needed.
     Sampling(Box<Sampling>),
-    /// The rung is too large to be computed.
+    /// The bin is too large to be computed.
     TooLarge,
 }
 
-impl Ladder {
+impl TableCache {
     pub(crate) fn new(setup: &Setup, grade: Grade) -> Self {
-        Self { setup: *setup, grade, slots: [const { OnceLock::new() }; RUNGS] }
+        Self { setup: *setup, grade, slots: [const { OnceLock::new() }; SPEED_BINS] }
     }
 
-    /// Returns the rung at `index`, unless it is too large.
-    pub(crate) fn rung(&self, index: usize, kept: &KeptBytes) -> Option<Held<'_>> {
-        match self.slots.get(index)?.get_or_init(|| self.slot(index, kept)) {
-            Slot::Rung(rung) => Some(Held::Kept(rung)),
+    /// Returns the tables of the speed bin at `index`, unless it is too large.
+    pub(crate) fn tables(&self, index: usize, bytes: &CacheBytes) -> Option<TablesRef<'_>> {
+        match self.slots.get(index)?.get_or_init(|| self.slot(index, bytes)) {
+            Slot::Tables(bin) => Some(TablesRef::Cached(bin)),
             Slot::Sampling(sampling) => {
-                Some(Held::Made(Box::new(Rung::new(&self.setup, **sampling, false))))
+                Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, false))))
             }
             Slot::TooLarge => None,
         }
     }
 
-    fn slot(&self, index: usize, kept: &KeptBytes) -> Slot {
-        let sampling = Sampling::at_rung(&self.setup, index, self.grade);
+    fn slot(&self, index: usize, bytes: &CacheBytes) -> Slot {
+        let sampling = Sampling::for_speed_bin(&self.setup, index, self.grade);
         let pairs = sampling.pairs(sampling.band);
         if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Slot::TooLarge;
         }
-        if kept.take(Rung::bytes(&self.setup, &sampling, pairs)) {
-            Slot::Rung(Box::new(Rung::new(&self.setup, sampling, true)))
+        if bytes.reserve(BinTables::bytes(&self.setup, &sampling, pairs)) {
+            Slot::Tables(Box::new(BinTables::new(&self.setup, sampling, true)))
         } else {
             Slot::Sampling(Box::new(sampling))
         }
     }
 }
 
-impl KeptBytes {
+impl CacheBytes {
     /// Reserves this much memory; returns whether the limit allows it.
-    fn take(&self, bytes: u64) -> bool {
-        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= KEPT_BYTES_MAX;
+    fn reserve(&self, bytes: u64) -> bool {
+        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= CACHE_BYTES_MAX;
         if !may {
             self.0.fetch_sub(bytes, Ordering::Relaxed);
         }
@@ -89,13 +89,13 @@ impl KeptBytes {
     }
 }
 
-impl Deref for Held<'_> {
-    type Target = Rung;
+impl Deref for TablesRef<'_> {
+    type Target = BinTables;
 
-    fn deref(&self) -> &Rung {
+    fn deref(&self) -> &BinTables {
         match self {
-            Self::Kept(rung) => rung,
-            Self::Made(rung) => rung,
+            Self::Cached(bin) => bin,
+            Self::Temporary(bin) => bin,
         }
     }
 }
@@ -108,7 +108,7 @@ mod tests {
 
     use super::*;
     use crate::exact::Exact;
-    use crate::exact::look::ExactWorkspace;
+    use crate::exact::pass::ExactWorkspace;
     use crate::isa::Isa;
 
     const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
@@ -126,15 +126,15 @@ mod tests {
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
         let (keeps, keeps_none) =
             (Exact::new(&setup, Isa::fastest()), Exact::new(&setup, Isa::fastest()));
-        assert!(keeps_none.kept.take(KEPT_BYTES_MAX));
+        assert!(keeps_none.cache_bytes.reserve(CACHE_BYTES_MAX));
         assert_eq!(bits(&keeps_none, &bones), bits(&keeps, &bones));
         let kept = |exact: &Exact| {
             let slots = exact.quick.slots.iter().filter_map(OnceLock::get);
-            slots.filter(|slot| matches!(slot, Slot::Rung(_))).count()
+            slots.filter(|slot| matches!(slot, Slot::Tables(_))).count()
         };
         assert_eq!((kept(&keeps_none), kept(&keeps) > 0), (0, true));
-        let held = |exact: &Exact| exact.kept.0.load(Ordering::Relaxed);
-        assert_eq!(held(&keeps_none), KEPT_BYTES_MAX);
-        assert!(held(&keeps) < KEPT_BYTES_MAX, "{}", held(&keeps));
+        let held = |exact: &Exact| exact.cache_bytes.0.load(Ordering::Relaxed);
+        assert_eq!(held(&keeps_none), CACHE_BYTES_MAX);
+        assert!(held(&keeps) < CACHE_BYTES_MAX, "{}", held(&keeps));
     }
 }
