@@ -438,7 +438,11 @@ fn age(text: &str) -> Result<Duration, String> {
         .map(|number| number * seconds)
         .filter(|age| *age <= AGE_S_MAX)
         .and_then(|age| Duration::try_from_secs_f64(age).ok())
-        .ok_or_else(|| "it must be a number with a unit, s, min, h or d: 90min, 30d".to_owned())
+        .ok_or_else(|| {
+            "it must be a number with the unit s, min, h or d (for example 90min or \
+                        30d)"
+                .to_owned()
+        })
 }
 
 fn job_name(text: &str) -> Result<String, String> {

@@ -241,7 +241,7 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
     let before = fs::read(copy.join("osteon.sqlite")).unwrap();
     let again = coordinator.client(&["backup", text(&copy)]);
     assert_eq!(again.code, Some(2), "{again:?}");
-    assert!(again.stderr.contains("is there already"), "{again:?}");
+    assert!(again.stderr.contains("already exists"), "{again:?}");
     assert_eq!(fs::read(copy.join("osteon.sqlite")).unwrap(), before);
     // Nor is a copy combined with another store's journal.
     let beside = scratch.path("beside");
@@ -304,7 +304,7 @@ fn tokens_and_certificates_are_read_again_at_sighup() {
     // A list that cannot be used changes nothing, and the log gives the reason.
     write_tokens(&secure, "nonsense\n");
     secure.process.signal("HUP");
-    let told = "tokens and certificates stay as they were";
+    let told = "the previous tokens and certificates stay in use";
     eventually("the log says so", || secure.read("coordinator.log").contains(told));
     assert_eq!((code(&secure, "submit"), code(&secure, "read")), (Some(0), Some(1)));
     // The old list again, with a certificate for another host, which clients then refuse.

@@ -104,7 +104,7 @@ pub struct FailureCounts([u64; 5]);
 
 impl FailureCounts {
     /// Counts the failures among `outcomes`.
-    pub fn of(outcomes: &[Outcome]) -> Self {
+    pub fn from_outcomes(outcomes: &[Outcome]) -> Self {
         let mut counts = Self::default();
         for kind in outcomes.iter().filter_map(|outcome| outcome.err()) {
             counts.add(kind, 1);
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn failures_are_counted_by_kind() {
-        let counts = FailureCounts::of(&[
+        let counts = FailureCounts::from_outcomes(&[
             Ok(3900.0),
             Err(FailureKind::NotFinite),
             Err(FailureKind::NoArrival),

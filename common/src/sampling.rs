@@ -11,8 +11,8 @@
 //! - T: from a receiver's earliest possible arrival on, one period includes the first packet and
 //!   the large wave that the bone's face reflects: if that wrapped round, it would overlap the
 //!   first arrival, which is a thousand times smaller;
-//! - band: the pulse's spectrum is cut smoothly below [`Sampling::first_band`] in the first pass
-//!   and, where that is not enough, below [`Sampling::band`]: the same lines and more;
+//! - band: the pulse's spectrum is cut smoothly below [`WaveSampling::first_band`] in the first pass
+//!   and, where that is not enough, below [`WaveSampling::band`]: the same lines and more;
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
 //! High in the band only the tail of the pulse's kink at t = 0 remains. There a shorter period
@@ -27,7 +27,7 @@ use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::settings::Method;
 
-pub use thinning::{RUN, Run, smooth_step};
+pub use thinning::{FrequencyRun, RUN, smooth_step};
 
 /// Ratio of the upper edges of neighbouring speed bins.
 const SPEED_BIN_RATIO: f64 = 1.05;
@@ -98,7 +98,7 @@ pub enum Grade {
 
 /// Sampling of one setup for waves up to one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sampling {
+pub struct WaveSampling {
     /// No wave along x1 is faster, m/s.
     pub speed: f64,
     /// T, s.
@@ -126,10 +126,10 @@ pub struct Sampling {
 }
 
 /// Returns the quick sampling of a setup at the usual speeds of bone.
-pub fn nominal(setup: &Setup) -> Sampling {
+pub fn nominal(setup: &Setup) -> WaveSampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
     let bin = speed_bin(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(SPEED_BINS - 1);
-    Sampling::for_speed_bin(setup, bin, first_grade(setup))
+    WaveSampling::for_speed_bin(setup, bin, first_grade(setup))
 }
 
 /// The exact method's sampling for the waves of the usual bone.
@@ -145,7 +145,7 @@ pub struct NominalSampling {
 
 impl NominalSampling {
     /// Returns the sampling of a setup; `None` for methods other than the exact one.
-    pub fn of(setup: &Setup) -> Option<Self> {
+    pub fn from_setup(setup: &Setup) -> Option<Self> {
         (setup.solver.method == Method::Exact).then(|| {
             let sampling = nominal(setup);
             let pairs = sampling.pairs(sampling.first_band).round() as u64;
@@ -225,7 +225,7 @@ pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
     setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
 }
 
-impl Sampling {
+impl WaveSampling {
     /// Returns the sampling for picking velocities of bones whose waves are no faster than the
     /// speed bin's speed.
     pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade) -> Self {
@@ -302,7 +302,7 @@ impl Sampling {
         }
     }
 
-    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`Sampling::runs`]
+    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`WaveSampling::runs`]
     /// lists those that are computed.
     pub fn frequencies(&self) -> usize {
         // The taper vanishes at the band's end.
@@ -471,7 +471,7 @@ mod tests {
     fn the_papers_outer_faces_are_not_heard_and_near_ones_are() {
         let echoes = |change: fn(&mut Setup)| {
             let setup = setup(change);
-            let sampling = Sampling::for_speed_bin(
+            let sampling = WaveSampling::for_speed_bin(
                 &setup,
                 speed_bin(&setup, 3960.1).unwrap(),
                 Grade::Thorough,
@@ -498,8 +498,11 @@ mod tests {
     fn a_speed_bin_is_fast_enough_and_not_much_faster() {
         let setup = Setup::default();
         for speed in [1000.0, 1687.5, 1687.6, 4000.0, 25_000.0] {
-            let sampling =
-                Sampling::for_speed_bin(&setup, speed_bin(&setup, speed).unwrap(), Grade::Quick);
+            let sampling = WaveSampling::for_speed_bin(
+                &setup,
+                speed_bin(&setup, speed).unwrap(),
+                Grade::Quick,
+            );
             assert!(sampling.speed >= speed);
             assert!(sampling.speed <= speed.max(1500.0) * SPEED_BIN_RATIO * (1.0 + 1e-12));
         }
@@ -510,8 +513,11 @@ mod tests {
     #[test]
     fn the_repeated_source_is_heard_after_the_window() {
         let setup = Setup::default();
-        let sampling =
-            Sampling::for_speed_bin(&setup, speed_bin(&setup, 3960.1).unwrap(), Grade::Thorough);
+        let sampling = WaveSampling::for_speed_bin(
+            &setup,
+            speed_bin(&setup, 3960.1).unwrap(),
+            Grade::Thorough,
+        );
         let length = 2.0 * PI / sampling.wavenumber_step;
         let image = earliest_arrival(&setup, length - 21.4e-3, sampling.speed);
         assert!(image > direct_arrival(&setup, 21.4e-3));
@@ -519,7 +525,7 @@ mod tests {
 
     #[test]
     fn the_taper_falls_from_one_to_nothing() {
-        let sampling = Sampling::for_speed_bin(&Setup::default(), 18, Grade::Quick);
+        let sampling = WaveSampling::for_speed_bin(&Setup::default(), 18, Grade::Quick);
         let weights: Vec<f64> = (0..sampling.frequencies())
             .map(|n| sampling.taper(n, velocity_taper(sampling.band)))
             .collect();
@@ -532,7 +538,7 @@ mod tests {
     fn the_count_is_estimated_from_above_where_it_is_not_counted() {
         for refinement in [1.0, 4.0] {
             let setup = setup(|s| s.solver.refinement = refinement);
-            let sampling = Sampling::for_traces(&setup, 4000.0, 16e-6);
+            let sampling = WaveSampling::for_traces(&setup, 4000.0, 16e-6);
             let per_frequency = (PI * sampling.band / 1500.0 + sampling.evanescent_limit)
                 / sampling.wavenumber_step;
             let ratio =

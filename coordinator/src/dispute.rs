@@ -45,11 +45,11 @@ pub struct Contradiction {
 
 /// A decided dispute.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Verdict {
+pub(crate) struct VoteResult {
     /// The two workers that agree.
-    pub(crate) believed: [WorkerName; 2],
+    pub(crate) agreeing: [WorkerName; 2],
     /// Each of the other workers, with the first index at which it differs from those two.
-    pub(crate) liars: Vec<Contradiction>,
+    pub(crate) outvoted: Vec<Contradiction>,
 }
 
 impl Dispute {
@@ -65,7 +65,7 @@ impl Dispute {
     }
 
     /// Returns whether `name` is one of the workers that have voted.
-    pub(crate) fn involves(&self, name: &WorkerName) -> bool {
+    pub(crate) fn has_vote_of(&self, name: &WorkerName) -> bool {
         self.votes.iter().any(|vote| vote.by == *name)
     }
 
@@ -76,16 +76,16 @@ impl Dispute {
     }
 
     /// Adds the vote of another worker. The dispute is decided as soon as two votes agree.
-    pub(crate) fn vote(&mut self, vote: Vote) -> Option<Verdict> {
+    pub(crate) fn vote(&mut self, vote: Vote) -> Option<VoteResult> {
         let agrees = |other: &&Vote| same_bits(&other.solved, &vote.solved);
         let Some(second) = self.votes.iter().find(agrees) else {
             self.votes.push(vote);
             return None;
         };
-        let believed = [second.by.clone(), vote.by.clone()];
+        let agreeing = [second.by.clone(), vote.by.clone()];
         let others = self.votes.iter().filter(|other| !agrees(other));
-        let liars = others.filter_map(|other| self.difference(&vote, other)).collect();
-        Some(Verdict { believed, liars })
+        let outvoted = others.filter_map(|other| self.difference(&vote, other)).collect();
+        Some(VoteResult { agreeing, outvoted })
     }
 
     /// Removes the vote of a banned worker, and returns whether anything is left to decide.
@@ -130,19 +130,19 @@ mod tests {
         let indices = Indices { first: 10, count: 2 };
         let votes = [vote(1, velocities[0]), vote(2, velocities[1])];
         let mut dispute = Dispute::new(indices, votes, Duration::ZERO);
-        let mut verdict = None;
+        let mut result = None;
         for (process, velocity) in (3..).zip(&velocities[2..]) {
-            assert_eq!(verdict, None);
-            verdict = dispute.vote(vote(process, *velocity));
+            assert_eq!(result, None);
+            result = dispute.vote(vote(process, *velocity));
         }
-        let liars = verdict.map(|verdict| {
-            let liar = |liar: &Contradiction| {
-                assert_eq!(liar.index, 11);
-                liar.answers[1].0.process()
+        let outvoted = result.map(|result| {
+            let worker = |worker: &Contradiction| {
+                assert_eq!(worker.index, 11);
+                worker.answers[1].0.process()
             };
-            verdict.liars.iter().map(liar).collect::<Vec<_>>()
+            result.outvoted.iter().map(worker).collect::<Vec<_>>()
         });
-        assert_eq!(liars.as_deref(), expected, "{velocities:?}");
+        assert_eq!(outvoted.as_deref(), expected, "{velocities:?}");
     }
 
     #[test]

@@ -26,19 +26,19 @@ pub(crate) struct Audit {
 
 /// Contents of the store for an evaluation that is being computed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) enum Before {
+pub(crate) enum StoredRecord {
     /// No record.
     #[default]
-    Nothing,
+    Missing,
     /// A record that cannot be read.
     Damaged,
     /// Outcomes, some of them from a worker that was banned.
-    Stored(Arc<[Outcome]>),
+    Outcomes(Arc<[Outcome]>),
 }
 
 /// The realizations of one point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evaluation {
+pub struct PendingEvaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
     /// Number of this attempt: batches of earlier attempts do not count in this one.
@@ -46,7 +46,7 @@ pub struct Evaluation {
     /// The point.
     pub point: Point,
     /// Contents of the store for it.
-    pub(crate) before: Before,
+    pub(crate) stored: StoredRecord,
     /// Result of each index.
     pub(crate) results: Vec<Option<Solved>>,
     /// Number of results that are filled.
@@ -74,7 +74,7 @@ pub struct Evaluation {
     pub(crate) has_crashed_worker: bool,
 }
 
-impl Evaluation {
+impl PendingEvaluation {
     /// Returns attempt `attempt` at an evaluation without any results.
     pub fn new(number: u64, attempt: u64, point: Point, realizations: u64) -> Self {
         let length = usize::try_from(realizations).unwrap_or(usize::MAX);
@@ -82,7 +82,7 @@ impl Evaluation {
             number,
             attempt,
             point,
-            before: Before::Nothing,
+            stored: StoredRecord::Missing,
             results: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
@@ -220,15 +220,17 @@ impl Evaluation {
 
     /// Returns whether the evaluations stored after this one cannot be on its path, because the
     /// store has outcomes other than `outcomes` for it, or none.
-    pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
+    pub(crate) fn diverges_from_store(&self, outcomes: &[Outcome]) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
         };
-        match &self.before {
-            Before::Nothing => true,
-            Before::Damaged => false,
-            Before::Stored(before) => !before.iter().map(bits).eq(outcomes.iter().map(bits)),
+        match &self.stored {
+            StoredRecord::Missing => true,
+            StoredRecord::Damaged => false,
+            StoredRecord::Outcomes(before) => {
+                !before.iter().map(bits).eq(outcomes.iter().map(bits))
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use osteon_proto::timestamp;
 use osteon_proto::v1::{DepartedWorker, ListWorkersResponse, WorkerSnapshot, WorkerStanding};
 
 use crate::ids::WorkerId;
-use crate::state::{Departed, State, Worker};
+use crate::state::{AttachedWorker, Departed, State};
 
 /// Returns the attached workers, and those that departed last.
 pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
@@ -17,11 +17,15 @@ pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
 }
 
 /// Returns the snapshot of a worker; `None` if it is not attached.
-pub(crate) fn of(state: &State, worker: WorkerId, now: Duration) -> Option<WorkerSnapshot> {
+pub(crate) fn worker_snapshot(
+    state: &State,
+    worker: WorkerId,
+    now: Duration,
+) -> Option<WorkerSnapshot> {
     state.workers.get(&worker).map(|attached| snapshot(state, worker, attached, now))
 }
 
-fn snapshot(state: &State, id: WorkerId, worker: &Worker, now: Duration) -> WorkerSnapshot {
+fn snapshot(state: &State, id: WorkerId, worker: &AttachedWorker, now: Duration) -> WorkerSnapshot {
     let held = worker.in_flight.iter().filter_map(|batch| state.batches.get(batch));
     let oldest = held.map(|batch| batch.sent).min();
     let standing = if worker.draining {

@@ -32,7 +32,7 @@ pub struct Realizations {
 
 /// Result and history of a job.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Identified {
+pub struct CompletedJob {
     /// Status, digest, best point (or the result of each group), and what the data determine.
     pub result: JobResult,
     /// Returns the rows of all evaluations, in order.
@@ -130,7 +130,7 @@ pub enum IdentifyError<E> {
 pub fn identify<E>(
     specification: &JobSpecification,
     mut evaluate: impl FnMut(&Realizations) -> Result<Vec<Solved>, E>,
-) -> Result<Identified, IdentifyError<E>> {
+) -> Result<CompletedJob, IdentifyError<E>> {
     let violations = specification.check();
     if !violations.is_empty() {
         return Err(IdentifyError::Specification(violations));
@@ -205,8 +205,8 @@ fn identified(
     search: &Search,
     ending: &Ending,
     best: &BestOfGroups,
-) -> Identified {
-    let mut result = search.result(ending, &Program::this(None));
+) -> CompletedJob {
+    let mut result = search.result(ending, &Program::current(None));
     let summary = search.summary();
     let group = |set: usize| -> Option<GroupResult> {
         let found = summary.groups[set].best.zip(best.0.get(&set));
@@ -215,7 +215,7 @@ fn identified(
         summary.group(specification, set, best)
     };
     result.groups = (0..summary.groups.len()).filter_map(group).collect();
-    Identified { result, history: summary.history }
+    CompletedJob { result, history: summary.history }
 }
 
 #[cfg(test)]

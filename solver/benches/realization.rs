@@ -11,7 +11,7 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use osteon_common::case::Bone;
 use osteon_common::settings::Method;
-use osteon_solver::stages::{Memory, Stages};
+use osteon_solver::stages::{StageWorkspace, Stages};
 use osteon_solver::{Isa, Solver, Workspace};
 
 mod measure;
@@ -51,7 +51,7 @@ fn methods(criterion: &mut Criterion) {
 
 fn stages(criterion: &mut Criterion) {
     let stages = Stages::new(&setup(Method::Exact, 1.0), Isa::fastest());
-    let mut memory = Memory::default();
+    let mut memory = StageWorkspace::default();
     let ensemble = ensemble();
     let bone = ensemble.bone(0).expect("a bone");
     let mut group = criterion.benchmark_group("stages");

@@ -9,9 +9,9 @@ use osteon_solver::{Failure, fastest_wave};
 
 use crate::draws::{Draws, arrival, cells, not_elastic};
 use crate::generator::Generator;
-use crate::spread::Spread;
-use crate::table::{Table, millimetres, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, millimetres, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -33,8 +33,8 @@ const JUMP_MAX: f64 = 1e-5;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "plate (mm)",
         "dispersion",
         "pairs",
@@ -63,7 +63,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
 }
 
 fn summary(differences: &[Difference]) -> Vec<String> {
-    let spread = Spread::of(differences);
+    let spread = DifferenceSummary::new(differences);
     let jumps = differences.iter().filter_map(|difference| difference.velocity());
     vec![
         differences.len().to_string(),

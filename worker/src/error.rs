@@ -72,7 +72,7 @@ pub enum WorkerError {
     },
     /// The solver panicked: a bug in the program, never an outcome.
     #[error(
-        "the solver panicked ({message}) on {case}; this is a mistake in osteon, please report it with this line"
+        "the solver panicked ({message}) on {case}; this is a bug in osteon; please report it with this line"
     )]
     Panicked {
         /// The realization at which it panicked.

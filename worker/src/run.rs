@@ -249,7 +249,7 @@ impl Worker {
                 Effect::Send(message) => {
                     let request = AttachRequest { message: Some(message) };
                     if outbox.is_some_and(|outbox| outbox.try_send(request).is_err()) {
-                        end = Some(End::Lost("the coordinator takes no messages".to_owned()));
+                        end = Some(End::Lost("the coordinator does not read messages".to_owned()));
                     }
                 }
                 Effect::Compute(task, work) => {

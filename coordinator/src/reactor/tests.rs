@@ -114,7 +114,7 @@ impl Rig {
     }
 
     /// Applies a heartbeat of a worker.
-    fn hear(&mut self, worker: u64) {
+    fn heartbeat(&mut self, worker: u64) {
         self.check(Event::Heartbeat { worker: WorkerId(worker) }, &[]);
     }
 }
@@ -215,7 +215,7 @@ fn described(effect: &Effect) -> String {
             format!("store job {} evaluation {}", record.job, record.number)
         }
         Effect::Store(Record::Ban(record)) => {
-            format!("store expulsion {}: {} {}", record.number, record.worker, record.reason)
+            format!("store ban {}: {} {}", record.number, record.worker, record.reason)
         }
         Effect::Read { job, number } => format!("read job {job} evaluation {number}"),
         Effect::Prune { jobs, .. } => {
@@ -244,7 +244,7 @@ fn answered(answer: &Answer) -> String {
         }
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
-        Answer::Banned(banned) => format!("expelled {}", banned.len()),
+        Answer::Banned(banned) => format!("banned {}", banned.len()),
         Answer::Workers(list) => {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }

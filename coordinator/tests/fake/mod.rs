@@ -175,7 +175,7 @@ pub(crate) fn left_by(
     let groups =
         groups.filter_map(|(set, group)| summary.group(specification, set, best(group.best)));
     let groups = groups.collect();
-    summary.result(specification, ending, &Program::this(None), best(summary.best), groups)
+    summary.result(specification, ending, &Program::current(None), best(summary.best), groups)
 }
 
 /// Returns all outcomes at one point, with the median and the largest of their estimated errors.

@@ -38,7 +38,7 @@ fn speeds(realizations: &Realizations) -> Vec<Solved> {
     (0..realizations.count).map(solved).collect()
 }
 
-fn identified(specification: &JobSpecification) -> Identified {
+fn identified(specification: &JobSpecification) -> CompletedJob {
     identify(specification, |realizations| Ok::<_, Infallible>(speeds(realizations))).unwrap()
 }
 
@@ -61,7 +61,7 @@ fn the_result_is_that_of_the_search() {
             }
         };
         let found = identified(&specification);
-        assert_eq!(found.result, search.result(&ending, &Program::this(None)));
+        assert_eq!(found.result, search.result(&ending, &Program::current(None)));
         assert_eq!(found.history, search.history());
         assert_eq!(found.result.best.unwrap().estimated_error, errors);
     }
@@ -97,7 +97,7 @@ fn a_propagation_is_one_evaluation() {
         data: None,
         ..specification(MOMENTS, SearchMethod::Simplex)
     };
-    let Identified { result, history } = identified(&specification);
+    let CompletedJob { result, history } = identified(&specification);
     assert_eq!((result.status, history.len()), (Status::Converged, 1));
     assert_eq!(result.best.unwrap().point, specification.start());
 }

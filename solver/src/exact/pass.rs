@@ -2,13 +2,13 @@
 //! estimate of its error.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{self, RUN, Sampling, velocity_taper};
+use osteon_common::sampling::{self, RUN, WaveSampling, velocity_taper};
 
 use crate::Failure;
 use crate::exact::Exact;
 use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::response::Spectra;
-use crate::exact::signal::{Grid, Signal, Slopes};
+use crate::exact::signal::{Signal, Slopes, TimeGrid};
 use crate::exact::tables::Tables;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -36,7 +36,7 @@ const ESTIMATE_FACTOR: f64 = 1.3;
 #[derive(Debug)]
 pub(crate) struct BinTables {
     pub(crate) tables: Tables,
-    grid: Grid,
+    grid: TimeGrid,
     /// The band of a first pass.
     pub(crate) first: Band,
     /// The whole band.
@@ -90,18 +90,18 @@ impl Estimated {
 
 impl BinTables {
     /// Returns the memory of a bin with this many pairs that keeps its tables, bytes.
-    pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> u64 {
+    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling, pairs: f64) -> u64 {
         let lines = sampling.runs().len() * RUN;
-        (Tables::bytes(setup, sampling, pairs) + Grid::bytes(setup, lines)) as u64
+        (Tables::bytes(setup, sampling, pairs) + TimeGrid::bytes(setup, lines)) as u64
     }
 
     /// Creates the tables of a bin. `keep`: whether they are kept, or recomputed whenever they are
     /// needed.
-    pub(crate) fn new(setup: &Setup, sampling: Sampling, keep: bool) -> Self {
+    pub(crate) fn new(setup: &Setup, sampling: WaveSampling, keep: bool) -> Self {
         let whole = velocity_taper(sampling.band);
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let tables = Tables::new(setup, sampling, 1.0, whole, keep);
-        let grid = Grid::new(setup, &tables, keep);
+        let grid = TimeGrid::new(setup, &tables, keep);
         let first = Band::new(&tables, sampling.first_band);
         let whole = Band::new(&tables, sampling.band);
         Self { tables, grid, first, whole }

@@ -25,7 +25,7 @@ pub struct Stages {
 
 /// Scratch memory of one thread.
 #[derive(Debug, Default)]
-pub struct Memory {
+pub struct StageWorkspace {
     exact: ExactWorkspace,
     /// Responses of each line.
     responses: Vec<Vec<ComplexLanes>>,
@@ -39,7 +39,7 @@ pub struct Filled<'a> {
     accurate: bool,
     medium: Medium,
     speed: f64,
-    memory: &'a mut Memory,
+    memory: &'a mut StageWorkspace,
 }
 
 /// A plate whose responses at every frequency and wavenumber are known.
@@ -68,7 +68,7 @@ impl Stages {
     pub fn tensor<'a>(
         &'a self,
         bone: &Bone,
-        memory: &'a mut Memory,
+        memory: &'a mut StageWorkspace,
     ) -> Result<Filled<'a>, Failure> {
         let exact = &self.exact;
         let accurate = sampling::first_grade(&exact.setup) == Grade::Thorough;
@@ -104,7 +104,8 @@ impl<'b> Filled<'b> {
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
         let (isa, tables, medium) = (self.exact.isa, &self.bin.tables, &self.medium);
         let lines = &tables.lines[..self.band().lines];
-        let Memory { exact: ExactWorkspace { fast, accurate, .. }, responses } = &mut *self.memory;
+        let StageWorkspace { exact: ExactWorkspace { fast, accurate, .. }, responses } =
+            &mut *self.memory;
         responses.resize_with(lines.len(), Vec::new);
         for (line, responses) in lines.iter().zip(responses) {
             if self.accurate {
@@ -171,7 +172,7 @@ mod tests {
             setup.solver.refinement = refinement;
             let solver = Solver::new(&setup);
             let stages = Stages::new(&setup, Isa::fastest());
-            let (mut workspace, mut memory) = (Workspace::default(), Memory::default());
+            let (mut workspace, mut memory) = (Workspace::default(), StageWorkspace::default());
             let mut same = 0;
             for i in 0..20 {
                 let bone = ensemble.bone(i).unwrap();

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use osteon_common::case::Setup;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{Grade, SPEED_BINS, Sampling};
+use osteon_common::sampling::{Grade, SPEED_BINS, WaveSampling};
 
 use crate::exact::pass::BinTables;
 
@@ -43,7 +43,7 @@ pub(crate) enum TablesRef<'a> {
 enum Slot {
     Tables(Box<BinTables>),
     /// Only the sampling; its tables are recomputed whenever they are needed.
-    Sampling(Box<Sampling>),
+    SamplingOnly(Box<WaveSampling>),
     /// The bin is too large to be computed.
     TooLarge,
 }
@@ -57,7 +57,7 @@ impl TableCache {
     pub(crate) fn tables(&self, index: usize, bytes: &CacheBytes) -> Option<TablesRef<'_>> {
         match self.slots.get(index)?.get_or_init(|| self.slot(index, bytes)) {
             Slot::Tables(bin) => Some(TablesRef::Cached(bin)),
-            Slot::Sampling(sampling) => {
+            Slot::SamplingOnly(sampling) => {
                 Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, false))))
             }
             Slot::TooLarge => None,
@@ -65,7 +65,7 @@ impl TableCache {
     }
 
     fn slot(&self, index: usize, bytes: &CacheBytes) -> Slot {
-        let sampling = Sampling::for_speed_bin(&self.setup, index, self.grade);
+        let sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade);
         let pairs = sampling.pairs(sampling.band);
         if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Slot::TooLarge;
@@ -73,7 +73,7 @@ impl TableCache {
         if bytes.reserve(BinTables::bytes(&self.setup, &sampling, pairs)) {
             Slot::Tables(Box::new(BinTables::new(&self.setup, sampling, true)))
         } else {
-            Slot::Sampling(Box::new(sampling))
+            Slot::SamplingOnly(Box::new(sampling))
         }
     }
 }
