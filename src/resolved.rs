@@ -162,7 +162,7 @@ pub(crate) struct Run {
     pub(crate) kind: JobKind,
     /// The job file.
     pub(crate) job: PathBuf,
-    /// The computers of the run.
+    /// Where the job is computed.
     pub(crate) location: RunLocation,
     /// Name of the job for display; may be empty.
     pub(crate) name: String,
@@ -172,7 +172,7 @@ pub(crate) struct Run {
     pub(crate) format: OutputFormat,
 }
 
-/// The computers of a run.
+/// Where a job is computed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum RunLocation {
     /// Worker processes started by this process.

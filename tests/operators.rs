@@ -48,7 +48,7 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert_eq!(coordinator.client(&["workers"]).succeeded(), "no workers\n");
     let mut first = coordinator.worker(1);
     let listed = || coordinator.client(&["workers", "--json"]).json();
-    eventually("a worker is attached", || listed()["workers"][0]["standing"] == "ok");
+    eventually("a worker is attached", || listed()["workers"][0]["state"] == "ok");
     let _second = coordinator.worker(2);
     coordinator.submit(&file);
     eventually("both compute", || {
@@ -63,12 +63,12 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert!(is_recent(&workers[0]["attached"]), "{workers}");
     assert!(workers[0]["silent_s"].as_f64() < Some(60.0), "{workers}");
     let table = coordinator.client(&["workers"]).succeeded().to_owned();
-    assert!(table.starts_with("NUMBER") && table.contains("STANDING"), "{table}");
+    assert!(table.starts_with("NUMBER") && table.contains("STATE"), "{table}");
     assert_eq!(table.lines().count(), 3, "{table}");
 
     let number = workers[0]["number"].to_string();
     let drained = coordinator.client(&["workers", "drain", &number, "--json"]).json();
-    assert_eq!(drained["standing"], "draining");
+    assert_eq!(drained["state"], "draining");
     // It ends as if its own user had asked it to, and nobody is blamed.
     assert_eq!(first.code(), Some(0));
     eventually("it is gone", || listed()["workers"].as_array().map(Vec::len) == Some(1));

@@ -44,7 +44,7 @@ pub(super) async fn drain(
     Ok(ExitStatus::Done)
 }
 
-/// `health`: prints whether a coordinator serves; the exit code says the same.
+/// `health`: prints whether a coordinator is serving; the exit code is 0 if it is.
 pub(super) async fn health(
     coordinator: &Remote,
     limit: Duration,

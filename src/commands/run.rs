@@ -75,7 +75,7 @@ struct NamedJob<'a> {
     name: &'a str,
 }
 
-/// The computers of a run, started or connected.
+/// Where a job is computed; a coordinator is already connected.
 enum ConnectedLocation {
     Local { workers: u32, threads: u32 },
     Coordinator(Box<Client>),

@@ -248,7 +248,7 @@ fn answered(answer: &Answer) -> String {
         Answer::Workers(list) => {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }
-        Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.standing()),
+        Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.state()),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }

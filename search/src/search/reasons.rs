@@ -58,7 +58,7 @@ pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> Stri
     )
 }
 
-/// Explains why a search that settled has no lower cost, if its method can tell.
+/// Explains why a search that converged has no lower cost, if its method can tell.
 fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> Option<String> {
     let best = best.filter(|_| specification.search.method == SearchMethod::Newton)?;
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);

@@ -1,7 +1,7 @@
 //! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
 //! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
-//! A bad node that has just come back holds nothing, so being idle says nothing for a worker: a
+//! A bad node that has just come back holds nothing, so being idle is no evidence for a worker: a
 //! quarantined realization goes to the worker with the best reputation, and waits for it. One over
 //! which a worker was lost goes to the worker that has been attached longest among these, so that a
 //! node that comes and goes does not get it while another worker is there.

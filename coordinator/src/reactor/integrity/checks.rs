@@ -84,12 +84,12 @@ pub(crate) fn tie_broken(
     let dispute = &mut evaluation.disputes[at];
     if let Some(result) = dispute.vote(Vote { by: by.clone(), solved }) {
         evaluation.disputes.remove(at);
-        execute(turn, assignment.job, result);
+        ban_outvoted(turn, assignment.job, result);
     }
 }
 
-/// Bans the workers that a verdict finds wrong.
-fn execute(turn: &mut Turn, job: JobId, result: VoteResult) {
+/// Bans the workers that were outvoted.
+fn ban_outvoted(turn: &mut Turn, job: JobId, result: VoteResult) {
     let VoteResult { agreeing: [one, other], outvoted } = result;
     for Contradiction { index, answers: [(_, right), (worker, wrong)] } in outvoted {
         let reason = format!(

@@ -159,10 +159,10 @@ fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
         .workers
         .iter()
         .map(|it| {
-            (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.standing())
+            (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.state())
         })
         .collect();
-    let ok = osteon_proto::v1::WorkerStanding::Ok;
+    let ok = osteon_proto::v1::WorkerState::Ok;
     assert_eq!(shown, [(1, 1, 4.0, 2, Some(4.0), ok), (2, 2, 1.0, 2, Some(4.0), ok)]);
     assert_eq!(list.workers[0].realizations_per_second, 0.0);
     assert_eq!(list.departed, []);
