@@ -58,7 +58,7 @@ pub(crate) struct HealthArguments {
 /// Of `backup`.
 #[derive(Debug, Args)]
 pub(crate) struct BackupArguments {
-    /// Directory for the copy, osteon.sqlite, which may not exist there already
+    /// Directory for the copy, osteon.sqlite, which must not exist there yet
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// The coordinator.

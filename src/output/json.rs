@@ -13,7 +13,7 @@ use osteon_solver::check::{Difference, MethodSolution};
 use serde_json::{Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_of};
-use crate::output::text::operators::state_name;
+use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
 use crate::program;
@@ -153,7 +153,7 @@ fn worker_value(worker: &WorkerSnapshot) -> Value {
         "realizations_per_second": worker.realizations_per_second,
         "batches": worker.batches,
         "oldest_batch_s": worker.oldest_batch_s,
-        "state": state_name(worker),
+        "state": worker_state_name(worker),
     })
 }
 

@@ -489,12 +489,10 @@ fn jobs() -> Vec<JobSnapshot> {
 
 #[test]
 fn jobs_are_a_table_or_a_list() {
-    insta::assert_snapshot!(printed(OutputFormat::Text, |output| output
-        .jobs(&jobs(), &[])
-        .unwrap()));
-    insta::assert_snapshot!(printed(OutputFormat::Json, |output| output
-        .jobs(&jobs(), &[])
-        .unwrap()));
+    let shown = printed(OutputFormat::Text, |output| output.jobs(&jobs(), &[]).unwrap());
+    insta::assert_snapshot!(shown);
+    let shown = printed(OutputFormat::Json, |output| output.jobs(&jobs(), &[]).unwrap());
+    insta::assert_snapshot!(shown);
     assert_eq!(printed(OutputFormat::Text, |output| output.jobs(&[], &[]).unwrap()), "no jobs\n");
     let none = printed(OutputFormat::Json, |output| output.jobs(&[], &[]).unwrap());
     assert_eq!(none, "[]\n");

@@ -81,7 +81,7 @@ pub(super) fn attached(workers: &[WorkerSnapshot]) -> String {
             format!("{:.0}/s", worker.realizations_per_second),
             worker.batches.to_string(),
             worker.oldest_batch_s.map(span).unwrap_or_default(),
-            state_name(worker).to_owned(),
+            worker_state_name(worker).to_owned(),
         ]
     };
     table(&header, workers.iter().map(|worker| (row(worker), String::new())).collect())
@@ -100,7 +100,7 @@ fn departed(gone: &DepartedWorker) -> String {
 }
 
 /// `ok`, `draining`, `distrusted` or `probation`.
-pub(in crate::output) fn state_name(worker: &WorkerSnapshot) -> &'static str {
+pub(in crate::output) fn worker_state_name(worker: &WorkerSnapshot) -> &'static str {
     match worker.state() {
         WorkerState::Ok => "ok",
         WorkerState::Draining => "draining",

@@ -158,9 +158,7 @@ fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
     let shown: Vec<_> = list
         .workers
         .iter()
-        .map(|it| {
-            (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.state())
-        })
+        .map(|it| (it.worker, it.threads, it.silent_s, it.batches, it.oldest_batch_s, it.state()))
         .collect();
     let ok = osteon_proto::v1::WorkerState::Ok;
     assert_eq!(shown, [(1, 1, 4.0, 2, Some(4.0), ok), (2, 2, 1.0, 2, Some(4.0), ok)]);
