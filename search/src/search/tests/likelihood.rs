@@ -127,5 +127,5 @@ fn velocities_that_are_all_the_same_have_no_likelihood() {
     }
     let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
-    assert!(reason.unwrap().contains("every velocity of the first point is the same"));
+    assert!(reason.unwrap().contains("all velocities at the first point are equal"));
 }
