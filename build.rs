@@ -1,4 +1,4 @@
-//! Notes from which commit the program is built. This is a script of the front door, not of
+//! Notes from which commit the program is built. This is a build script of the program, not of
 //! `common`, so that a commit builds this package anew and not all of them.
 
 use std::env;

@@ -10,14 +10,14 @@ use anyhow::Context as _;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::job_file;
 use osteon_common::parameters::Parameter;
-use osteon_search::{Identified, IdentifyError, identify};
+use osteon_search::{CompletedJob, IdentifyError, identify};
 use osteon_solver::{Solver, Workspace};
 use rayon::prelude::*;
 
 /// Does the job on all cores.
 pub(crate) fn run(
     specification: &JobSpecification,
-) -> Result<Identified, IdentifyError<Infallible>> {
+) -> Result<CompletedJob, IdentifyError<Infallible>> {
     let solver = Solver::new(&specification.setup);
     identify(specification, |realizations| {
         let solve = |workspace: &mut Workspace, index| {
@@ -32,7 +32,7 @@ pub(crate) fn run(
 fn main() -> anyhow::Result<()> {
     let path = std::env::args().nth(1).context("usage: identify JOB.toml")?;
     let specification = job_file::read(Path::new(&path), JobKind::Identification)?;
-    let Identified { result, history } = run(&specification)?;
+    let CompletedJob { result, history } = run(&specification)?;
     println!("{} after {} evaluations", result.status.name(), history.len());
     if let Some(best) = &result.best {
         for parameter in Parameter::ALL {

@@ -42,7 +42,7 @@ pub(crate) enum Command {
     Jobs(JobsArguments),
     /// List the workers of a coordinator
     Workers(WorkersArguments),
-    /// Say whether a coordinator serves: exit code 0 if so, else 1
+    /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
     Health(HealthArguments),
     /// Copy the store of a coordinator while it runs
     Backup(BackupArguments),
@@ -85,10 +85,11 @@ pub(crate) struct RunArguments {
     /// What is shown to the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
-    /// What people call the job, for `osteon jobs` and logs (at most 256 bytes)
+    /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
     #[arg(long, value_name = "TEXT", value_parser = job_name)]
     pub(crate) name: Option<String>,
-    /// Keep the results here; the same command resumes the run, or shows its results again
+    /// Directory for the results; the same command resumes an interrupted run, or shows the results
+    /// again
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
@@ -101,14 +102,14 @@ pub(crate) struct RunArguments {
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
     pub(crate) case: PathBuf,
-    /// Write the case, the result and the pressure traces here (traces.csv, by the exact method,
-    /// whatever the case asks for); a directory belongs to one case
+    /// Directory for the case, the result and the pressure traces (traces.csv, always by the exact
+    /// method); it can hold only one case
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Solve with both methods and a refined exact one, and show how they differ
+    /// Solve with both methods and with a refined exact method, and show the differences
     #[arg(long)]
     pub(crate) check: bool,
     /// Duration of the traces, s
@@ -130,7 +131,7 @@ pub(crate) struct DrawArguments {
     /// Draw at the best point of DIR/result.json instead of the fixed/start point
     #[arg(long, value_name = "DIR")]
     pub(crate) at: Option<PathBuf>,
-    /// With --at: draw at the best point of this group of the data
+    /// With --at, draw at the best point of this group of the data
     #[arg(long, value_name = "NAME", requires = "at")]
     pub(crate) group: Option<String>,
 }
@@ -138,13 +139,14 @@ pub(crate) struct DrawArguments {
 /// Of `coordinator`.
 #[derive(Debug, Args)]
 pub(crate) struct CoordinatorArguments {
-    /// HOST:PORT (port 0 takes a free one) or unix:PATH
+    /// Address to listen on: HOST:PORT (port 0 selects a free port) or unix:PATH
     #[arg(long, value_name = "ADDR")]
     pub(crate) listen: String,
     /// Directory of the store; the URL in use is written to DIR/address
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
-    /// Serve addresses other than loopback without TLS: anyone who can reach them can use them
+    /// Serve on addresses other than loopback without TLS: anyone who can reach the address can use
+    /// the coordinator
     #[arg(long, conflicts_with_all = ["tls_ca", "tls_cert", "tls_key", "tokens", "token_file"])]
     pub(crate) insecure: bool,
     /// Serve with TLS: certificates of the authorities that sign workers' certificates (PEM)
@@ -153,33 +155,34 @@ pub(crate) struct CoordinatorArguments {
     /// The coordinator's certificate (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_key"])]
     pub(crate) tls_cert: Option<PathBuf>,
-    /// Its private key (PEM)
+    /// Private key of the certificate (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
     pub(crate) tls_key: Option<PathBuf>,
-    /// Clients need a token from this list: lines of NAME ROLE HASH, made by `osteon token`; read
-    /// again, with the certificates, at SIGHUP
+    /// List of the tokens that clients may use: lines of NAME ROLE HASH, made by `osteon token`;
+    /// SIGHUP makes the coordinator read it and the certificates again
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
     /// File with one more client token, of role admin
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
-    /// Fraction of the batches that a second worker computes too, 0 to 1: different bits expose a
-    /// worker that computes wrongly
+    /// Fraction of the batches that a second worker computes too, 0 to 1: different answers reveal
+    /// a worker that computes wrongly
     #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
           value_parser = fraction)]
     pub(crate) audit_fraction: f64,
-    /// Leave idle the threads that no job needs now, instead of computing points that a search may
-    /// ask for next; changes no bit of a result
+    /// Do not use idle threads for points that a search may request next; does not change any
+    /// result
     #[arg(long)]
     pub(crate) no_speculation: bool,
     /// Delete finished jobs after this long: a number with s, min, h or d [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
-    /// Start although the store has lost accepted jobs; otherwise it is refused
+    /// Start even if the store has lost accepted jobs; without this option the coordinator refuses
+    /// to start
     #[arg(long)]
     pub(crate) accept_lost_jobs: bool,
-    /// Seconds of silence after which a worker's batches are reassigned, 1 to 3600; heartbeats are
-    /// sent five times per lease
+    /// Time without a message after which a worker's batches are reassigned, s, 1 to 3600;
+    /// heartbeats are sent five times per lease
     #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
     pub(crate) lease: Duration,
 }
@@ -199,7 +202,7 @@ pub(crate) struct WorkerArguments {
     /// End after this long without a coordinator, s [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) give_up_after: Option<f64>,
-    /// Finish the work in hand and end after this long, s [default: never]
+    /// After this long, finish the current work and end, s [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) time_limit: Option<f64>,
 }
@@ -207,14 +210,14 @@ pub(crate) struct WorkerArguments {
 /// What is shown to a coordinator, and how it is known.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CredentialArguments {
-    /// Certificates of the authorities that may have signed the coordinator's (PEM); for https [env:
-    /// OSTEON_TLS_CA]
+    /// Certificates of the authorities that may sign the coordinator's certificate (PEM); for https
+    /// [env: OSTEON_TLS_CA]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_ca: Option<PathBuf>,
     /// Client certificate (PEM) [env: OSTEON_TLS_CERT]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_cert: Option<PathBuf>,
-    /// Its private key (PEM) [env: OSTEON_TLS_KEY]
+    /// Private key of the certificate (PEM) [env: OSTEON_TLS_KEY]
     #[arg(long, value_name = "FILE")]
     pub(crate) tls_key: Option<PathBuf>,
     /// File with an access token [env: OSTEON_TOKEN_FILE]
@@ -260,13 +263,14 @@ pub(crate) struct SubmitArguments {
     /// Submit a propagation instead of an identification
     #[arg(long)]
     pub(crate) propagate: bool,
-    /// Submitting again with the same ID gives the same job (at most 256 bytes)
+    /// Id of this submission: repeating it returns the same job and does not create a second one
+    /// (at most 256 bytes)
     #[arg(long, value_name = "ID", value_parser = request_id)]
     pub(crate) request_id: Option<String>,
-    /// What people call the job, for `osteon jobs` and logs (at most 256 bytes)
+    /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
     #[arg(long, value_name = "TEXT", value_parser = job_name)]
     pub(crate) name: Option<String>,
-    /// Rank among your own jobs, 0 to 9: a higher one goes first
+    /// Priority among your own jobs, 0 to 9: jobs of higher priority run first
     #[arg(long, value_name = "P", default_value_t = 0,
           value_parser = clap::value_parser!(u32).range(0..=i64::from(osteon_common::limits::PRIORITY_MAX)))]
     pub(crate) priority: u32,
@@ -292,7 +296,7 @@ pub(crate) struct JobsArguments {
 /// What can be done with jobs.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
-    /// Delete finished jobs and print their ids; without options all of them
+    /// Delete finished jobs (without options, all of them) and print their ids
     Prune(PruneArguments),
 }
 
@@ -302,10 +306,10 @@ pub(crate) struct PruneArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Only those that ended longer ago: a number with s, min, h or d
+    /// Delete only jobs that ended longer ago than this: a number with s, min, h or d
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) older_than: Option<Duration>,
-    /// Keep the N that ended last
+    /// Keep the N jobs that ended last
     #[arg(long, value_name = "N")]
     pub(crate) keep_last: Option<u64>,
     /// Print JSON
@@ -341,18 +345,18 @@ pub(crate) struct FetchArguments {
 /// Of `certs`.
 #[derive(Debug, Args)]
 pub(crate) struct CertsArguments {
-    /// Directory for the files; none of them may be there already
+    /// Directory for the files, none of which may exist already
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// Host name or IP address of the coordinator, besides localhost, 127.0.0.1 and ::1; may be
     /// repeated
     #[arg(long, value_name = "HOST")]
     pub(crate) host: Vec<String>,
-    /// Days that the certificates of coordinator, workers and clients are valid
+    /// Number of days for which the certificates of coordinator, workers and clients are valid
     #[arg(long, value_name = "N", default_value_t = 365,
           value_parser = clap::value_parser!(u16).range(1..=3650))]
     pub(crate) days: u16,
-    /// Sign with the authority in this directory instead of making a new one
+    /// Sign with the authority in this directory instead of creating a new one
     #[arg(long, value_name = "DIR")]
     pub(crate) ca: Option<PathBuf>,
 }
@@ -363,7 +367,8 @@ pub(crate) struct TokenArguments {
     /// Holder's name (letters, digits and . _ - @), for logs
     #[arg(value_name = "NAME")]
     pub(crate) name: String,
-    /// What it allows: read (see jobs, fetch results), submit (also submit, cancel), admin (all)
+    /// Permissions of the token: read (see jobs, fetch results), submit (also submit and cancel),
+    /// admin (everything)
     #[arg(long, value_name = "ROLE", value_parser = ["read", "submit", "admin"])]
     pub(crate) role: String,
     /// Write the token to this new file, which only you can read
@@ -377,7 +382,7 @@ pub(crate) struct TokenArguments {
 /// Of `schema`.
 #[derive(Debug, Args)]
 pub(crate) struct SchemaArguments {
-    /// The file: job is a job file, result is result.json and what --json prints of a run
+    /// The file: `job` stands for a job file, `result` for result.json and for the output of a run with --json
     #[arg(value_enum, value_name = "FILE")]
     pub(crate) file: SchemaFile,
 }
@@ -441,7 +446,11 @@ fn age(text: &str) -> Result<Duration, String> {
         .map(|number| number * seconds)
         .filter(|age| *age <= AGE_S_MAX)
         .and_then(|age| Duration::try_from_secs_f64(age).ok())
-        .ok_or_else(|| "it must be a number with a unit, s, min, h or d: 90min, 30d".to_owned())
+        .ok_or_else(|| {
+            "it must be a number with the unit s, min, h or d (for example 90min or \
+                        30d)"
+                .to_owned()
+        })
 }
 
 fn job_name(text: &str) -> Result<String, String> {

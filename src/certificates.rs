@@ -16,7 +16,7 @@ const CLOCK_MARGIN: Duration = Duration::hours(1);
 const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 
 /// A certificate and its key, both in PEM.
-pub(crate) struct Made {
+pub(crate) struct PemPair {
     /// The certificate.
     pub(crate) certificate: String,
     /// Its private key, which is secret.
@@ -28,7 +28,7 @@ pub(crate) struct Authority(Issuer<'static, KeyPair>);
 
 /// The holder of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Bearer<'a> {
+pub(crate) enum CertificateHolder<'a> {
     /// A coordinator, with the hosts under which it can be reached, besides the local machine's own
     /// names.
     Coordinator(&'a [String]),
@@ -40,7 +40,7 @@ pub(crate) enum Bearer<'a> {
 
 impl Authority {
     /// Creates an authority that is valid from `now` on.
-    pub(crate) fn new(now: OffsetDateTime) -> Result<(Self, Made), rcgen::Error> {
+    pub(crate) fn new(now: OffsetDateTime) -> Result<(Self, PemPair), rcgen::Error> {
         let key = KeyPair::generate()?;
         let mut params = CertificateParams::default();
         params.distinguished_name = named(&format!("osteon authority of {}", now.date()));
@@ -49,7 +49,7 @@ impl Authority {
         params.not_before = now - CLOCK_MARGIN;
         params.not_after = now + Duration::days(AUTHORITY_DAYS);
         let certificate = params.self_signed(&key)?.pem();
-        let made = Made { certificate, key: key.serialize_pem() };
+        let made = PemPair { certificate, key: key.serialize_pem() };
         Ok((Self(Issuer::new(params, key)), made))
     }
 
@@ -61,22 +61,24 @@ impl Authority {
     /// Issues a certificate for `bearer` that is valid for `days` from `now` on.
     pub(crate) fn sign(
         &self,
-        bearer: Bearer<'_>,
+        bearer: CertificateHolder<'_>,
         now: OffsetDateTime,
         days: u16,
-    ) -> Result<Made, rcgen::Error> {
+    ) -> Result<PemPair, rcgen::Error> {
         let mut params = match bearer {
-            Bearer::Coordinator(hosts) => {
+            CertificateHolder::Coordinator(hosts) => {
                 let local = LOCAL_HOSTS.map(str::to_owned);
                 CertificateParams::new(hosts.iter().cloned().chain(local).collect::<Vec<_>>())?
             }
-            Bearer::Worker => with_uri(WORKER_NAME)?,
-            Bearer::Client => with_uri(CLIENT_NAME)?,
+            CertificateHolder::Worker => with_uri(WORKER_NAME)?,
+            CertificateHolder::Client => with_uri(CLIENT_NAME)?,
         };
         let (name, usage) = match bearer {
-            Bearer::Coordinator(_) => ("osteon coordinator", ExtendedKeyUsagePurpose::ServerAuth),
-            Bearer::Worker => ("osteon worker", ExtendedKeyUsagePurpose::ClientAuth),
-            Bearer::Client => ("osteon client", ExtendedKeyUsagePurpose::ClientAuth),
+            CertificateHolder::Coordinator(_) => {
+                ("osteon coordinator", ExtendedKeyUsagePurpose::ServerAuth)
+            }
+            CertificateHolder::Worker => ("osteon worker", ExtendedKeyUsagePurpose::ClientAuth),
+            CertificateHolder::Client => ("osteon client", ExtendedKeyUsagePurpose::ClientAuth),
         };
         params.distinguished_name = named(name);
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
@@ -86,7 +88,7 @@ impl Authority {
         params.not_after = now + Duration::days(i64::from(days));
         let key = KeyPair::generate()?;
         let certificate = params.signed_by(&key, &self.0)?.pem();
-        Ok(Made { certificate, key: key.serialize_pem() })
+        Ok(PemPair { certificate, key: key.serialize_pem() })
     }
 }
 

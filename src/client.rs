@@ -22,9 +22,9 @@ use tonic::Code;
 
 use crate::environment::{COORDINATOR, Unused};
 use crate::progress::say;
-use crate::request::Request;
+use crate::request_id::RequestId;
 
-use self::parts::Parts;
+use self::parts::FetchedParts;
 use self::peer::{Peer, with_wait_notice};
 
 mod parts;
@@ -51,13 +51,13 @@ pub(crate) enum ClientError {
     /// The coordinator did not answer in time.
     #[error("the coordinator at {endpoint} did not answer within {ANSWER_S_MAX} s")]
     Unanswered {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
     },
     /// The connection was lost.
     #[error("lost the coordinator at {endpoint}: {reason}")]
     Lost {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The transport's error.
         reason: String,
@@ -65,7 +65,7 @@ pub(crate) enum ClientError {
     /// The coordinator cannot serve the request now.
     #[error("the coordinator at {endpoint} is unavailable: {reason}")]
     Unavailable {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The coordinator's explanation.
         reason: String,
@@ -76,7 +76,7 @@ pub(crate) enum ClientError {
     /// The coordinator refuses the request.
     #[error("{reason}{hint} (coordinator {endpoint})")]
     Refused {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The gRPC status code.
         code: Code,
@@ -87,8 +87,8 @@ pub(crate) enum ClientError {
     },
     /// It is unknown whether the coordinator has accepted the job.
     #[error(
-        "{cause}; the job may be accepted all the same: `osteon submit` of the same job with \
-         --request-id {request_id} prints its id and makes no second one"
+        "{cause}; the coordinator may have accepted the job: `osteon submit` of the same job with \
+         --request-id {request_id} prints its id and does not create a second job"
     )]
     Uncertain {
         /// Error of the last attempt.
@@ -108,7 +108,7 @@ pub(crate) enum ClientError {
     /// The coordinator sent a message that cannot be read.
     #[error("invalid answer of the coordinator at {endpoint}: {source}")]
     Malformed {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The defect of the message.
         source: Malformed,
@@ -129,7 +129,7 @@ impl ClientError {
     }
 
     /// Adds the environment variables that were not used, if that may be the reason of the error.
-    fn without(self, unused: &Unused) -> Self {
+    fn with_unused_variables(self, unused: &Unused) -> Self {
         let of_trust = matches!(
             self,
             Self::Credentials(CredentialsError::NoAuthority { .. })
@@ -177,7 +177,7 @@ pub(crate) struct Remote {
 
 impl Remote {
     /// Prints the coordinator's address, unless it was given on the command line.
-    pub(crate) fn tell(&self) {
+    pub(crate) fn announce(&self) {
         if self.from_environment {
             say(&format!("running on {} ({COORDINATOR})", self.endpoint));
         }
@@ -210,7 +210,7 @@ impl Client {
             let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
             with_wait_notice(Self::find(endpoint, &credentials), notice).await
         };
-        let jobs = found.await.map_err(|error: ClientError| error.without(unused))?;
+        let jobs = found.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
         Ok(Self { peer: Peer::new(remote), jobs })
     }
 
@@ -240,7 +240,7 @@ impl Client {
     pub(crate) async fn submit(
         &mut self,
         specification: &JobSpecification,
-        request: &Request,
+        request: &RequestId,
         options: SubmitOptions,
     ) -> Result<String, ClientError> {
         let message = v1::SubmitRequest {
@@ -288,9 +288,9 @@ impl Client {
         Ok(jobs)
     }
 
-    /// Returns the workers that are expelled because they computed wrongly.
-    pub(crate) async fn expelled(&mut self) -> Result<Vec<v1::ExpelledWorker>, ClientError> {
-        let call = self.jobs.list_expelled(v1::ListExpelledRequest {});
+    /// Returns the workers that are banned because they computed wrongly.
+    pub(crate) async fn banned(&mut self) -> Result<Vec<v1::BannedWorker>, ClientError> {
+        let call = self.jobs.list_bans(v1::ListBansRequest {});
         Ok(self.peer.answered(call).await?.workers)
     }
 
@@ -382,7 +382,7 @@ impl Client {
     pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
         let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
         let mut stream = self.peer.answered(call).await?;
-        let mut parts = Parts::default();
+        let mut parts = FetchedParts::default();
         loop {
             let Ok(message) = timeout(answer_limit(), stream.message()).await else {
                 return Err(self.peer.silent());
@@ -396,7 +396,7 @@ impl Client {
                 Err(status) => return Err(self.peer.refused(&status)),
             }
         }
-        parts.whole().map_err(|source| self.malformed(source))
+        parts.assemble().map_err(|source| self.malformed(source))
     }
 
     fn present<T>(&self, field: Option<T>, name: &'static str) -> Result<T, ClientError> {

@@ -11,7 +11,7 @@ mod simulate;
 mod token;
 mod worker;
 
-use crate::ending::{Ending, Failure};
+use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::resolved::Resolved;
 use crate::signals::unless_interrupted;
 
@@ -22,7 +22,7 @@ const NOTHING_LEFT: &str = "nothing was changed";
 ///
 /// # Errors
 /// If the command fails.
-pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
+pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
     match resolved {
         Resolved::Run(run) => run::run(run).await,
         Resolved::Simulate { arguments, isa } => {
@@ -37,11 +37,11 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
         Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
-            let left = "the job may be accepted all the same (see `osteon jobs`)";
+            let left = "the job may have been accepted (see `osteon jobs`)";
             unless_interrupted(jobs::submit(submission, &coordinator, format), left).await
         }
         Resolved::Prune { older_than, keep_last, coordinator, format } => {
-            let left = "jobs may be deleted all the same (see `osteon jobs`)";
+            let left = "jobs may have been deleted (see `osteon jobs`)";
             let pruned = jobs::prune(older_than, keep_last, &coordinator, format);
             unless_interrupted(pruned, left).await
         }
@@ -49,11 +49,11 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
             unless_interrupted(jobs::list(&coordinator, format), NOTHING_LEFT).await
         }
         Resolved::Watch { job, coordinator } => {
-            let left = "the job goes on (see `osteon jobs`, `osteon cancel`)";
+            let left = "the job continues (see `osteon jobs`, `osteon cancel`)";
             unless_interrupted(jobs::watch(&job, &coordinator), left).await
         }
         Resolved::Cancel { job, coordinator } => {
-            let left = "the job may be cancelled all the same (see `osteon jobs`)";
+            let left = "the job may have been cancelled (see `osteon jobs`)";
             unless_interrupted(jobs::cancel(&job, &coordinator), left).await
         }
         Resolved::Fetch { job, coordinator, out } => {
@@ -64,7 +64,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<Ending, Failure> {
             unless_interrupted(operators::workers(&coordinator, format), NOTHING_LEFT).await
         }
         Resolved::DrainWorker { worker, coordinator, format } => {
-            let left = "the worker may be drained all the same (see `osteon workers`)";
+            let left = "the worker may have been told to drain (see `osteon workers`)";
             unless_interrupted(operators::drain(worker, &coordinator, format), left).await
         }
         Resolved::Health { coordinator, limit, format } => {

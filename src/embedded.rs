@@ -16,7 +16,7 @@ use osteon_proto::endpoint::Endpoint;
 use tempfile::TempDir;
 
 use crate::embedded::workers::Workers;
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 use crate::program;
 
 /// Longest path of a temporary directory that leaves room for the socket's name, bytes.
@@ -50,13 +50,13 @@ impl Embedded {
         workers: u32,
         threads: u32,
         progress: Arc<AtomicU64>,
-    ) -> Result<Self, Failure> {
-        let directory = private_directory().map_err(Failure::Failed)?;
+    ) -> Result<Self, CommandFailure> {
+        let directory = private_directory().map_err(CommandFailure::Failed)?;
         let socket = directory.path().join("socket");
         let endpoint = Endpoint::Unix(socket.clone());
         let executable = std::env::current_exe()
             .context("cannot find this program to start workers")
-            .map_err(Failure::Failed)?;
+            .map_err(CommandFailure::Failed)?;
         let coordinator = start_coordinator(store, socket).await?;
         let workers = Workers::start(executable, &endpoint, workers, threads, progress);
         Ok(Self { coordinator, workers, endpoint, _directory: directory })
@@ -68,10 +68,10 @@ impl Embedded {
     }
 
     /// Completes when the workers or the coordinator cannot continue.
-    pub(crate) async fn failed(&mut self) -> Failure {
+    pub(crate) async fn failed(&mut self) -> CommandFailure {
         tokio::select! {
             failure = self.workers.failed() => failure,
-            failed = self.coordinator.failed() => Failure::failed(failed),
+            failed = self.coordinator.failed() => CommandFailure::failed(failed),
         }
     }
 
@@ -82,20 +82,23 @@ impl Embedded {
     }
 }
 
-async fn start_coordinator(store: StoreLocation, socket: PathBuf) -> Result<Coordinator, Failure> {
+async fn start_coordinator(
+    store: StoreLocation,
+    socket: PathBuf,
+) -> Result<Coordinator, CommandFailure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
-    let listener = listener.map_err(Failure::failed)?;
+    let listener = listener.map_err(CommandFailure::failed)?;
     let store: Box<dyn Store + Send> = match store {
         StoreLocation::Memory => Box::new(MemoryStore::new()),
         // Lost jobs are accepted here: this process submits its job again, and it is recomputed.
         StoreLocation::Directory(path) => {
             let store = SqliteStore::open_with(&path, LostJobs::Accept);
-            Box::new(store.map_err(Failure::failed)?)
+            Box::new(store.map_err(CommandFailure::failed)?)
         }
     };
     let store_give_up_after = Some(Duration::from_secs(STORE_PATIENCE_S));
     let config = Config { store_give_up_after, commit: program::COMMIT, ..Config::default() };
-    osteon_coordinator::start(listener, store, config).await.map_err(Failure::failed)
+    osteon_coordinator::start(listener, store, config).await.map_err(CommandFailure::failed)
 }
 
 /// Creates a directory that only this user can enter.

@@ -8,7 +8,7 @@ use anyhow::anyhow;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint::Endpoint;
 
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 
 /// The variable with the address of the coordinator.
 pub(crate) const COORDINATOR: &str = "OSTEON_COORDINATOR";
@@ -32,7 +32,7 @@ impl Environment {
     ///
     /// # Errors
     /// If the coordinator's address is not valid Unicode.
-    pub(crate) fn of_process() -> Result<Self, Failure> {
+    pub(crate) fn from_process() -> Result<Self, CommandFailure> {
         Self::read(|name| std::env::var_os(name))
     }
 
@@ -40,13 +40,15 @@ impl Environment {
     ///
     /// # Errors
     /// Same as [`of_process`](Self::of_process).
-    pub(crate) fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, Failure> {
+    pub(crate) fn read(
+        variable: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<Self, CommandFailure> {
         let given = |name| variable(name).filter(|value| !value.is_empty());
         let file = |name| given(name).map(PathBuf::from);
         let coordinator = given(COORDINATOR).map(OsString::into_string).transpose();
         Ok(Self {
             coordinator: coordinator.map_err(|value| {
-                Failure::bad_input(anyhow!("in {COORDINATOR}: {value:?} is no text"))
+                CommandFailure::bad_input(anyhow!("in {COORDINATOR}: {value:?} is not valid UTF-8"))
             })?,
             files: CredentialFiles {
                 ca: file(TLS_CA),
@@ -61,10 +63,12 @@ impl Environment {
     ///
     /// # Errors
     /// If the value is not an address.
-    pub(crate) fn coordinator(&self) -> Result<Option<Endpoint>, Failure> {
+    pub(crate) fn coordinator(&self) -> Result<Option<Endpoint>, CommandFailure> {
         let parsed = self.coordinator.as_deref().map(str::parse::<Endpoint>).transpose();
         parsed.map_err(|error| {
-            Failure::bad_input(anyhow::Error::new(error).context(format!("in {COORDINATOR}")))
+            CommandFailure::bad_input(
+                anyhow::Error::new(error).context(format!("in {COORDINATOR}")),
+            )
         })
     }
 
@@ -72,11 +76,11 @@ impl Environment {
     ///
     /// # Errors
     /// If neither the option nor the environment names one.
-    pub(crate) fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, Failure> {
+    pub(crate) fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, CommandFailure> {
         match option {
             Some(endpoint) => Ok(endpoint),
             None => self.coordinator()?.ok_or_else(|| {
-                Failure::bad_input(anyhow!(
+                CommandFailure::bad_input(anyhow!(
                     "no coordinator is given; use --coordinator URL or set {COORDINATOR}"
                 ))
             }),
@@ -103,7 +107,7 @@ impl Environment {
             token: found(&self.files.token, private && options.token.is_none()),
         };
         match &self.coordinator {
-            Some(other) if !is_at(other, endpoint) => (options, Unused::of(&wanted)),
+            Some(other) if !is_at(other, endpoint) => (options, Unused::from_files(&wanted)),
             _ => {
                 let files = CredentialFiles {
                     ca: options.ca.or(wanted.ca),
@@ -134,7 +138,7 @@ fn is_at(text: &str, endpoint: &Endpoint) -> bool {
 pub(crate) struct Unused(Vec<(&'static str, &'static str)>);
 
 impl Unused {
-    fn of(files: &CredentialFiles) -> Self {
+    fn from_files(files: &CredentialFiles) -> Self {
         let all = [
             (&files.ca, TLS_CA, "--tls-ca FILE"),
             (&files.certificate, TLS_CERT, "--tls-cert FILE"),

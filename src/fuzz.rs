@@ -11,9 +11,9 @@ use osteon_common::report::ResultFile;
 use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
 use crate::output::{self, ShownResult};
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 use crate::results_directory::{self, ResultsDirectory};
-use crate::{sample_result, verdict};
+use crate::{result_status, sample_result};
 
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
 
@@ -27,13 +27,13 @@ fn check_result(json: &str) {
     let Ok(result) = bounded(json.len(), || ResultFile::from_json(json)) else { return };
     let specification = specification(result.kind());
     let specification = &specification;
-    let ended = bounded(json.len(), || verdict::ending(specification, &result));
-    let cancelled = verdict::is_cancelled(&result);
-    assert!(!cancelled || ended == crate::Ending::RunFailed);
+    let ended = bounded(json.len(), || result_status::exit_status(specification, &result));
+    let cancelled = result_status::is_cancelled(&result);
+    assert!(!cancelled || ended == crate::ExitStatus::RunFailed);
     let shown = ShownResult { specification, result: &result, directory: None };
-    for format in [Format::Text, Format::Json] {
+    for format in [OutputFormat::Text, OutputFormat::Json] {
         let mut bytes = Vec::new();
-        let mut output = output::on(format, Box::new(&mut bytes));
+        let mut output = output::to_writer(format, Box::new(&mut bytes));
         bounded(json.len(), || output.result(&shown)).unwrap();
         drop(output);
         assert!(String::from_utf8(bytes).unwrap().len() < 64 * json.len() + 4096);

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use anyhow::anyhow;
 use tracing_subscriber::EnvFilter;
 
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 
 /// The environment variable with the log filter.
 pub(crate) const VARIABLE: &str = "RUST_LOG";
@@ -18,9 +18,12 @@ const LEVELS: [&str; 6] = ["off", "error", "warn", "info", "debug", "trace"];
 /// # Errors
 /// If it cannot be parsed, or contains a word that is neither a level nor a module with a level:
 /// such a word would turn off everything that it does not name.
-pub(crate) fn read(value: Option<OsString>, default_level: &str) -> Result<EnvFilter, Failure> {
+pub(crate) fn read(
+    value: Option<OsString>,
+    default_level: &str,
+) -> Result<EnvFilter, CommandFailure> {
     let text = value.map(OsString::into_string).transpose();
-    let text = text.map_err(|value| wrong(&value.to_string_lossy(), "it is no text"))?;
+    let text = text.map_err(|value| wrong(&value.to_string_lossy(), "it is not valid UTF-8"))?;
     let Some(text) = text.filter(|text| !text.trim().is_empty()) else {
         return Ok(EnvFilter::new(default_level));
     };
@@ -28,14 +31,14 @@ pub(crate) fn read(value: Option<OsString>, default_level: &str) -> Result<EnvFi
         let is_level = LEVELS.iter().any(|level| word.eq_ignore_ascii_case(level));
         let is_number = matches!(word, "0" | "1" | "2" | "3" | "4" | "5");
         if !word.is_empty() && !word.contains(['=', '[']) && !is_level && !is_number {
-            return Err(wrong(&text, &format!("`{word}` is no level")));
+            return Err(wrong(&text, &format!("`{word}` is not a level")));
         }
     }
     EnvFilter::builder().parse(&text).map_err(|error| wrong(&text, &error.to_string()))
 }
 
-fn wrong(text: &str, what: &str) -> Failure {
-    Failure::bad_input(anyhow!(
+fn wrong(text: &str, what: &str) -> CommandFailure {
+    CommandFailure::bad_input(anyhow!(
         "RUST_LOG is `{}`: {what}; write a level (error, warn, info, debug, trace, off), or levels of \
          modules: info,osteon_coordinator=debug",
         text.escape_debug()

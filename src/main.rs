@@ -7,27 +7,27 @@ mod arguments;
 mod certificates;
 mod client;
 mod commands;
-mod door;
 mod embedded;
-mod ending;
 mod environment;
+mod exit_status;
 #[cfg(test)]
 mod fuzz;
+mod listener_security;
 mod log_filter;
 mod new_files;
 mod output;
 mod program;
 mod progress;
-mod request;
+mod request_id;
 mod resolved;
 mod result_files;
+mod result_status;
 mod results_directory;
 #[cfg(test)]
 mod sample_result;
 mod signals;
 mod simulation_directory;
 mod unsearched_groups;
-mod verdict;
 mod warnings;
 
 use std::io::Write as _;
@@ -37,14 +37,14 @@ use clap::Parser as _;
 use osteon_common::visible;
 
 use crate::arguments::Arguments;
-use crate::ending::{Ending, Failure};
+use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::resolved::Resolved;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     match run(arguments) {
-        Ok(Ending::Done) | Err(Failure::ClosedPipe) => ExitCode::SUCCESS,
-        Ok(Ending::RunFailed) => ExitCode::from(1),
+        Ok(ExitStatus::Done) | Err(CommandFailure::ClosedPipe) => ExitCode::SUCCESS,
+        Ok(ExitStatus::RunFailed) => ExitCode::from(1),
         Err(failure) => {
             // If stderr is closed as well, nothing more can be done.
             let message = failure.to_string();
@@ -54,14 +54,16 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: Arguments) -> Result<Ending, Failure> {
+fn run(arguments: Arguments) -> Result<ExitStatus, CommandFailure> {
     let resolved = Resolved::from_arguments(arguments)?;
     trace(resolved.default_log_level())?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
-        .map_err(|error| Failure::failed(anyhow::Error::new(error).context("cannot start")))?;
+        .map_err(|error| {
+            CommandFailure::failed(anyhow::Error::new(error).context("cannot start"))
+        })?;
     let result = runtime.block_on(commands::run(resolved));
     // An abandoned computation may still occupy a thread; its result is not needed.
     runtime.shutdown_background();
@@ -72,7 +74,7 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
 ///
 /// # Errors
 /// If `RUST_LOG` is not a valid filter.
-fn trace(default_level: &str) -> Result<(), Failure> {
+fn trace(default_level: &str) -> Result<(), CommandFailure> {
     let filter = log_filter::read(std::env::var_os(log_filter::VARIABLE), default_level)?;
     tracing_subscriber::fmt()
         .with_env_filter(filter)

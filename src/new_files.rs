@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use osteon_common::{user_file, visible};
 
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 
 /// A file to be created.
 pub(crate) struct NewFile {
@@ -24,11 +24,11 @@ pub(crate) struct NewFile {
 ///
 /// # Errors
 /// If one of them already exists (bad input), or cannot be written.
-pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
+pub(crate) fn create(files: &[NewFile]) -> Result<(), CommandFailure> {
     for NewFile { path, .. } in files {
         if path.symlink_metadata().is_ok() {
-            return Err(Failure::bad_input(anyhow!(
-                "{} exists already and is not replaced; remove it, or choose another place",
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{} already exists and is not overwritten; remove it, or choose another path",
                 visible::path(path)
             )));
         }
@@ -40,7 +40,7 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
                 drop(fs::remove_file(&earlier.path));
             }
             let context = format!("cannot write {}", visible::path(&file.path));
-            return Err(Failure::unusable_path(error, context));
+            return Err(CommandFailure::unusable_path(error, context));
         }
     }
     Ok(())
@@ -50,10 +50,10 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// If it cannot be created.
-pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
+pub(crate) fn private_directory(path: &Path) -> Result<(), CommandFailure> {
     let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
     made.map_err(|error| {
-        Failure::unusable_path(
+        CommandFailure::unusable_path(
             error,
             format!("cannot create the directory {}", visible::path(path)),
         )
@@ -64,7 +64,7 @@ pub(crate) fn private_directory(path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
+pub(crate) fn append(path: &Path, line: &str) -> Result<(), CommandFailure> {
     let write = || -> std::io::Result<()> {
         let mut options = OpenOptions::new();
         let options = options.read(true).append(true).create(true).mode(0o600);
@@ -75,7 +75,7 @@ pub(crate) fn append(path: &Path, line: &str) -> Result<(), Failure> {
         file.sync_all()
     };
     write().map_err(|error| {
-        Failure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
+        CommandFailure::unusable_path(error, format!("cannot add to {}", visible::path(path)))
     })
 }
 

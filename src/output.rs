@@ -11,13 +11,11 @@ use osteon_common::case::Setup;
 use osteon_common::job::JobSpecification;
 use osteon_common::report::{ResultFile, Solver};
 use osteon_common::sampling::NominalSampling;
-use osteon_proto::v1::{
-    BackupEnd, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
-};
+use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure};
 
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
@@ -46,13 +44,13 @@ pub(crate) struct ShownSimulation<'a> {
 /// Returns the object `solver` of one solved case, with the sampling that was decisive, if known.
 fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     let error = arrival.map(|arrival| arrival.estimated_error);
-    let mut solver = Solver::new(&setup.solver, NominalSampling::of(setup), error);
-    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, looks, .. }) =
-        (arrival.and_then(|arrival| arrival.looks), &mut solver)
+    let mut solver = Solver::new(&setup.solver, NominalSampling::from_setup(setup), error);
+    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, passes, .. }) =
+        (arrival.and_then(|arrival| arrival.passes), &mut solver)
     {
         (*band, *period) = (Some(used.last.band), Some(used.last.period));
         (*pairs, *pairs_computed) = (Some(used.last.pairs), Some(used.pairs_computed));
-        *looks = Some(used.count);
+        *passes = Some(used.count);
     }
     solver
 }
@@ -65,14 +63,11 @@ pub(crate) trait Output {
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
     /// Prints the id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
-    /// Prints all jobs, and the workers that are expelled.
-    fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()>;
-    /// Prints the attached workers, those that left last, and those that are expelled.
-    fn workers(
-        &mut self,
-        workers: &ListWorkersResponse,
-        expelled: &[ExpelledWorker],
-    ) -> io::Result<()>;
+    /// Prints all jobs, and the workers that are banned.
+    fn jobs(&mut self, jobs: &[JobSnapshot], banned: &[BannedWorker]) -> io::Result<()>;
+    /// Prints the attached workers, those that left last, and those that are banned.
+    fn workers(&mut self, workers: &ListWorkersResponse, banned: &[BannedWorker])
+    -> io::Result<()>;
     /// Prints the current state of one worker.
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
     /// Prints that a coordinator serves, or why it does not.
@@ -88,15 +83,18 @@ pub(crate) trait Output {
 }
 
 /// Returns the output of `format` on stdout.
-pub(crate) fn stdout(format: Format) -> Box<dyn Output> {
-    on(format, Box::new(io::stdout()))
+pub(crate) fn stdout(format: OutputFormat) -> Box<dyn Output> {
+    to_writer(format, Box::new(io::stdout()))
 }
 
 /// Returns the output of `format` on `writer`.
-pub(crate) fn on<'a>(format: Format, writer: Box<dyn Write + 'a>) -> Box<dyn Output + 'a> {
+pub(crate) fn to_writer<'a>(
+    format: OutputFormat,
+    writer: Box<dyn Write + 'a>,
+) -> Box<dyn Output + 'a> {
     match format {
-        Format::Text => Box::new(text::TextOutput::new(writer)),
-        Format::Json => Box::new(json::JsonOutput::new(writer)),
+        OutputFormat::Text => Box::new(text::TextOutput::new(writer)),
+        OutputFormat::Json => Box::new(json::JsonOutput::new(writer)),
     }
 }
 

@@ -8,8 +8,8 @@ use osteon_common::version::{NUMERICS_REVISION, Program, RESULT_SCHEMA, VERSION}
 pub(crate) const COMMIT: Option<&str> = option_env!("OSTEON_BUILD_COMMIT");
 
 /// Returns version, numerics and commit of this program.
-pub(crate) fn this() -> Program {
-    Program::this(COMMIT)
+pub(crate) fn current() -> Program {
+    Program::current(COMMIT)
 }
 
 /// Returns the text that `--version` prints after the name.

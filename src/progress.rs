@@ -14,7 +14,7 @@ use osteon_proto::v1::JobSnapshot;
 use terminal_size::{Width, terminal_size_of};
 use tracing_subscriber::fmt::MakeWriter;
 
-pub(crate) use self::display::{Observed, line, span};
+pub(crate) use self::display::{JobProgress, line, span};
 use self::observer::Observer;
 
 /// Time between two lines if stderr is not a terminal, s.

@@ -16,16 +16,16 @@ use crate::arguments::{
     SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
-use crate::ending::Failure;
 use crate::environment::{Environment, Unused};
-use crate::request::Request;
+use crate::exit_status::CommandFailure;
+use crate::request_id::RequestId;
 
 /// Default number of worker processes of a run on this machine.
 const WORKERS_DEFAULT: u32 = 2;
 
 /// Format of the output on stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Format {
+pub(crate) enum OutputFormat {
     /// Text for people.
     Text,
     /// JSON for programs.
@@ -70,20 +70,20 @@ pub(crate) enum Resolved {
         /// Kind of the job.
         kind: JobKind,
         /// The request, which makes the submission idempotent.
-        request: Request,
+        request: RequestId,
         /// Further properties of the job.
         options: SubmitOptions,
         /// The coordinator to submit to.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `jobs`.
     Jobs {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `jobs prune`.
     Prune {
@@ -94,14 +94,14 @@ pub(crate) enum Resolved {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `workers`.
     Workers {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `workers drain`.
     DrainWorker {
@@ -110,7 +110,7 @@ pub(crate) enum Resolved {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `health`.
     Health {
@@ -119,7 +119,7 @@ pub(crate) enum Resolved {
         /// Longest wait for the answer.
         limit: Duration,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `backup`.
     Backup {
@@ -128,7 +128,7 @@ pub(crate) enum Resolved {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
-        format: Format,
+        format: OutputFormat,
     },
     /// `watch`.
     Watch {
@@ -162,28 +162,28 @@ pub(crate) struct Run {
     pub(crate) kind: JobKind,
     /// The job file.
     pub(crate) job: PathBuf,
-    /// The computers of the run.
-    pub(crate) place: Place,
+    /// Where the job is computed.
+    pub(crate) location: RunLocation,
     /// Name of the job for display; may be empty.
     pub(crate) name: String,
     /// Directory for the results, if they are kept.
     pub(crate) out: Option<PathBuf>,
     /// Output format.
-    pub(crate) format: Format,
+    pub(crate) format: OutputFormat,
 }
 
-/// The computers of a run.
+/// Where a job is computed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum RunLocation {
     /// Worker processes started by this process.
-    Here {
+    Local {
         /// Number of worker processes.
         workers: u32,
         /// Number of threads of each worker.
         threads: u32,
     },
     /// A running coordinator.
-    There(Remote),
+    Coordinator(Remote),
 }
 
 impl Resolved {
@@ -191,24 +191,25 @@ impl Resolved {
     ///
     /// # Errors
     /// When the environment holds something that cannot be meant.
-    pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, Failure> {
+    pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, CommandFailure> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let cores = u32::try_from(cores).unwrap_or(1);
-        let environment = Environment::of_process()?;
+        let environment = Environment::from_process()?;
         let remote = |client: ClientArguments| {
             let from_environment = client.coordinator.is_none();
             let endpoint = environment.needed(client.coordinator)?;
             let (files, unused) = environment.files(client.credentials.into(), &endpoint);
-            Ok::<_, Failure>(Remote { endpoint, files, from_environment, unused })
+            Ok::<_, CommandFailure>(Remote { endpoint, files, from_environment, unused })
         };
-        let isa = || Isa::chosen(std::env::var_os(Isa::VARIABLE)).map_err(Failure::bad_input);
+        let isa =
+            || Isa::chosen(std::env::var_os(Isa::VARIABLE)).map_err(CommandFailure::bad_input);
         let run = |kind, run| {
             let run = resolve_run(kind, run, cores, &environment)?;
-            if matches!(run.place, Place::Here { .. }) {
+            if matches!(run.location, RunLocation::Local { .. }) {
                 // Workers read the variable again, but an invalid value is reported here, at once.
                 isa()?;
             }
-            Ok::<_, Failure>(Self::Run(run))
+            Ok::<_, CommandFailure>(Self::Run(run))
         };
         Ok(match arguments.command {
             Command::Identify(arguments) => run(JobKind::Identification, arguments)?,
@@ -266,8 +267,8 @@ impl Resolved {
 }
 
 /// Returns JSON or text.
-pub(crate) fn format(json: bool) -> Format {
-    if json { Format::Json } else { Format::Text }
+pub(crate) fn format(json: bool) -> OutputFormat {
+    if json { OutputFormat::Json } else { OutputFormat::Text }
 }
 
 fn resolve_run(
@@ -275,39 +276,39 @@ fn resolve_run(
     arguments: RunArguments,
     cores: u32,
     environment: &Environment,
-) -> Result<Run, Failure> {
+) -> Result<Run, CommandFailure> {
     let RunArguments { job, workers, threads, coordinator, credentials, name, out, json } =
         arguments;
     let files = CredentialFiles::from(credentials);
-    let here = workers.is_some() || threads.is_some();
+    let local = workers.is_some() || threads.is_some();
     let from_environment = coordinator.is_none();
-    let there = match coordinator {
-        None if !here => environment.coordinator()?,
+    let endpoint = match coordinator {
+        None if !local => environment.coordinator()?,
         given => given,
     };
-    let place = match (there, files.first_given()) {
+    let location = match (endpoint, files.first_given()) {
         (Some(endpoint), _) => {
             let (files, unused) = environment.files(files, &endpoint);
-            Place::There(Remote { endpoint, files, from_environment, unused })
+            RunLocation::Coordinator(Remote { endpoint, files, from_environment, unused })
         }
         (None, Some(option)) => {
-            return Err(Failure::bad_input(anyhow!(
-                "{option} is for a coordinator, and none is given; add --coordinator URL"
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{option} requires a coordinator; add --coordinator URL"
             )));
         }
         (None, None) => {
             let workers = workers.unwrap_or(WORKERS_DEFAULT);
-            Place::Here { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
+            RunLocation::Local { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
         }
     };
-    Ok(Run { kind, job, place, name: name.unwrap_or_default(), out, format: format(json) })
+    Ok(Run { kind, job, location, name: name.unwrap_or_default(), out, format: format(json) })
 }
 
 /// Resolves `jobs` and its subcommands.
 fn resolve_jobs(
     arguments: JobsArguments,
-    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
-) -> Result<Resolved, Failure> {
+    remote: impl Fn(ClientArguments) -> Result<Remote, CommandFailure>,
+) -> Result<Resolved, CommandFailure> {
     let JobsArguments { command, client, json } = arguments;
     Ok(match command {
         None => Resolved::Jobs { coordinator: remote(client)?, format: format(json) },
@@ -323,8 +324,8 @@ fn resolve_jobs(
 /// Resolves `workers` and its subcommands.
 fn resolve_workers(
     arguments: WorkersArguments,
-    remote: impl Fn(ClientArguments) -> Result<Remote, Failure>,
-) -> Result<Resolved, Failure> {
+    remote: impl Fn(ClientArguments) -> Result<Remote, CommandFailure>,
+) -> Result<Resolved, CommandFailure> {
     let WorkersArguments { command, client, json } = arguments;
     Ok(match command {
         None => Resolved::Workers { coordinator: remote(client)?, format: format(json) },
@@ -359,14 +360,17 @@ impl From<CredentialArguments> for CredentialFiles {
     }
 }
 
-fn resolve_submit(arguments: SubmitArguments, coordinator: Remote) -> Result<Resolved, Failure> {
+fn resolve_submit(
+    arguments: SubmitArguments,
+    coordinator: Remote,
+) -> Result<Resolved, CommandFailure> {
     let SubmitArguments { job, client: _, propagate, request_id, name, priority, json } = arguments;
     Ok(Resolved::Submit {
         job,
         kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
         request: request_id
-            .map_or_else(Request::new, |id| Ok(Request::with_id(id)))
-            .map_err(Failure::failed)?,
+            .map_or_else(RequestId::new, |id| Ok(RequestId::with_id(id)))
+            .map_err(CommandFailure::failed)?,
         options: SubmitOptions { priority, name: name.unwrap_or_default() },
         coordinator,
         format: format(json),
@@ -402,9 +406,9 @@ mod tests {
     }
 
     fn here(line: &str, cores: u32) -> (u32, u32) {
-        match run(line, cores, None).place {
-            Place::Here { workers, threads } => (workers, threads),
-            Place::There(remote) => panic!("{}", remote.endpoint),
+        match run(line, cores, None).location {
+            RunLocation::Local { workers, threads } => (workers, threads),
+            RunLocation::Coordinator(remote) => panic!("{}", remote.endpoint),
         }
     }
 
@@ -420,9 +424,9 @@ mod tests {
 
     #[test]
     fn the_flag_counts_before_the_environment() {
-        let there = |line: &str, environment| match run(line, 2, environment).place {
-            Place::There(remote) => Some(remote.endpoint.to_string()),
-            Place::Here { .. } => None,
+        let there = |line: &str, environment| match run(line, 2, environment).location {
+            RunLocation::Coordinator(remote) => Some(remote.endpoint.to_string()),
+            RunLocation::Local { .. } => None,
         };
         let environment = Some("unix:/run/osteon");
         let flag = "osteon identify a.toml --coordinator http://a:1";

@@ -16,7 +16,7 @@ pub(crate) const RESULT: &str = "result.json";
 pub(crate) const PROVENANCE: &str = "provenance.json";
 
 /// Origin of the files of a directory.
-pub(crate) struct Origin<'a> {
+pub(crate) struct ResultOrigin<'a> {
     /// Kind of the computation: `kind` of the result.
     pub(crate) kind: &'a str,
     /// The program that computed the result.
@@ -60,7 +60,7 @@ impl<'a> ResultFiles<'a> {
     }
 
     /// Writes `provenance.json`, then the result.
-    pub(crate) fn finish(mut self, result: &str, origin: &Origin<'_>) -> anyhow::Result<()> {
+    pub(crate) fn finish(mut self, result: &str, origin: &ResultOrigin<'_>) -> anyhow::Result<()> {
         let mut hash = blake3::Hasher::new();
         hash.update(result.as_bytes());
         self.note(RESULT, &hash);

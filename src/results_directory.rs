@@ -18,11 +18,11 @@ use osteon_common::results::{GroupResult, JobResult, Status};
 use osteon_common::{job_file, results_csv, user_file, visible};
 
 use crate::client::Fetched;
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 use crate::progress::say;
-use crate::request::Request;
-use crate::result_files::{self, Origin, RESULT, ResultFiles};
-use crate::verdict;
+use crate::request_id::RequestId;
+use crate::result_files::{self, RESULT, ResultFiles, ResultOrigin};
+use crate::result_status;
 
 /// File of the job to which a directory belongs.
 pub(crate) const JOB: &str = "job.toml";
@@ -57,10 +57,10 @@ impl ResultsDirectory {
     pub(crate) fn stored(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<ResultFile>, Failure> {
+    ) -> Result<Option<ResultFile>, CommandFailure> {
         let job = path.join(JOB);
         if path.exists() && !path.is_dir() {
-            return Err(Failure::bad_input(anyhow!(
+            return Err(CommandFailure::bad_input(anyhow!(
                 "{} is not a directory; choose another --out directory",
                 visible::path(path)
             )));
@@ -69,14 +69,14 @@ impl ResultsDirectory {
         match given(&job)? {
             Some(stored) => same_job(&job, &stored, specification)?,
             None if result.is_some() && !path.join(CASE).exists() => {
-                return Err(Failure::bad_input(anyhow!(
+                return Err(CommandFailure::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: its job is unknown; \
                      choose another --out directory",
                     visible::path(path)
                 )));
             }
             None if path.join(CASE).exists() => {
-                return Err(Failure::bad_input(anyhow!(
+                return Err(CommandFailure::bad_input(anyhow!(
                     "{} holds the results of a simulation, not of a job; \
                      choose another --out directory",
                     visible::path(path)
@@ -85,9 +85,9 @@ impl ResultsDirectory {
             None => {}
         }
         let Some(text) = result else { return Ok(None) };
-        let result = read_result(path, &text).map_err(Failure::BadInput)?;
+        let result = read_result(path, &text).map_err(CommandFailure::BadInput)?;
         if result.kind() != specification.kind {
-            return Err(Failure::bad_input(anyhow!(
+            return Err(CommandFailure::bad_input(anyhow!(
                 "{} is the result of a {}, not of a {}; choose another --out directory",
                 result_path(path),
                 result.kind().name(),
@@ -105,8 +105,9 @@ impl ResultsDirectory {
     pub(crate) fn finished(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<ResultFile>, Failure> {
-        Ok(Self::stored(path, specification)?.filter(|result| !verdict::is_worth_repeating(result)))
+    ) -> Result<Option<ResultFile>, CommandFailure> {
+        Ok(Self::stored(path, specification)?
+            .filter(|result| !result_status::is_worth_repeating(result)))
     }
 
     /// Creates the directory, if necessary, and locks it. By then the stored files may have changed
@@ -114,12 +115,15 @@ impl ResultsDirectory {
     ///
     /// # Errors
     /// If another process holds the lock, or if the directory cannot be written.
-    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path) -> Result<Self, CommandFailure> {
         make_directory(path)?;
         let lock_path = path.join(LOCK);
         for _ in 0..LOCK_ATTEMPTS_MAX {
             let lock = user_file::create(&lock_path).map_err(|error| {
-                Failure::unusable_path(error, format!("cannot write {}", visible::path(&lock_path)))
+                CommandFailure::unusable_path(
+                    error,
+                    format!("cannot write {}", visible::path(&lock_path)),
+                )
             })?;
             match lock.try_lock() {
                 // A run that ended meanwhile has removed the file, so this lock protects nothing.
@@ -128,11 +132,11 @@ impl ResultsDirectory {
                 Err(TryLockError::WouldBlock) => break,
                 Err(TryLockError::Error(error)) => {
                     let context = format!("cannot lock {}", visible::path(&lock_path));
-                    return Err(Failure::failed(anyhow::Error::new(error).context(context)));
+                    return Err(CommandFailure::failed(anyhow::Error::new(error).context(context)));
                 }
             }
         }
-        Err(Failure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
+        Err(CommandFailure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
     }
 
     /// Returns the directory of the run's store, which is kept until the run has ended.
@@ -141,19 +145,19 @@ impl ResultsDirectory {
     }
 
     /// Returns the request of this directory, which is the same at every call and on every host.
-    pub(crate) fn request(&self) -> Result<Request, Failure> {
+    pub(crate) fn request(&self) -> Result<RequestId, CommandFailure> {
         let path = self.path.join(REQUEST);
-        let stored = read_if_there(&path).map_err(Failure::Failed)?.unwrap_or_default();
+        let stored = read_if_there(&path).map_err(CommandFailure::Failed)?.unwrap_or_default();
         let mut lines = stored.lines().map(str::trim);
         if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
-            let request = Request::with_id(id.to_owned());
+            let request = RequestId::with_id(id.to_owned());
             // A user who writes the file by hand may leave out the client.
             let client = lines.next().map_or(request.client, str::to_owned);
-            return Ok(Request { client, ..request });
+            return Ok(RequestId { client, ..request });
         }
-        let request = Request::new().map_err(Failure::failed)?;
+        let request = RequestId::new().map_err(CommandFailure::failed)?;
         let text = format!("{}\n{}\n", request.id, request.client);
-        result_files::write(&path, &text).map_err(Failure::Failed)?;
+        result_files::write(&path, &text).map_err(CommandFailure::Failed)?;
         Ok(request)
     }
 
@@ -165,9 +169,9 @@ impl ResultsDirectory {
     }
 
     /// Writes `job.toml`: from now on the directory belongs to this specification.
-    pub(crate) fn write_job(&self, specification: &JobSpecification) -> Result<(), Failure> {
+    pub(crate) fn write_job(&self, specification: &JobSpecification) -> Result<(), CommandFailure> {
         let text = job_file::to_toml(specification);
-        result_files::write(&self.path.join(JOB), &text).map_err(Failure::Failed)
+        result_files::write(&self.path.join(JOB), &text).map_err(CommandFailure::Failed)
     }
 
     /// Writes all files of an ended job, `result.json` last, and returns the result.
@@ -175,7 +179,7 @@ impl ResultsDirectory {
         &self,
         kind: JobKind,
         fetched: &Fetched,
-    ) -> Result<ResultFile, Failure> {
+    ) -> Result<ResultFile, CommandFailure> {
         let written = ResultFile::from_job(kind, &fetched.result);
         let write_all = || -> anyhow::Result<()> {
             let mut files = ResultFiles::begin(&self.path)?;
@@ -193,9 +197,12 @@ impl ResultsDirectory {
             files.write(REALIZATIONS, &realizations(fetched))?;
             let JobResult { program, digest, seed, .. } = &fetched.result;
             let (digest, seed) = (Some(digest.as_str()), Some(*seed));
-            files.finish(&written.to_json(), &Origin { kind: kind.name(), program, digest, seed })
+            files.finish(
+                &written.to_json(),
+                &ResultOrigin { kind: kind.name(), program, digest, seed },
+            )
         };
-        write_all().map_err(Failure::Failed)?;
+        write_all().map_err(CommandFailure::Failed)?;
         if fetched.result.status != Status::Cancelled {
             // The data for resuming are no longer needed; it does no harm if some remain.
             self.forget_request();
@@ -216,9 +223,9 @@ impl Drop for ResultsDirectory {
 ///
 /// # Errors
 /// Bad input if the path cannot be a directory, failed if the machine has no room for it.
-pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
+pub(crate) fn make_directory(path: &Path) -> Result<(), CommandFailure> {
     fs::create_dir_all(path).map_err(|error| {
-        Failure::unusable_path(
+        CommandFailure::unusable_path(
             error,
             format!("cannot create the directory {}", visible::path(path)),
         )
@@ -226,10 +233,12 @@ pub(crate) fn make_directory(path: &Path) -> Result<(), Failure> {
 }
 
 /// Returns the text of a file in a directory named by the user; `None` if there is no such file.
-pub(crate) fn given(path: &Path) -> Result<Option<String>, Failure> {
+pub(crate) fn given(path: &Path) -> Result<Option<String>, CommandFailure> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
-        Ok(error) => Failure::unusable_path(error, format!("cannot read {}", visible::path(path))),
-        Err(error) => Failure::Failed(error),
+        Ok(error) => {
+            CommandFailure::unusable_path(error, format!("cannot read {}", visible::path(path)))
+        }
+        Err(error) => CommandFailure::Failed(error),
     })
 }
 
@@ -269,7 +278,11 @@ pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpeci
 }
 
 /// Refuses a directory whose job is not `specification`, and reports the first difference.
-fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), Failure> {
+fn same_job(
+    path: &Path,
+    stored: &str,
+    specification: &JobSpecification,
+) -> Result<(), CommandFailure> {
     // The comparison ignores formatting, and defaults that are left out.
     let directory = path.parent().unwrap_or(Path::new(""));
     // Only the job of an identification has data.
@@ -279,7 +292,7 @@ fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Resu
         .map_or_else(|| stored.to_owned(), |there| job_file::to_toml(&there));
     match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
-        Some(difference) => Err(Failure::bad_input(anyhow!(
+        Some(difference) => Err(CommandFailure::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \
              choose another --out directory",
             visible::path(path)
@@ -337,7 +350,7 @@ fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
     };
     let Some(bytes) = read else {
         bail!(
-            "{} is longer than {FILE_BYTES_MAX} bytes, and osteon writes no such file; remove it, \
+            "{} is longer than {FILE_BYTES_MAX} bytes, which no result of osteon is; remove it, \
              or choose another directory",
             visible::path(path)
         );

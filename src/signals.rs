@@ -5,14 +5,14 @@ use std::time::Duration;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot;
 
-use crate::ending::{Failure, Interruption};
+use crate::exit_status::{CommandFailure, Interruption};
 use crate::progress::say;
 
 /// Signals that follow the first one within this time count as part of it: some programs send a
 /// signal both to a process and to its group.
 const SIGNAL_DEBOUNCE: Duration = Duration::from_millis(300);
 /// A command that cannot stop, because nobody reads its output, is killed after this long.
-const PATIENCE: Duration = Duration::from_secs(2);
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Completes at the first SIGINT or SIGTERM after the call; from the call on, these signals do not
 /// end the process by themselves. SIGHUP is left alone, so that `nohup` keeps its effect, unless
@@ -23,10 +23,10 @@ const PATIENCE: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// If the system does not allow signals to be handled.
-pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, Failure> {
+pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, CommandFailure> {
     let listen = |kind| {
         signal(kind).map_err(|error| {
-            Failure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
+            CommandFailure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
         })
     };
     let mut interrupt = listen(SignalKind::interrupt())?;
@@ -47,9 +47,9 @@ pub(crate) fn interruption() -> Result<impl Future<Output = Interruption>, Failu
 /// # Errors
 /// The error of the command, or the signal.
 pub(crate) async fn unless_interrupted<T>(
-    command: impl Future<Output = Result<T, Failure>>,
+    command: impl Future<Output = Result<T, CommandFailure>>,
     left: &'static str,
-) -> Result<T, Failure> {
+) -> Result<T, CommandFailure> {
     let interruption = interruption()?;
     let (sender, received) = oneshot::channel();
     // Runs in a separate task, which makes progress even while the command blocks.
@@ -57,12 +57,12 @@ pub(crate) async fn unless_interrupted<T>(
         let interruption = interruption.await;
         // Fails only if the command has ended.
         let _ended = sender.send(interruption);
-        tokio::time::sleep(PATIENCE).await;
+        tokio::time::sleep(EXIT_TIMEOUT).await;
         std::process::exit(interruption.exit_code().into());
     });
     tokio::select! {
         result = command => result,
-        Ok(interruption) = received => Err(Failure::Interrupted(interruption, left)),
+        Ok(interruption) = received => Err(CommandFailure::Interrupted(interruption, left)),
     }
 }
 
@@ -70,9 +70,9 @@ pub(crate) async fn unless_interrupted<T>(
 ///
 /// # Errors
 /// If the system does not allow signals to be handled.
-pub(crate) fn hangups() -> Result<Signal, Failure> {
+pub(crate) fn hangups() -> Result<Signal, CommandFailure> {
     signal(SignalKind::hangup()).map_err(|error| {
-        Failure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
+        CommandFailure::failed(anyhow::Error::new(error).context("cannot listen for signals"))
     })
 }
 
@@ -93,7 +93,7 @@ async fn exit_at_the_next() {
     if let Ok(mut interrupt) = signal(SignalKind::interrupt())
         && interrupt.recv().await.is_some()
     {
-        say("osteon: interrupted again, ends at once");
+        say("osteon: interrupted again; exiting immediately");
         std::process::exit(Interruption::Interrupted.exit_code().into());
     }
 }

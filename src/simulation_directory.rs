@@ -12,9 +12,9 @@ use osteon_common::case::Case;
 use osteon_common::document::Format;
 use osteon_common::{case_file, visible};
 
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 use crate::program;
-use crate::result_files::{Origin, RESULT, ResultFiles};
+use crate::result_files::{RESULT, ResultFiles, ResultOrigin};
 use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 
 /// The file of the traces.
@@ -23,7 +23,7 @@ pub(crate) const TRACES: &str = "traces.csv";
 const COMMAND: &str = "# osteon simulate case.toml";
 
 /// The case and options to which a simulation's directory belongs.
-pub(crate) struct Simulated<'a> {
+pub(crate) struct SimulationKey<'a> {
     /// The case.
     pub(crate) case: &'a Case,
     /// Duration of the traces, s.
@@ -32,7 +32,7 @@ pub(crate) struct Simulated<'a> {
     pub(crate) time_step: f64,
 }
 
-impl Simulated<'_> {
+impl SimulationKey<'_> {
     /// Returns the text of `case.toml`: the case with all defaults, below the command that creates
     /// the same files from it.
     fn text(&self) -> String {
@@ -64,7 +64,7 @@ impl Simulated<'_> {
     /// # Errors
     /// Bad input if another case, other traces, or a job was computed there; failed if it cannot be
     /// read.
-    pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), Failure> {
+    pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), CommandFailure> {
         let there = |name: &str| directory.join(name).symlink_metadata().is_ok();
         let shown = visible::path(directory);
         let stored = given(&directory.join(CASE))?;
@@ -81,7 +81,7 @@ impl Simulated<'_> {
                 }
             },
         };
-        Err(Failure::bad_input(anyhow!("{why}; choose another --out directory")))
+        Err(CommandFailure::bad_input(anyhow!("{why}; choose another --out directory")))
     }
 
     /// Writes all files; `print` writes the traces.
@@ -94,19 +94,20 @@ impl Simulated<'_> {
         directory: &Path,
         result: &str,
         print: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CommandFailure> {
         let _held = ResultsDirectory::open(directory)?;
         // Another process may have written between the first check and the lock.
         self.refuse_other(directory)?;
-        let program = program::this();
-        let origin = Origin { kind: "simulation", program: &program, digest: None, seed: None };
+        let program = program::current();
+        let origin =
+            ResultOrigin { kind: "simulation", program: &program, digest: None, seed: None };
         let write = || {
             let mut files = ResultFiles::begin(directory)?;
             files.write(CASE, &self.text())?;
             files.write_by(TRACES, print)?;
             files.finish(result, &origin)
         };
-        write().map_err(Failure::Failed)
+        write().map_err(CommandFailure::Failed)
     }
 }
 
@@ -128,7 +129,7 @@ mod tests {
     #[test]
     fn the_same_simulation_is_known_in_other_words() {
         let case = case_file::parse(CASE_TEXT, Format::Toml).unwrap();
-        let mine = Simulated { case: &case, duration: 3e-5, time_step: 1e-8 };
+        let mine = SimulationKey { case: &case, duration: 3e-5, time_step: 1e-8 };
         let shorter = format!("{COMMAND} --duration 3e-5 --time-step 0.00000001\n{CASE_TEXT}");
         for stored in [mine.text(), shorter] {
             assert_eq!(mine.difference_from(&stored), None, "{stored}");
@@ -138,7 +139,7 @@ mod tests {
     #[test]
     fn another_simulation_is_told_by_what_differs() {
         let case = case_file::parse(CASE_TEXT, Format::Toml).unwrap();
-        let mine = Simulated { case: &case, duration: 3e-5, time_step: 1e-8 };
+        let mine = SimulationKey { case: &case, duration: 3e-5, time_step: 1e-8 };
         let text = mine.text();
         for (stored, expected) in [
             (text.replace("3e-5", "4e-5"), "duration 4e-5 s there, 3e-5 s here"),

@@ -9,7 +9,7 @@ use osteon_common::visible;
 use crate::progress::say;
 
 /// Maximum number of groups that are listed individually.
-const TOLD_MAX: usize = 10;
+const LISTED_MAX: usize = 10;
 
 /// Prints on stderr which groups of the job in the file `job` are not searched, and why.
 pub(crate) fn warn(job: &Path, noted: &JobWithWarnings) {
@@ -20,15 +20,15 @@ pub(crate) fn warn(job: &Path, noted: &JobWithWarnings) {
         return;
     }
     let file = visible::path(noted.velocities_file.as_deref().unwrap_or(job));
-    for (group, why) in unsearched.iter().take(TOLD_MAX) {
+    for (group, why) in unsearched.iter().take(LISTED_MAX) {
         let (name, count) = (&group.name, group.velocities.len());
         let velocities = if count == 1 { "velocity" } else { "velocities" };
         say(&format!(
             "warning: {file}: group {name:?} ({count} {velocities}) is not searched: {why}"
         ));
     }
-    if unsearched.len() > TOLD_MAX {
-        let more = unsearched.len() - TOLD_MAX;
-        say(&format!("warning: {file}: nor are {more} more groups, not listed here"));
+    if unsearched.len() > LISTED_MAX {
+        let more = unsearched.len() - LISTED_MAX;
+        say(&format!("warning: {file}: {more} more groups are not searched either (not listed)"));
     }
 }

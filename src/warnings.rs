@@ -55,7 +55,7 @@ fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     if specification.kind != JobKind::Identification || pair_count(&setup) > PAIRS_MAX {
         return Vec::new();
     }
-    let solved = Solved::of(specification, &setup);
+    let solved = ClosedFormMoments::new(specification, &setup);
     let mut lines = Vec::new();
     if let Err(failure) = &solved.start {
         lines.push(format!(
@@ -84,15 +84,15 @@ fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
 }
 
 /// Velocities of mean models, m/s, and coefficients of variation by the closed form.
-struct Solved {
+struct ClosedFormMoments {
     slowest: Option<(Point, f64)>,
     fastest: Option<(Point, f64)>,
     start: Result<f64, Failure>,
     variation: (f64, f64),
 }
 
-impl Solved {
-    fn of(specification: &JobSpecification, setup: &Setup) -> Self {
+impl ClosedFormMoments {
+    fn new(specification: &JobSpecification, setup: &Setup) -> Self {
         let ranges = &specification.parameters;
         let solver = Solver::new(setup);
         let mut workspace = Workspace::default();
@@ -108,7 +108,7 @@ impl Solved {
         let (slowest, fastest) =
             (corner(Some(reach::slowest(ranges))), corner(reach::fastest(ranges)));
         let start = velocity(&specification.start()).unwrap_or(Ok(f64::NAN));
-        Self { slowest, fastest, start, variation: Reach::of(ranges, setup).variation }
+        Self { slowest, fastest, start, variation: Reach::from_ranges(ranges, setup).variation }
     }
 
     /// Returns which moments of data with this number of velocities are out of reach, each with the

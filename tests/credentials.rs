@@ -43,14 +43,14 @@ fn certs_makes_keys_that_only_their_owner_reads_and_replaces_none() {
         assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{refused:?}");
         assert!(refused.stderr.contains(expected), "{refused:?}");
     };
-    refuse(&directory, "ca.pem exists already");
+    refuse(&directory, "ca.pem already exists");
     let after: Vec<Vec<u8>> = listed.iter().map(|path| fs::read(path).unwrap()).collect();
     assert_eq!(before, after);
     // If one file exists already, even as a dangling link, none is created.
     let other = scratch.path("other");
     fs::create_dir(&other).unwrap();
     std::os::unix::fs::symlink("/nonexistent", other.join("worker-key.pem")).unwrap();
-    refuse(&other, "worker-key.pem exists already");
+    refuse(&other, "worker-key.pem already exists");
     assert_eq!(fs::read_dir(&other).unwrap().count(), 1);
 
     // New certificates of the same authority, whose key stays where it is.
@@ -100,7 +100,7 @@ fn token_writes_the_token_once_and_shows_only_its_hash() {
 
     let refused = make("ann", &out, &[]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("a.token exists already"), "{refused:?}");
+    assert!(refused.stderr.contains("a.token already exists"), "{refused:?}");
     assert_eq!(fs::read_to_string(&out).unwrap(), token);
 
     // Lines are appended to a list, even if its last line has no end.
@@ -156,9 +156,14 @@ fn a_coordinator_is_open_to_others_with_tls_and_tokens_only() {
     check("0.0.0.0:0", &["--tokens"], &[], "tokens would be readable on their way");
     check("0.0.0.0:0", &["--tokens"], &["--insecure"], "cannot be used with");
     check("0.0.0.0:0", &tls, &["--insecure"], "cannot be used with");
-    check("0.0.0.0:0", &tls, &[], "without --tokens FILE no client can do anything");
-    check("127.0.0.1:0", &tls, &[], "without --tokens FILE no client can do anything");
-    check("unix:/tmp/a", &[&tls[..], &["--tokens"]].concat(), &[], "a Unix socket has no TLS");
+    check("0.0.0.0:0", &tls, &[], "with TLS, --tokens FILE is required");
+    check("127.0.0.1:0", &tls, &[], "with TLS, --tokens FILE is required");
+    check(
+        "unix:/tmp/a",
+        &[&tls[..], &["--tokens"]].concat(),
+        &[],
+        "a Unix socket does not use TLS",
+    );
     for missing in tls {
         let rest: Vec<&str> = tls.into_iter().filter(|name| *name != missing).collect();
         check("127.0.0.1:0", &rest, &[], missing);
@@ -234,8 +239,8 @@ fn a_clients_options_are_checked_before_anything_is_sent() {
     check(tls, &["--tls-ca", &ca, "--token-file", &ca], "is open to other users");
     check(tls, &["--tls-ca", &ca, "--token-file", &key], "is not a valid osteon token");
     check(far, &["--token-file", &token], "in the clear");
-    check(near, &["--tls-ca", &ca], "--tls-ca is for TLS");
-    check("unix:/nonexistent", &["--tls-ca", &ca], "--tls-ca is for TLS");
+    check(near, &["--tls-ca", &ca], "--tls-ca requires TLS");
+    check("unix:/nonexistent", &["--tls-ca", &ca], "--tls-ca requires TLS");
 
     let embedded = run(&["identify", text(&job), "--token-file", &token]);
     assert_eq!(embedded.code, Some(2), "{embedded:?}");
@@ -265,7 +270,7 @@ fn a_token_may_come_through_a_pipe() {
     let silent = pipe(&secure.scratch, "silent");
     let refused = run(&[&jobs[..], &[text(&silent)]].concat());
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    let expected = "silent: it is a pipe, and nobody wrote it to its end within 10 s";
+    let expected = "silent: it is a pipe, and its writer did not close it within 10 s";
     assert!(refused.stderr.contains(expected), "{refused:?}");
 }
 

@@ -48,7 +48,7 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert_eq!(coordinator.client(&["workers"]).succeeded(), "no workers\n");
     let mut first = coordinator.worker(1);
     let listed = || coordinator.client(&["workers", "--json"]).json();
-    eventually("a worker is attached", || listed()["workers"][0]["standing"] == "ok");
+    eventually("a worker is attached", || listed()["workers"][0]["state"] == "ok");
     let _second = coordinator.worker(2);
     coordinator.submit(&file);
     eventually("both compute", || {
@@ -63,12 +63,12 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert!(is_recent(&workers[0]["attached"]), "{workers}");
     assert!(workers[0]["silent_s"].as_f64() < Some(60.0), "{workers}");
     let table = coordinator.client(&["workers"]).succeeded().to_owned();
-    assert!(table.starts_with("NUMBER") && table.contains("STANDING"), "{table}");
+    assert!(table.starts_with("NUMBER") && table.contains("STATE"), "{table}");
     assert_eq!(table.lines().count(), 3, "{table}");
 
     let number = workers[0]["number"].to_string();
     let drained = coordinator.client(&["workers", "drain", &number, "--json"]).json();
-    assert_eq!(drained["standing"], "draining");
+    assert_eq!(drained["state"], "draining");
     // It ends as if its own user had asked it to, and nobody is blamed.
     assert_eq!(first.code(), Some(0));
     eventually("it is gone", || listed()["workers"].as_array().map(Vec::len) == Some(1));
@@ -241,7 +241,7 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
     let before = fs::read(copy.join("osteon.sqlite")).unwrap();
     let again = coordinator.client(&["backup", text(&copy)]);
     assert_eq!(again.code, Some(2), "{again:?}");
-    assert!(again.stderr.contains("is there already"), "{again:?}");
+    assert!(again.stderr.contains("already exists"), "{again:?}");
     assert_eq!(fs::read(copy.join("osteon.sqlite")).unwrap(), before);
     // Nor is a copy combined with another store's journal.
     let beside = scratch.path("beside");
@@ -304,7 +304,7 @@ fn tokens_and_certificates_are_read_again_at_sighup() {
     // A list that cannot be used changes nothing, and the log gives the reason.
     write_tokens(&secure, "nonsense\n");
     secure.process.signal("HUP");
-    let told = "tokens and certificates stay as they were";
+    let told = "the previous tokens and certificates stay in use";
     eventually("the log says so", || secure.read("coordinator.log").contains(told));
     assert_eq!((code(&secure, "submit"), code(&secure, "read")), (Some(0), Some(1)));
     // The old list again, with a certificate for another host, which clients then refuse.

@@ -96,7 +96,7 @@ const CALLERS: [(&str, &[&str], bool); 12] = [
     ("/grpc.reflection.v1alpha.ServerReflection/", &["read", "submit", "admin"], true),
     ("/osteon.v1.Jobs/Get", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/List", &["read", "submit", "admin"], false),
-    ("/osteon.v1.Jobs/ListExpelled", &["read", "submit", "admin"], false),
+    ("/osteon.v1.Jobs/ListBans", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/ListWorkers", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Watch", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Fetch", &["read", "submit", "admin"], false),
@@ -333,7 +333,7 @@ fn tls_and_plain_http_meet_with_an_explanation() {
     let secure = Secure::start();
     let plain = secure.url.replace("https://", "http://");
     let token = secure.scratch.path("read.token");
-    let hint = format!("if the coordinator speaks TLS, write {}", secure.url);
+    let hint = format!("if the coordinator uses TLS, write {}", secure.url);
     for options in [&[] as &[&str], &["--token-file", text(&token)]] {
         let finished = run(&[&["jobs", "--coordinator", &plain], options].concat());
         assert_eq!(finished.code, Some(1), "{finished:?}");
@@ -350,7 +350,7 @@ fn tls_and_plain_http_meet_with_an_explanation() {
     let finished = run(&["jobs", "--coordinator", &tls, "--tls-ca", text(&ca)]);
     assert_eq!(finished.code, Some(1), "{finished:?}");
     assert!(finished.stderr.contains(&tls), "{finished:?}");
-    assert!(finished.stderr.contains("does not speak TLS"), "{finished:?}");
+    assert!(finished.stderr.contains("does not use TLS"), "{finished:?}");
 }
 
 #[test]

@@ -270,9 +270,9 @@ fn a_command_that_a_signal_ends_has_its_code() {
         (&["identify", job] as &[&str], "no results were saved"),
         (&["propagate", job], "no results were saved"),
         (&["simulate", case], "no results were saved"),
-        (&["identify", job, "--coordinator", &silent], "a job that was accepted goes on"),
-        (&["watch", "1", "--coordinator", &silent], "the job goes on"),
-        (&["submit", job, "--coordinator", &silent], "may be accepted all the same"),
+        (&["identify", job, "--coordinator", &silent], "a job that was accepted continues"),
+        (&["watch", "1", "--coordinator", &silent], "the job continues"),
+        (&["submit", job, "--coordinator", &silent], "may have accepted the job"),
         (&["fetch", "1", "--out", text(&out), "--coordinator", &silent], "to fetch the results"),
     ];
     for (arguments, expected) in commands {

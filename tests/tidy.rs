@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -137,6 +137,74 @@ fn properties_are_tested_on_the_same_cases_everywhere() {
         .into_iter()
         .filter(|path| path.to_string_lossy().contains("proptest-regressions"));
     assert_eq!(folders.collect::<Vec<_>>(), Vec::<PathBuf>::new());
+}
+
+/// Names of types that are defined more than once, with the reason.
+const REPEATED_TYPE_NAMES: [(&str, &str); 17] = [
+    ("Arguments", "the command line of each program"),
+    ("Data", "a part of a job, and its JSON form in a result"),
+    ("Direction", "a part of the conclusions, and its JSON form in a result"),
+    ("Effect", "the effects of the state machines of coordinator and worker"),
+    ("Event", "the events of the state machines of coordinator and worker"),
+    ("Failure", "the failure of a solver and that of a worker, never in one file"),
+    ("Group", "a group of the data, and the JSON form of its result"),
+    ("MomentIntervals", "a part of the conclusions, and its JSON form in a result"),
+    ("Moments", "the two moments, and their JSON form in a result"),
+    ("Noise", "a part of the conclusions, and its JSON form in a result"),
+    ("Search", "a search, and the section of a job that configures it"),
+    ("Settings", "the settings of each search method, named with their module"),
+    ("Solution", "a part of the conclusions, and its JSON form in a result"),
+    ("Solutions", "a part of the conclusions, and its JSON form in a result"),
+    ("Solver", "the solver, and its JSON form in a result"),
+    ("Spreads", "a part of the conclusions, and its JSON form in a result"),
+    ("State", "the states of the state machines of coordinator and worker"),
+];
+
+/// A name that means two things makes readers guess.
+#[test]
+fn type_names_are_unique() {
+    let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for path in files(&[".rs"]).iter().filter(|path| !is_of_tests(path)) {
+        let text = fs::read_to_string(path).unwrap();
+        let end = text.find("\n#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+        for (line, code) in text[..end].lines().enumerate() {
+            if let Some(name) = defined_type(code) {
+                let place = format!("{}:{}", path.display(), line + 1);
+                places.entry(name.to_owned()).or_default().push(place);
+            }
+        }
+    }
+    assert!(places.len() > 500, "only {} types were found", places.len());
+    let repeated = places.iter().filter(|(_, places)| places.len() > 1);
+    let repeated: BTreeMap<&str, &Vec<String>> =
+        repeated.map(|(name, places)| (name.as_str(), places)).collect();
+    let allowed: BTreeSet<&str> = REPEATED_TYPE_NAMES.iter().map(|(name, _)| *name).collect();
+    for (name, places) in &repeated {
+        let problem = "is defined more than once; rename one, or give a reason in this file";
+        assert!(allowed.contains(name), "{name} {problem}: {places:?}");
+    }
+    for name in allowed {
+        assert!(repeated.contains_key(name), "{name} is no longer defined more than once");
+    }
+}
+
+/// Returns whether a file contains tests or benchmarks only.
+fn is_of_tests(path: &Path) -> bool {
+    let path = path.strip_prefix(root()).unwrap();
+    path.iter().any(|part| ["tests", "benches", "fuzz"].iter().any(|folder| part == *folder))
+        || ["tests.rs", "fuzz.rs"].iter().any(|name| path.ends_with(name))
+}
+
+/// Returns the name of the type that a line of formatted code defines outside of any block.
+fn defined_type(code: &str) -> Option<&str> {
+    let code = match code.strip_prefix("pub") {
+        Some(rest) if rest.starts_with('(') => rest.split_once(") ")?.1,
+        Some(rest) => rest.strip_prefix(' ')?,
+        None => code,
+    };
+    let kinds = ["struct ", "enum ", "trait ", "type "];
+    let name = kinds.iter().find_map(|kind| code.strip_prefix(kind))?;
+    name.split(|c: char| !c.is_alphanumeric()).next()
 }
 
 #[test]

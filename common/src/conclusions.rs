@@ -37,12 +37,12 @@ pub struct Inference {
     /// Orthonormal directions that the data leave free.
     pub undetermined: Vec<Vec<f64>>,
     /// √(c1111/ρ), m/s.
-    pub bulk_velocity: Quantity,
+    pub bulk_velocity: DerivedQuantity,
     /// The dispersion.
-    pub dispersion: Quantity,
+    pub dispersion: DerivedQuantity,
     /// The free parameters themselves; their uncertainty is known only if no direction is left
     /// free.
-    pub parameters: Vec<(Parameter, Quantity)>,
+    pub parameters: Vec<(Parameter, DerivedQuantity)>,
 }
 
 /// A direction of the box that the data determine.
@@ -56,16 +56,16 @@ pub struct Direction {
 
 /// A quantity derived from the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity {
+pub struct DerivedQuantity {
     /// Its value at the best point, in its unit.
     pub value: f64,
     /// Its uncertainty; `None` if the data do not determine it.
-    pub known: Option<Known>,
+    pub known: Option<Uncertainty>,
 }
 
 /// Uncertainty of a quantity, as far as the data determine it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
+pub struct Uncertainty {
     /// Standard error.
     pub standard_error: f64,
     /// Confidence interval.

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::job::{Data, Sampling};
-use crate::moments::{Interval, KolmogorovTest, MomentIntervals, Moments};
+use crate::moments::{ConfidenceInterval, KolmogorovTest, MomentIntervals, Moments};
 use crate::outcome::Outcome;
 use crate::quantile::quantile;
 use crate::results::DataSummary;
@@ -37,7 +37,7 @@ pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
     if found.coefficient_of_variation.is_nan() || found.coefficient_of_variation <= 0.0 {
         return None;
     }
-    let influences = Influences::of(velocities, found);
+    let influences = Influences::from_velocities(velocities, found);
     if velocities.len() > RESAMPLED_MAX {
         return Some(influences.normal(found));
     }
@@ -56,7 +56,7 @@ pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
 impl DataSummary {
     /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
     /// of a second.
-    pub fn of(data: &Data, set: usize) -> Self {
+    pub fn from_data(data: &Data, set: usize) -> Self {
         let velocities = data.velocities(set);
         Self {
             moments: data.moments(set),
@@ -99,7 +99,7 @@ struct Influences {
 }
 
 impl Influences {
-    fn of(velocities: &[f64], at: Moments) -> Self {
+    fn from_velocities(velocities: &[f64], at: Moments) -> Self {
         let Moments { mean, coefficient_of_variation: variation } = at;
         let variance = (variation * mean) * (variation * mean);
         let of_variation = |velocity: f64| {
@@ -118,7 +118,7 @@ impl Influences {
             let n = influences.len() as f64;
             let squares = sum(influences.iter().map(|influence| influence * influence));
             let half = standard_normal_quantile(0.5 * (1.0 + CONFIDENCE)) * squares.sqrt() / n;
-            Interval { low: value - half, high: value + half }
+            ConfidenceInterval { low: value - half, high: value + half }
         };
         MomentIntervals {
             mean: interval(at.mean, &self.mean),
@@ -150,7 +150,7 @@ fn resampled(velocities: &[f64]) -> Option<[Vec<f64>; 2]> {
 }
 
 /// Returns the interval of resampled values around the value `found` for the sample.
-fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<Interval> {
+fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<ConfidenceInterval> {
     values.sort_unstable_by(f64::total_cmp);
     let count = values.len() as f64;
     let below = values.partition_point(|&value| value < found) as f64;
@@ -166,7 +166,7 @@ fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<I
         quantile(&values, level)
     };
     let tail = 0.5 * (1.0 - CONFIDENCE);
-    Some(Interval { low: end(tail)?, high: end(1.0 - tail)? })
+    Some(ConfidenceInterval { low: end(tail)?, high: end(1.0 - tail)? })
 }
 
 /// Returns the probability of the standard normal law below `z`.
@@ -238,7 +238,7 @@ mod tests {
         germs.take(count).map(|u| 3900.0 * (1.0 + 0.03 * standard_normal_quantile(u))).collect()
     }
 
-    fn holds(interval: Interval, value: f64) -> bool {
+    fn holds(interval: ConfidenceInterval, value: f64) -> bool {
         interval.low <= value && value <= interval.high
     }
 
@@ -267,7 +267,8 @@ mod tests {
     fn many_velocities_have_the_intervals_of_the_normal_law() {
         let few = normal(1, RESAMPLED_MAX);
         let by_bootstrap = moment_intervals(&few).unwrap();
-        let by_law = Influences::of(&few, moments(&few).unwrap()).normal(moments(&few).unwrap());
+        let by_law = Influences::from_velocities(&few, moments(&few).unwrap())
+            .normal(moments(&few).unwrap());
         let close = |a: f64, b: f64, width: f64| (a - b).abs() < 0.06 * width;
         for (a, b) in [
             (by_bootstrap.mean, by_law.mean),

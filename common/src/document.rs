@@ -8,14 +8,14 @@ mod json;
 mod node;
 mod toml;
 
-pub use self::node::{Format, Malformed};
+pub use self::node::{Format, SyntaxError};
 pub(crate) use self::node::{Node, Value, element_path, entry_path, position, quoted};
 
 /// Parses a text into a tree.
 ///
 /// # Errors
 /// Position and description of the syntax error. A duplicate key is such an error.
-pub(crate) fn parse(text: &str, format: Format) -> Result<Node, Malformed> {
+pub(crate) fn parse(text: &str, format: Format) -> Result<Node, SyntaxError> {
     match format {
         Format::Toml => toml::parse(text),
         Format::Json => json::parse(text),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::document::{Format, Malformed, Node};
+use crate::document::{Format, Node, SyntaxError};
 use crate::violations::Violation;
 use crate::{user_file, visible};
 
@@ -53,7 +53,7 @@ pub enum FileError {
 pub enum ContentError {
     /// The text is not valid TOML or JSON.
     #[error(transparent)]
-    Malformed(#[from] Malformed),
+    Malformed(#[from] SyntaxError),
     /// The text violates rules.
     #[error(transparent)]
     Invalid(#[from] Invalid),
@@ -132,12 +132,17 @@ pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileEr
     }
 }
 
-fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> Malformed {
+fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> SyntaxError {
     let valid = error.utf8_error().valid_up_to();
     let before = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
     let (line, column) = crate::document::position(&before, valid);
     let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
-    Malformed { format, line, column, message: format!("the byte 0x{byte:02x} is not valid UTF-8") }
+    SyntaxError {
+        format,
+        line,
+        column,
+        message: format!("the byte 0x{byte:02x} is not valid UTF-8"),
+    }
 }
 
 /// Returns a text without its byte order mark, if it has one.

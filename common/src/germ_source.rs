@@ -78,7 +78,7 @@ impl GermMaker {
     }
 
     /// Returns germ 11 of realizations 0, 1, … `count` - 1.
-    pub(crate) fn firsts(&self, count: u64) -> Box<dyn Iterator<Item = f64> + '_> {
+    pub(crate) fn first_germs(&self, count: u64) -> Box<dyn Iterator<Item = f64> + '_> {
         let seed = self.source.seed;
         match self.source.scheme {
             GermScheme::Streams => Box::new((0..count).map(move |index| Germs::first(seed, index))),
@@ -131,7 +131,7 @@ mod tests {
         for scheme in [GermScheme::Streams, GermScheme::Sobol { points: 4 }] {
             let maker = GermMaker::new(GermSource { seed: 9, scheme });
             for count in [0, 3, 4, 9] {
-                let firsts: Vec<f64> = maker.firsts(count).collect();
+                let firsts: Vec<f64> = maker.first_germs(count).collect();
                 let expected = (0..count).map(|index| maker.germs(index).values()[0]);
                 assert!(expected.eq(firsts), "{scheme:?}, {count}");
             }

@@ -32,7 +32,7 @@ use crate::parameters::Parameter;
 use crate::results::{BestPoint, Evaluation};
 
 use self::jacobian::log_ratios;
-use self::linear::{Linear, Response};
+use self::linear::{Linear, NoiseResponse};
 
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
@@ -40,8 +40,8 @@ pub use self::noise::{Noise, noise};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
 pub use crate::conclusions::{
-    Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
-    Solution, Solutions, Spread, Spreads,
+    Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
+    Solution, Solutions, Spread, Spreads, Uncertainty,
 };
 pub use crate::data_statistics::CONFIDENCE;
 
@@ -58,7 +58,7 @@ pub fn inference(
     let data = specification.data.as_ref()?;
     let jacobian = jacobian(specification, set, best, history)?;
     let noise = noise(data, set, &estimate);
-    let linear = Linear::of(&jacobian);
+    let linear = Linear::from_jacobian(&jacobian);
     let quantile = noise.quantile();
     let residual = log_ratios(data.moments(set), estimate.moments);
     let matched = is_matched(residual, &noise);
@@ -113,7 +113,7 @@ struct Context<'a> {
 
 impl Context<'_> {
     /// √(c1111/ρ). Its logarithm is close to normally distributed.
-    fn bulk_velocity(&self, free: &[Parameter]) -> Option<Quantity> {
+    fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
         let bulk = bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
             bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
@@ -122,7 +122,7 @@ impl Context<'_> {
         Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
     }
 
-    fn dispersion(&self, free: &[Parameter]) -> Quantity {
+    fn dispersion(&self, free: &[Parameter]) -> DerivedQuantity {
         let dispersion = self.best.point.dispersion();
         let slope = |&parameter: &Parameter| match parameter {
             Parameter::Dispersion => self.specification.range(parameter).edge() / dispersion,
@@ -132,38 +132,38 @@ impl Context<'_> {
         self.of_logarithm(dispersion, &gradient)
     }
 
-    fn parameters(&self, free: &[Parameter]) -> Vec<(Parameter, Quantity)> {
+    fn parameters(&self, free: &[Parameter]) -> Vec<(Parameter, DerivedQuantity)> {
         let quantity = |(place, &parameter): (usize, &Parameter)| {
             let value = self.best.point.get(parameter);
             let axis = (0..free.len()).map(|other| if other == place { 1.0 } else { 0.0 });
             let gradient: Vec<f64> = axis.collect();
             let response = self.response(&gradient).filter(|_| self.linear.undetermined.is_empty());
             let known = response.map(|response| {
-                let Response { deviation, free_share, .. } = response;
+                let NoiseResponse { deviation, free_share, .. } = response;
                 let edge = self.specification.range(parameter).edge();
                 let standard_error = deviation * edge;
                 let reach = self.reach(&response) * edge;
-                Known { standard_error, interval: [value - reach, value + reach], free_share }
+                Uncertainty { standard_error, interval: [value - reach, value + reach], free_share }
             });
-            (parameter, Quantity { value, known })
+            (parameter, DerivedQuantity { value, known })
         };
         free.iter().enumerate().map(quantity).collect()
     }
 
     /// Returns a quantity, given the gradient of its logarithm in units of the box.
-    fn of_logarithm(&self, value: f64, gradient: &[f64]) -> Quantity {
+    fn of_logarithm(&self, value: f64, gradient: &[f64]) -> DerivedQuantity {
         let known = self.response(gradient).map(|response| {
-            let Response { deviation, free_share, .. } = response;
+            let NoiseResponse { deviation, free_share, .. } = response;
             let factor = libm::exp(self.reach(&response));
             let interval = [value / factor, value * factor];
-            Known { standard_error: value * deviation, interval, free_share }
+            Uncertainty { standard_error: value * deviation, interval, free_share }
         });
-        Quantity { value, known }
+        DerivedQuantity { value, known }
     }
 
     /// Returns half the length of an interval: the effect of the noise, plus the distance by which
     /// the solution would move if the residual were removed.
-    fn reach(&self, response: &Response) -> f64 {
+    fn reach(&self, response: &NoiseResponse) -> f64 {
         let [mean, variation] = response.transfer;
         let left = mean * self.residual[0] + variation * self.residual[1];
         self.quantile * response.deviation + left.abs()
@@ -171,7 +171,7 @@ impl Context<'_> {
 
     /// Returns the effect of noise on a quantity with this gradient; `None` if the model does not
     /// match, or if the quantity does not depend on any free parameter.
-    fn response(&self, gradient: &[f64]) -> Option<Response> {
+    fn response(&self, gradient: &[f64]) -> Option<NoiseResponse> {
         if !self.matched || gradient.iter().all(|slope| *slope == 0.0) {
             return None;
         }
@@ -185,7 +185,7 @@ impl Context<'_> {
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
-    let searched = history.iter().filter(|row| row.is_for(set) && row.role.varied.is_none());
+    let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.varied.is_none());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)
 }

@@ -50,7 +50,7 @@ pub struct EstimatedError {
 
 /// An interval that contains a value with some probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub struct ConfidenceInterval {
     /// Lower end.
     pub low: f64,
     /// Upper end.
@@ -61,9 +61,9 @@ pub struct Interval {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MomentIntervals {
     /// Interval of the mean, m/s.
-    pub mean: Interval,
+    pub mean: ConfidenceInterval,
     /// Interval of the coefficient of variation.
-    pub coefficient_of_variation: Interval,
+    pub coefficient_of_variation: ConfidenceInterval,
     /// Probability with which each interval contains its moment.
     pub level: f64,
 }

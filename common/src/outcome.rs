@@ -76,14 +76,14 @@ pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
 
 /// One realization as returned by a worker.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solved {
+pub struct RealizationResult {
     /// The outcome.
     pub outcome: Outcome,
     /// Estimated relative error of the velocity by discretisation, ≥ 0; 0 on failure.
     pub estimated_error: f64,
 }
 
-impl Solved {
+impl RealizationResult {
     /// Returns a realization without a velocity.
     pub fn failed(kind: FailureKind) -> Self {
         Self { outcome: Err(kind), estimated_error: 0.0 }
@@ -104,7 +104,7 @@ pub struct FailureCounts([u64; 5]);
 
 impl FailureCounts {
     /// Counts the failures among `outcomes`.
-    pub fn of(outcomes: &[Outcome]) -> Self {
+    pub fn from_outcomes(outcomes: &[Outcome]) -> Self {
         let mut counts = Self::default();
         for kind in outcomes.iter().filter_map(|outcome| outcome.err()) {
             counts.add(kind, 1);
@@ -167,9 +167,9 @@ mod tests {
 
     #[test]
     fn an_estimate_is_finite_and_a_failure_has_none() {
-        let sound = |outcome, estimated_error| Solved { outcome, estimated_error }.is_sound();
+        let sound = |outcome, estimated_error| RealizationResult { outcome, estimated_error }.is_sound();
         assert!(sound(Ok(3900.0), 0.0) && sound(Ok(3900.0), 2e-5));
-        assert!(Solved::failed(FailureKind::NoArrival).is_sound());
+        assert!(RealizationResult::failed(FailureKind::NoArrival).is_sound());
         for estimate in [-1e-9, f64::NAN, f64::INFINITY] {
             assert!(!sound(Ok(3900.0), estimate), "{estimate}");
         }
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn failures_are_counted_by_kind() {
-        let counts = FailureCounts::of(&[
+        let counts = FailureCounts::from_outcomes(&[
             Ok(3900.0),
             Err(FailureKind::NotFinite),
             Err(FailureKind::NoArrival),

@@ -42,7 +42,7 @@ pub struct Reach {
 
 impl Reach {
     /// Returns the moments that points within `ranges` reach in `setup`.
-    pub fn of(ranges: &[Range; 7], setup: &Setup) -> Self {
+    pub fn from_ranges(ranges: &[Range; 7], setup: &Setup) -> Self {
         let (density, modulus) =
             (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
         let slowest = (modulus.0 / density.1).sqrt();
@@ -94,7 +94,7 @@ pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static 
     if specification.kind != JobKind::Identification {
         return None;
     }
-    let reach = Reach::of(&specification.parameters, &specification.setup);
+    let reach = Reach::from_ranges(&specification.parameters, &specification.setup);
     let mut first = None;
     for set in 0..data.sets() {
         let count = data.velocities(set).map(<[f64]>::len);
@@ -122,12 +122,12 @@ pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static 
 
 /// The two moments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Moment {
+enum MomentKind {
     Mean,
     Variation,
 }
 
-impl Moment {
+impl MomentKind {
     fn name(self) -> &'static str {
         match self {
             Self::Mean => "mean",
@@ -146,7 +146,7 @@ impl Moment {
 impl Reach {
     /// Returns the moment of data with this number of velocities that is far out of reach: its
     /// kind, its value, and the reachable range.
-    fn missed(&self, data: Moments, count: Option<usize>) -> Option<(Moment, f64, String)> {
+    fn missed(&self, data: Moments, count: Option<usize>) -> Option<(MomentKind, f64, String)> {
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
         let (slowest, fastest) = self.velocity;
         if mean < slowest / MEAN_BEYOND || mean > fastest * MEAN_BEYOND {
@@ -155,7 +155,7 @@ impl Reach {
                  data and parameters, or widen the bounds",
                 span(self.velocity, " m/s")
             );
-            return Some((Moment::Mean, mean, reached));
+            return Some((MomentKind::Mean, mean, reached));
         }
         let enough = count.is_none_or(|count| count >= VELOCITIES_MIN);
         if enough && variation > self.variation.1 * VARIATION_BEYOND {
@@ -164,7 +164,7 @@ impl Reach {
                  the data, or widen the bounds",
                 span(self.variation, "")
             );
-            return Some((Moment::Variation, variation, reached));
+            return Some((MomentKind::Variation, variation, reached));
         }
         None
     }
@@ -261,7 +261,7 @@ mod tests {
     fn the_usual_box_has_no_fastest_point() {
         let ranges = free(BOUNDS);
         assert_eq!(fastest(&ranges), None);
-        let reach = Reach::of(&ranges, &Setup::default());
+        let reach = Reach::from_ranges(&ranges, &Setup::default());
         assert!((2400.0..2401.0).contains(&reach.velocity.0), "{reach:?}");
         assert_eq!(reach.velocity.1, f64::INFINITY);
     }
@@ -274,7 +274,7 @@ mod tests {
             let (lower, upper) = BOUNDS[axis];
             ranges[axis] = Range::Free { start: OPTIMUM.0[axis], lower, upper };
         }
-        let reach = Reach::of(&ranges, &Setup::default());
+        let reach = Reach::from_ranges(&ranges, &Setup::default());
         let missed = |mean: f64, coefficient_of_variation: f64, count| {
             let missed = reach.missed(Moments { mean, coefficient_of_variation }, count);
             missed.map(|(moment, _, text)| (moment, text.split(':').next().unwrap().to_owned()))
@@ -288,12 +288,12 @@ mod tests {
             (3900.0, 0.12, None, None),
             (1400.0, 0.0271, None, None),
             (9000.0, 0.0271, None, None),
-            (12_000.0, 0.0271, None, Some((Moment::Mean, velocities))),
-            (1300.0, 0.0271, Some(2), Some((Moment::Mean, velocities))),
+            (12_000.0, 0.0271, None, Some((MomentKind::Mean, velocities))),
+            (1300.0, 0.0271, Some(2), Some((MomentKind::Mean, velocities))),
             (3906.0, 0.4, None, None),
-            (3906.0, 0.5, None, Some((Moment::Variation, variations))),
+            (3906.0, 0.5, None, Some((MomentKind::Variation, variations))),
             (3906.0, 0.5, Some(9), None),
-            (3906.0, 0.5, Some(10), Some((Moment::Variation, variations))),
+            (3906.0, 0.5, Some(10), Some((MomentKind::Variation, variations))),
             (3906.0, 0.001, None, None),
         ] {
             let expected = expected.map(|(moment, text)| (moment, text.to_owned()));
@@ -306,8 +306,8 @@ mod tests {
     fn near_receivers_have_no_fastest_velocity() {
         let ranges = OPTIMUM.0.map(Range::Fixed);
         let mut setup = Setup::default();
-        assert!(Reach::of(&ranges, &setup).velocity.1 < 4200.0);
+        assert!(Reach::from_ranges(&ranges, &setup).velocity.1 < 4200.0);
         setup.probe.receivers.first_x1 = 7e-3;
-        assert_eq!(Reach::of(&ranges, &setup).velocity.1, f64::INFINITY);
+        assert_eq!(Reach::from_ranges(&ranges, &setup).velocity.1, f64::INFINITY);
     }
 }

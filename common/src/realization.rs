@@ -67,7 +67,7 @@ impl Ensemble {
     /// constants are not computed, which saves 99 % of the work. A speed may exist even if the
     /// whole bone does not.
     pub(crate) fn longitudinal_speeds(&self, count: u64) -> impl Iterator<Item = f64> {
-        self.germs.firsts(count).map(|germ| (self.law.c1111(germ) / self.density).sqrt())
+        self.germs.first_germs(count).map(|germ| (self.law.c1111(germ) / self.density).sqrt())
     }
 
     /// Returns mean, m/s, and variance, m²/s², of √(c1111/ρ) under the law.

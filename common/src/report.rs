@@ -24,9 +24,9 @@ use crate::results::{JobFailure, JobResult, Status};
 use crate::version::RESULT_SCHEMA;
 
 pub use self::conclusions::{
-    Answer, Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solutions, Spreads,
+    Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solution, Solutions, Spreads,
 };
-pub use self::error::{PointError, ReadError, listed};
+pub use self::error::{NoPoint, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};
 pub use self::moments::{Data, Moment, MomentIntervals, Moments, Velocity};
 pub use self::point::MeanModel;
@@ -72,8 +72,8 @@ impl ResultFile {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
         text(match self {
-            Self::Identification(found) => Content::Identification(found),
-            Self::Propagation(found) => Content::Propagation(found),
+            Self::Identification(found) => DocumentContent::Identification(found),
+            Self::Propagation(found) => DocumentContent::Propagation(found),
         })
     }
 
@@ -121,17 +121,17 @@ impl ResultFile {
     ///
     /// # Errors
     /// When there is no such group, or no point was found.
-    pub fn best_point(&self, group: Option<&str>) -> Result<Point, PointError> {
+    pub fn best_point(&self, group: Option<&str>) -> Result<Point, NoPoint> {
         let (parameters, dispersion) = match (group, self) {
             (Some(name), _) => {
                 let found = self.groups().iter().find(|group| group.name == name);
-                let found = found.ok_or_else(|| PointError::no_group(name, self.groups()))?;
+                let found = found.ok_or_else(|| NoPoint::no_group(name, self.groups()))?;
                 (&found.parameters, found.dispersion)
             }
             (None, Self::Identification(found)) => (&found.parameters, found.dispersion),
             (None, Self::Propagation(found)) => (&found.parameters, found.dispersion),
         };
-        parameters.point(dispersion).ok_or(PointError::NoPoint)
+        parameters.point(dispersion).ok_or(NoPoint::NoPoint)
     }
 }
 
@@ -144,12 +144,12 @@ struct Document<'a> {
     #[schemars(extend("const" = RESULT_SCHEMA))]
     schema: u32,
     #[serde(flatten)]
-    content: Content<'a>,
+    content: DocumentContent<'a>,
 }
 
 #[derive(Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-enum Content<'a> {
+enum DocumentContent<'a> {
     /// The result of `osteon identify`.
     Identification(&'a Identification),
     /// The result of `osteon propagate`.
@@ -159,7 +159,7 @@ enum Content<'a> {
 }
 
 #[expect(clippy::expect_used, reason = "only a key that is no string could fail, and none is")]
-fn text(content: Content<'_>) -> String {
+fn text(content: DocumentContent<'_>) -> String {
     let document = Document { schema: RESULT_SCHEMA, content };
     serde_json::to_string_pretty(&document).expect("keys are strings") + "\n"
 }

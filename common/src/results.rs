@@ -54,7 +54,7 @@ pub enum JobFailure {
     /// decide.
     IntegrityError,
     /// Workers were lost repeatedly over one realization.
-    LostRealization,
+    PoisonRealization,
     /// The store's data of the job differ from what was written.
     Store,
 }
@@ -62,14 +62,14 @@ pub enum JobFailure {
 impl JobFailure {
     /// All kinds.
     pub const ALL: [Self; 4] =
-        [Self::NoFeasiblePoint, Self::IntegrityError, Self::LostRealization, Self::Store];
+        [Self::NoFeasiblePoint, Self::IntegrityError, Self::PoisonRealization, Self::Store];
 
     /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::NoFeasiblePoint => "no_feasible_point",
             Self::IntegrityError => "integrity_error",
-            Self::LostRealization => "lost_realization",
+            Self::PoisonRealization => "poison_realization",
             Self::Store => "store",
         }
     }
@@ -79,14 +79,14 @@ impl JobFailure {
     pub fn is_retryable(self) -> bool {
         match self {
             Self::NoFeasiblePoint => false,
-            Self::IntegrityError | Self::LostRealization | Self::Store => true,
+            Self::IntegrityError | Self::PoisonRealization | Self::Store => true,
         }
     }
 }
 
 /// Purpose of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Role {
+pub struct EvaluationRole {
     /// Number of its set of data, from 0.
     pub group: u32,
     /// Number of the start of its search, from 0; 0 is the job's own start.
@@ -102,7 +102,7 @@ pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
     /// Its purpose.
-    pub role: Role,
+    pub role: EvaluationRole,
     /// The evaluated point.
     pub point: Point,
     /// Moments over the successes, unless there are none. For an evaluation that measures a
@@ -118,7 +118,7 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// Whether it belongs to a search for this set of data.
-    pub fn is_for(&self, set: usize) -> bool {
+    pub fn belongs_to(&self, set: usize) -> bool {
         self.role.group as usize == set
     }
 }

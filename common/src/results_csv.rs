@@ -3,9 +3,9 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::inference::{Known, Quantity};
+use crate::inference::{DerivedQuantity, Uncertainty};
 use crate::job::{Data, JobSpecification, Range};
-use crate::moments::Interval;
+use crate::moments::ConfidenceInterval;
 use crate::outcome::Outcome;
 use crate::parameters::Parameter;
 use crate::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
@@ -155,7 +155,8 @@ fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
 /// law.
 fn measured(group: &GroupResult) -> [String; 8] {
     let DataSummary { moments, intervals, .. } = group.data;
-    let both = |interval: Option<Interval>| ends(interval.map(|found| [found.low, found.high]));
+    let both =
+        |interval: Option<ConfidenceInterval>| ends(interval.map(|found| [found.low, found.high]));
     let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));
     let [variation_lower, variation_upper] =
         both(intervals.map(|found| found.coefficient_of_variation));
@@ -223,19 +224,21 @@ pub fn comparison(result: &JobResult) -> String {
 }
 
 /// Returns the difference of two quantities, and the ends of its interval.
-fn difference((first, second): (Option<Quantity>, Option<Quantity>)) -> [Option<f64>; 3] {
+fn difference(
+    (first, second): (Option<DerivedQuantity>, Option<DerivedQuantity>),
+) -> [Option<f64>; 3] {
     let Some((first, second)) = first.zip(second) else { return [None; 3] };
     let difference = first.value - second.value;
     let Some((one, other)) = first.known.zip(second.known) else {
         return [Some(difference), None, None];
     };
     // Half the length of each interval already accounts for the degrees of freedom of its data.
-    let half = |known: Known| 0.5 * (known.interval[1] - known.interval[0]);
+    let half = |known: Uncertainty| 0.5 * (known.interval[1] - known.interval[0]);
     let reach = libm::hypot(half(one), half(other));
     [Some(difference), Some(difference - reach), Some(difference + reach)]
 }
 
-fn quantities_of(group: &GroupResult) -> [Option<Quantity>; 2] {
+fn quantities_of(group: &GroupResult) -> [Option<DerivedQuantity>; 2] {
     let found = group.conclusions.inference.as_ref();
     [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
 }

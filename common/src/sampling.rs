@@ -11,8 +11,8 @@
 //! - T: from a receiver's earliest possible arrival on, one period includes the first packet and
 //!   the large wave that the bone's face reflects: if that wrapped round, it would overlap the
 //!   first arrival, which is a thousand times smaller;
-//! - band: the pulse's spectrum is cut smoothly below [`Sampling::first_band`] in the first pass
-//!   and, where that is not enough, below [`Sampling::band`]: the same lines and more;
+//! - band: the pulse's spectrum is cut smoothly below [`WaveSampling::first_band`] in the first pass
+//!   and, where that is not enough, below [`WaveSampling::band`]: the same lines and more;
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
 //! High in the band only the tail of the pulse's kink at t = 0 remains. There a shorter period
@@ -27,14 +27,14 @@ use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::settings::Method;
 
-pub use thinning::{RUN, Run, smooth_step};
+pub use thinning::{FrequencyRun, RUN, smooth_step};
 
-/// Ratio of neighbouring speeds of the speed grid.
-const RUNG_RATIO: f64 = 1.05;
-/// Number of speeds of the grid: the last is 270 times the first.
-pub const RUNGS: usize = 116;
-/// Fraction of a rung's highest speed over which it is blended into the next.
-const RUNG_OVERLAP: f64 = 5e-4;
+/// Ratio of the upper edges of neighbouring speed bins.
+const SPEED_BIN_RATIO: f64 = 1.05;
+/// Number of speed bins: the last edge is 270 times the first.
+pub const SPEED_BINS: usize = 116;
+/// Fraction of a speed bin's highest speed over which it is blended into the next.
+const SPEED_BIN_OVERLAP: f64 = 5e-4;
 /// Speed, m/s, for which a setup's sampling is sized before any bone is known: the usual upper
 /// limit of speeds in cortical bone.
 const NOMINAL_SPEED: f64 = 4000.0;
@@ -98,7 +98,7 @@ pub enum Grade {
 
 /// Sampling of one setup for waves up to one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sampling {
+pub struct WaveSampling {
     /// No wave along x1 is faster, m/s.
     pub speed: f64,
     /// T, s.
@@ -126,10 +126,10 @@ pub struct Sampling {
 }
 
 /// Returns the quick sampling of a setup at the usual speeds of bone.
-pub fn nominal(setup: &Setup) -> Sampling {
+pub fn nominal(setup: &Setup) -> WaveSampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
-    let rung = rung(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(RUNGS - 1);
-    Sampling::at_rung(setup, rung, first_grade(setup))
+    let bin = speed_bin(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(SPEED_BINS - 1);
+    WaveSampling::for_speed_bin(setup, bin, first_grade(setup))
 }
 
 /// The exact method's sampling for the waves of the usual bone.
@@ -139,13 +139,13 @@ pub struct NominalSampling {
     pub band: f64,
     /// Period, s.
     pub period: f64,
-    /// Returns the number of (frequency, wavenumber) pairs.
+    /// Number of (frequency, wavenumber) pairs.
     pub pairs: u64,
 }
 
 impl NominalSampling {
     /// Returns the sampling of a setup; `None` for methods other than the exact one.
-    pub fn of(setup: &Setup) -> Option<Self> {
+    pub fn from_setup(setup: &Setup) -> Option<Self> {
         (setup.solver.method == Method::Exact).then(|| {
             let sampling = nominal(setup);
             let pairs = sampling.pairs(sampling.first_band).round() as u64;
@@ -168,30 +168,30 @@ pub fn pair_count(setup: &Setup) -> f64 {
     sampling.pairs(sampling.first_band)
 }
 
-/// Returns the lowest rung whose speed is at least `speed` (m/s); `None` above the highest rung, or
-/// if `speed` is not finite.
-pub fn rung(setup: &Setup, speed: f64) -> Option<usize> {
-    let mut top = first_rung(setup);
-    for rung in 0..RUNGS {
+/// Returns the lowest speed bin whose upper edge is at least `speed` (m/s); `None` above all bins,
+/// or if `speed` is not finite.
+pub fn speed_bin(setup: &Setup, speed: f64) -> Option<usize> {
+    let mut top = first_bin_edge(setup);
+    for bin in 0..SPEED_BINS {
         if speed <= top {
-            return Some(rung);
+            return Some(bin);
         }
-        top *= RUNG_RATIO;
+        top *= SPEED_BIN_RATIO;
     }
     None
 }
 
-/// Returns how near a speed (m/s) is to the upper edge of its rung: 0 up to shortly below the edge,
-/// 1 at the edge, linear between. The results of two neighbouring rungs differ slightly; near the
-/// edge they are blended.
-pub fn nearness_to_next(setup: &Setup, rung: usize, speed: f64) -> f64 {
-    let edge = rung_speed(setup, rung);
-    ((speed / edge - (1.0 - RUNG_OVERLAP)) / RUNG_OVERLAP).clamp(0.0, 1.0)
+/// Returns the weight of the next speed bin's result in the velocity of a bone with this speed
+/// (m/s): 0 up to shortly below the upper edge of its own bin, 1 at the edge, linear between. The
+/// results of two neighbouring speed bins differ slightly; near the edge they are blended.
+pub fn next_bin_weight(setup: &Setup, bin: usize, speed: f64) -> f64 {
+    let edge = speed_bin_edge(setup, bin);
+    ((speed / edge - (1.0 - SPEED_BIN_OVERLAP)) / SPEED_BIN_OVERLAP).clamp(0.0, 1.0)
 }
 
-/// Returns the highest speed of a rung, m/s.
-pub fn rung_speed(setup: &Setup, rung: usize) -> f64 {
-    (0..rung).fold(first_rung(setup), |speed, _| speed * RUNG_RATIO)
+/// Returns the highest speed of a speed bin, m/s.
+pub fn speed_bin_edge(setup: &Setup, bin: usize) -> f64 {
+    (0..bin).fold(first_bin_edge(setup), |speed, _| speed * SPEED_BIN_RATIO)
 }
 
 /// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
@@ -225,11 +225,11 @@ pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
     setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
 }
 
-impl Sampling {
+impl WaveSampling {
     /// Returns the sampling for picking velocities of bones whose waves are no faster than the
-    /// rung's speed.
-    pub fn at_rung(setup: &Setup, rung: usize, grade: Grade) -> Self {
-        let speed = rung_speed(setup, rung);
+    /// speed bin's speed.
+    pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade) -> Self {
+        let speed = speed_bin_edge(setup, bin);
         let fc = setup.probe.center_frequency;
         // All in periods: length of the reflected wave; latest time of a picked extremum after the
         // earliest possible arrival; latest time for which the wave of a repeated source must be
@@ -302,7 +302,7 @@ impl Sampling {
         }
     }
 
-    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`Sampling::runs`]
+    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`WaveSampling::runs`]
     /// lists those that are computed.
     pub fn frequencies(&self) -> usize {
         // The taper vanishes at the band's end.
@@ -426,9 +426,9 @@ fn thinness(setup: &Setup) -> f64 {
     libm::pow((THIN_PLATE / product).max(1.0), THIN_PLATE_POWER).min(THIN_PLATE_MAX)
 }
 
-/// Speed of the lowest rung, m/s: waves no faster than the coupling fluid never arrive first.
-fn first_rung(setup: &Setup) -> f64 {
-    setup.layers.coupling.sound_speed * RUNG_RATIO
+/// Speed of the lowest speed bin, m/s: waves no faster than the coupling fluid never arrive first.
+fn first_bin_edge(setup: &Setup) -> f64 {
+    setup.layers.coupling.sound_speed * SPEED_BIN_RATIO
 }
 
 /// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
@@ -471,8 +471,11 @@ mod tests {
     fn the_papers_outer_faces_are_not_heard_and_near_ones_are() {
         let echoes = |change: fn(&mut Setup)| {
             let setup = setup(change);
-            let sampling =
-                Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap(), Grade::Thorough);
+            let sampling = WaveSampling::for_speed_bin(
+                &setup,
+                speed_bin(&setup, 3960.1).unwrap(),
+                Grade::Thorough,
+            );
             (sampling.upper_echoes, sampling.lower_echoes)
         };
         assert_eq!(echoes(|_| ()), (false, false));
@@ -492,21 +495,29 @@ mod tests {
     }
 
     #[test]
-    fn a_rung_is_fast_enough_and_not_much_faster() {
+    fn a_speed_bin_is_fast_enough_and_not_much_faster() {
         let setup = Setup::default();
         for speed in [1000.0, 1687.5, 1687.6, 4000.0, 25_000.0] {
-            let sampling = Sampling::at_rung(&setup, rung(&setup, speed).unwrap(), Grade::Quick);
+            let sampling = WaveSampling::for_speed_bin(
+                &setup,
+                speed_bin(&setup, speed).unwrap(),
+                Grade::Quick,
+            );
             assert!(sampling.speed >= speed);
-            assert!(sampling.speed <= speed.max(1500.0) * RUNG_RATIO * (1.0 + 1e-12));
+            assert!(sampling.speed <= speed.max(1500.0) * SPEED_BIN_RATIO * (1.0 + 1e-12));
         }
-        assert_eq!(rung(&setup, 1e9), None);
-        assert_eq!(rung(&setup, f64::NAN), None);
+        assert_eq!(speed_bin(&setup, 1e9), None);
+        assert_eq!(speed_bin(&setup, f64::NAN), None);
     }
 
     #[test]
     fn the_repeated_source_is_heard_after_the_window() {
         let setup = Setup::default();
-        let sampling = Sampling::at_rung(&setup, rung(&setup, 3960.1).unwrap(), Grade::Thorough);
+        let sampling = WaveSampling::for_speed_bin(
+            &setup,
+            speed_bin(&setup, 3960.1).unwrap(),
+            Grade::Thorough,
+        );
         let length = 2.0 * PI / sampling.wavenumber_step;
         let image = earliest_arrival(&setup, length - 21.4e-3, sampling.speed);
         assert!(image > direct_arrival(&setup, 21.4e-3));
@@ -514,7 +525,7 @@ mod tests {
 
     #[test]
     fn the_taper_falls_from_one_to_nothing() {
-        let sampling = Sampling::at_rung(&Setup::default(), 18, Grade::Quick);
+        let sampling = WaveSampling::for_speed_bin(&Setup::default(), 18, Grade::Quick);
         let weights: Vec<f64> = (0..sampling.frequencies())
             .map(|n| sampling.taper(n, velocity_taper(sampling.band)))
             .collect();
@@ -527,7 +538,7 @@ mod tests {
     fn the_count_is_estimated_from_above_where_it_is_not_counted() {
         for refinement in [1.0, 4.0] {
             let setup = setup(|s| s.solver.refinement = refinement);
-            let sampling = Sampling::for_traces(&setup, 4000.0, 16e-6);
+            let sampling = WaveSampling::for_traces(&setup, 4000.0, 16e-6);
             let per_frequency = (PI * sampling.band / 1500.0 + sampling.evanescent_limit)
                 / sampling.wavenumber_step;
             let ratio =

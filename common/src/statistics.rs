@@ -17,7 +17,7 @@ use crate::moments::{Estimate, Moments};
 use crate::outcome::Outcome;
 use crate::parameters::Point;
 
-use self::blocks::Doubled;
+use self::blocks::DoublingFactors;
 use self::central::{Central, central};
 use self::controlled::Controlled;
 
@@ -84,7 +84,7 @@ pub fn covariance_of_logarithms(velocities: &[f64]) -> Option<[[f64; 2]; 2]> {
 /// An error can be estimated only from at least two different velocities: with one velocity, both
 /// errors are NaN (unknown); with several equal ones, both are 0, and so is Δ.
 pub fn estimate(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Option<Estimate> {
-    let sample = Sample::of(monte_carlo, point, outcomes)?;
+    let sample = Sample::from_outcomes(monte_carlo, point, outcomes)?;
     Some(Estimate {
         moments: sample.moments(),
         standard_error: sample.standard_error(monte_carlo),
@@ -102,20 +102,21 @@ pub fn cost(data: Moments, model: Moments) -> f64 {
 
 /// Moments and feasibility of a point, computed from one complete evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Verdict {
+pub struct PointStatistics {
     /// Moments over the successes, unless there are none.
     pub moments: Option<Moments>,
     /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
     pub feasible: bool,
 }
 
-impl Verdict {
+impl PointStatistics {
     /// Computes moments and feasibility from the outcomes of every index of an evaluation at
     /// `point`. It is feasible if at least one realization succeeded and at most
     /// `max_failed_fraction` of all failed.
-    pub fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Self {
+    pub fn from_outcomes(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Self {
         let failed = outcomes.iter().filter(|outcome| outcome.is_err()).count();
-        let moments = Sample::of(monte_carlo, point, outcomes).map(|sample| sample.moments());
+        let moments =
+            Sample::from_outcomes(monte_carlo, point, outcomes).map(|sample| sample.moments());
         let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
         Self { moments, feasible: moments.is_some() && within }
     }
@@ -140,9 +141,13 @@ struct Sample<'a> {
 }
 
 impl<'a> Sample<'a> {
-    fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &'a [Outcome]) -> Option<Self> {
+    fn from_outcomes(
+        monte_carlo: &MonteCarlo,
+        point: &Point,
+        outcomes: &'a [Outcome],
+    ) -> Option<Self> {
         let central = central(outcomes.iter().filter_map(|outcome| outcome.ok()))?;
-        let controlled = Controlled::of(monte_carlo, point, outcomes);
+        let controlled = Controlled::new(monte_carlo, point, outcomes);
         Some(Self { outcomes, central, controlled })
     }
 
@@ -157,9 +162,12 @@ impl<'a> Sample<'a> {
             (Sampling::MonteCarlo, None) => self.central.standard_error(),
             (Sampling::MonteCarlo, Some(controlled)) => controlled.standard_error(),
             (Sampling::Sobol, controlled) => {
-                let doubled =
-                    if controlled.is_some() { Doubled::CONTROLLED } else { Doubled::PLAIN };
-                blocks::standard_error(self.influences(), doubled, monte_carlo, successes)
+                let doubling = if controlled.is_some() {
+                    DoublingFactors::CONTROLLED
+                } else {
+                    DoublingFactors::PLAIN
+                };
+                blocks::standard_error(self.influences(), doubling, monte_carlo, successes)
             }
         }
     }
@@ -190,9 +198,9 @@ mod tests {
         estimate(&MonteCarlo::default(), &OPTIMUM, outcomes)
     }
 
-    fn verdict(outcomes: &[Outcome], max_failed_fraction: f64) -> Verdict {
+    fn point_statistics(outcomes: &[Outcome], max_failed_fraction: f64) -> PointStatistics {
         let monte_carlo = MonteCarlo { max_failed_fraction, ..MonteCarlo::default() };
-        Verdict::of(&monte_carlo, &OPTIMUM, outcomes)
+        PointStatistics::from_outcomes(&monte_carlo, &OPTIMUM, outcomes)
     }
 
     fn close(value: f64, expected: f64) {
@@ -293,11 +301,11 @@ mod tests {
                     if k < failed { Err(FailureKind::NoArrival) } else { Ok(3.0 + (k % 2) as f64) }
                 })
                 .collect();
-            let verdict = verdict(&outcomes, fraction);
-            assert_eq!(verdict.feasible, feasible, "{failed} of {total}, {fraction}");
-            assert_eq!(verdict.cost(data).is_finite(), feasible);
-            assert!(!verdict.cost(data).is_nan());
-            assert_eq!(verdict.moments.is_some(), failed < total);
+            let point_statistics = point_statistics(&outcomes, fraction);
+            assert_eq!(point_statistics.feasible, feasible, "{failed} of {total}, {fraction}");
+            assert_eq!(point_statistics.cost(data).is_finite(), feasible);
+            assert!(!point_statistics.cost(data).is_nan());
+            assert_eq!(point_statistics.moments.is_some(), failed < total);
         };
         check(0, 100, 0.0, true);
         check(1, 100, 0.0, false);
@@ -312,6 +320,6 @@ mod tests {
     #[test]
     fn a_cost_is_never_nan() {
         let data = Moments { mean: 4.0, coefficient_of_variation: 0.0 };
-        assert_eq!(verdict(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
+        assert_eq!(point_statistics(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
     }
 }

@@ -132,7 +132,7 @@ fn measured(path: &Path, column: Option<&str>) -> Result<Measured<Vec<Group>>, V
         .map_err(|problem| vec![(None, problem)])
         .and_then(|file| parse(file, column))
         .map_err(|problems| problems.into_iter().map(located).collect::<Vec<_>>())?;
-    let Gathered { groups, lines, .. } = gathered;
+    let CollectedVelocities { groups, lines, .. } = gathered;
     Ok(Measured { data: groups, origin: Origin { path: path.to_owned(), lines } })
 }
 
@@ -149,14 +149,18 @@ fn open(path: &Path) -> Result<impl BufRead, Problem> {
     }
 }
 
-type Located = (Option<usize>, Problem);
+type LocatedProblem = (Option<usize>, Problem);
 
-fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Located>> {
-    let mut lines = Lines { file, number: 0, bytes: Vec::new() };
+fn parse(
+    file: impl BufRead,
+    group: Option<&str>,
+) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
+    let mut lines = LineReader { file, number: 0, bytes: Vec::new() };
     let header = lines.next().map_err(|problem| vec![problem])?;
     let (number, header) = header.ok_or_else(|| vec![(None, Problem::Empty)])?;
-    let columns = Columns::of(header, group).map_err(|problem| vec![(Some(number), problem)])?;
-    let mut gathered = Gathered::default();
+    let columns =
+        Columns::from_header(header, group).map_err(|problem| vec![(Some(number), problem)])?;
+    let mut gathered = CollectedVelocities::default();
     let mut problems = Vec::new();
     loop {
         match lines.next() {
@@ -188,16 +192,16 @@ fn parse(file: impl BufRead, group: Option<&str>) -> Result<Gathered, Vec<Locate
 }
 
 /// The lines of a file, of which one is in memory at a time.
-struct Lines<R> {
+struct LineReader<R> {
     file: R,
     /// Number of the last line, from 1.
     number: usize,
     bytes: Vec<u8>,
 }
 
-impl<R: BufRead> Lines<R> {
+impl<R: BufRead> LineReader<R> {
     /// Returns the next line that is neither empty nor a comment, without its end, and its number.
-    fn next(&mut self) -> Result<Option<(usize, &str)>, Located> {
+    fn next(&mut self) -> Result<Option<(usize, &str)>, LocatedProblem> {
         loop {
             self.bytes.clear();
             // The line end takes at most two bytes.
@@ -235,7 +239,7 @@ impl<R: BufRead> Lines<R> {
 
 /// The velocities read so far.
 #[derive(Default)]
-struct Gathered {
+struct CollectedVelocities {
     groups: Vec<Group>,
     /// Line of each velocity of each group, from 1.
     lines: Vec<Vec<u32>>,
@@ -244,7 +248,7 @@ struct Gathered {
     count: usize,
 }
 
-impl Gathered {
+impl CollectedVelocities {
     fn add(&mut self, line: usize, name: String, velocity: f64) -> Result<(), Problem> {
         self.count += 1;
         if self.count > limits::DATA_VELOCITIES_MAX {
@@ -276,7 +280,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(header: &str, group: Option<&str>) -> Result<Self, Problem> {
+    fn from_header(header: &str, group: Option<&str>) -> Result<Self, Problem> {
         let names = fields(header)?;
         if !names.iter().any(|name| name == COLUMN)
             && names.iter().all(|name| name.parse::<f64>().is_ok())

@@ -32,7 +32,7 @@ pub struct Program {
 
 impl Program {
     /// Returns the description of this program, built from `commit`.
-    pub fn this(commit: Option<&str>) -> Self {
+    pub fn current(commit: Option<&str>) -> Self {
         Self {
             version: VERSION.to_owned(),
             numerics: NUMERICS_REVISION,

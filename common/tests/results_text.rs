@@ -7,7 +7,9 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::document::Format;
-use osteon_common::inference::{Conclusions, Inference, Known, NoiseErrors, Quantity, meaning};
+use osteon_common::inference::{
+    Conclusions, DerivedQuantity, Inference, NoiseErrors, Uncertainty, meaning,
+};
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Objective, Range, Sampling, Search, SearchMethod,
 };
@@ -16,8 +18,8 @@ use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::report::{MeanModel, ReadError, ResultFile, Solver};
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
-    JobResult, Moments, Role, Status,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupResult,
+    JobFailure, JobResult, Moments, Status,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -54,7 +56,7 @@ fn result() -> JobResult {
             }),
             failure_bias: Some(moments(-12.5, 2.5e-4)),
             kolmogorov: Some(KolmogorovTest { distance: 0.25, p_value: 0.75 }),
-            failures: FailureCounts::of(&outcomes()),
+            failures: FailureCounts::from_outcomes(&outcomes()),
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
             outcomes: outcomes(),
         }),
@@ -70,7 +72,7 @@ fn result() -> JobResult {
         scrambles: 2,
         control_variate: true,
         solver: SolverSettings::default(),
-        nominal: NominalSampling::of(&Setup::default()),
+        nominal: NominalSampling::from_setup(&Setup::default()),
         picking: Picking::default(),
         program: Program {
             version: "0.1.0".to_owned(),
@@ -122,9 +124,9 @@ fn identified_by(specification: &JobSpecification, result: &JobResult) -> String
     identification_text(&JobResult {
         data: Some(DataSummary {
             moments,
-            ..DataSummary::of(specification.data.as_ref().unwrap(), 0)
+            ..DataSummary::from_data(specification.data.as_ref().unwrap(), 0)
         }),
-        conclusions: Conclusions::of(specification, 0, best.as_ref(), &[]),
+        conclusions: Conclusions::new(specification, 0, best.as_ref(), &[]),
         objective: specification.objective,
         search: specification.search,
         best,
@@ -209,7 +211,7 @@ fn propagation() {
 #[test]
 fn the_solver_states_its_method_and_sampling() {
     let keys = |setup: &Setup| -> Vec<String> {
-        let nominal = NominalSampling::of(setup);
+        let nominal = NominalSampling::from_setup(setup);
         let solver = Solver::new(&setup.solver, nominal, Some(2e-5));
         let solver = serde_json::to_value(solver).unwrap();
         let numbers = ["refinement", "band", "period", "pairs", "element_size", "estimated_error"];
@@ -338,7 +340,7 @@ fn names_in_files_are_those_of_messages() {
 fn history() {
     let row = |number, moments, cost, failures| Evaluation {
         number,
-        role: Role::default(),
+        role: EvaluationRole::default(),
         point: POINT,
         moments,
         cost,
@@ -346,11 +348,16 @@ fn history() {
         estimated_error: None,
     };
     let none = FailureCounts::default();
-    let varied = Role { varied: Some(Parameter::Density), ..Role::default() };
+    let varied = EvaluationRole { varied: Some(Parameter::Density), ..EvaluationRole::default() };
     let beside = Evaluation { role: varied, ..row(3, None, None, none) };
     let rows = [
         row(0, Some(moments(3906.5, 0.0271)), Some(1e-3), none),
-        row(1, Some(moments(3906.5, 0.0271)), Some(f64::INFINITY), FailureCounts::of(&outcomes())),
+        row(
+            1,
+            Some(moments(3906.5, 0.0271)),
+            Some(f64::INFINITY),
+            FailureCounts::from_outcomes(&outcomes()),
+        ),
         row(2, None, None, none),
         beside,
     ];
@@ -373,7 +380,7 @@ fn the_history_names_start_and_group() {
     specification.search.starts = 2;
     let row = Evaluation {
         number: 7,
-        role: Role { group: 1, start: 1, varied: None },
+        role: EvaluationRole { group: 1, start: 1, varied: None },
         point: POINT,
         moments: None,
         cost: Some(0.5),
@@ -397,7 +404,7 @@ fn realizations() {
 
 fn group(name: &str, status: Status, best: Option<BestPoint>) -> GroupResult {
     let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
-    let data = DataSummary::of(&Data::Velocities(velocities), 0);
+    let data = DataSummary::from_data(&Data::Velocities(velocities), 0);
     let (name, conclusions) = (name.to_owned(), Conclusions::default());
     GroupResult { name, status, reason: None, best, data, conclusions }
 }
@@ -417,8 +424,8 @@ fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
 /// What a group's data say where e_L and δ are free; without intervals where they are not `known`.
 fn found(known: bool) -> Inference {
     let quantity = |value: f64, interval: [f64; 2]| {
-        let known = known.then_some(Known { standard_error: 1.0, interval, free_share: 0.0 });
-        Quantity { value, known }
+        let known = known.then_some(Uncertainty { standard_error: 1.0, interval, free_share: 0.0 });
+        DerivedQuantity { value, known }
     };
     let modulus = quantity(17.717e9, [17e9, 18.5e9]);
     Inference {
@@ -445,11 +452,11 @@ fn grouped() -> (JobSpecification, JobResult, Vec<Evaluation>) {
     let mut b = group("b", Status::Converged, Some(best));
     let mut c = group("c", Status::Failed, None);
     (a.conclusions.inference, b.conclusions.inference) = (Some(found(true)), Some(found(false)));
-    b.reason = Some("settled at a cost of 7.644e-1, above cost_tolerance 1e-12".to_owned());
+    b.reason = Some("converged at a cost of 7.644e-1, above cost_tolerance 1e-12".to_owned());
     c.reason = Some("only one velocity, and no more".to_owned());
     let row = |group, varied| Evaluation {
         number: 0,
-        role: Role { group, start: 0, varied },
+        role: EvaluationRole { group, start: 0, varied },
         point: POINT,
         moments: None,
         cost: None,
@@ -484,7 +491,7 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
         (1, "longitudinal_young_modulus_lower", ""),
         (1, "best_longitudinal_young_modulus", "17717000000.0"),
         (1, "evaluations", "1"),
-        (1, "reason", "settled at a cost of 7.644e-1, above cost_tolerance 1e-12"),
+        (1, "reason", "converged at a cost of 7.644e-1, above cost_tolerance 1e-12"),
         (2, "best_density", ""),
         (2, "evaluations", "0"),
         (2, "reason", "only one velocity, and no more"),
@@ -529,7 +536,7 @@ fn the_best_point_of_a_group_is_found_by_its_name() {
     assert_eq!(names, ["left", "none"]);
     assert_eq!(read.best_point(Some("left")).unwrap(), POINT);
     let refused = |name| read.best_point(Some(name)).unwrap_err().to_string();
-    assert_eq!(refused("none"), "the result has no best point: none was feasible");
+    assert_eq!(refused("none"), "the result has no best point: no evaluated point was feasible");
     assert_eq!(refused("right"), "there is no group \"right\"; the groups are \"left\", \"none\"");
     assert!(ResultFile::from_json(&identified(&failed())).unwrap().groups().is_empty());
     assert_eq!(read.to_json(), text);

@@ -32,14 +32,14 @@ const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A bound socket.
 #[derive(Debug)]
-pub(crate) enum Bound {
+pub(crate) enum BoundSocket {
     Tcp(TcpListener),
     Unix(UnixListener),
 }
 
 /// A connection that has completed its handshake.
 #[derive(Debug)]
-pub(crate) struct Connection {
+pub(crate) struct AcceptedConnection {
     number: u64,
     io: Io,
     certificate: Certificate,
@@ -51,7 +51,7 @@ pub(crate) struct Connection {
 
 /// Facts about the peer of a call.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Peer {
+pub(crate) struct PeerInfo {
     /// Number of its connection, from 1.
     pub(crate) connection: u64,
     /// Result of the check of its certificate.
@@ -65,9 +65,9 @@ type Plain = Either<TcpStream, UnixStream>;
 /// Returns the connections as they arrive, with TLS if configured. A peer that does not complete
 /// its handshake is dropped silently.
 pub(crate) fn connections(
-    bound: Bound,
+    bound: BoundSocket,
     tls: Option<watch::Receiver<Tls>>,
-) -> impl Stream<Item = io::Result<Connection>> {
+) -> impl Stream<Item = io::Result<AcceptedConnection>> {
     let acceptor = Acceptor {
         bound,
         tls,
@@ -82,17 +82,17 @@ pub(crate) fn connections(
 }
 
 struct Acceptor {
-    bound: Bound,
+    bound: BoundSocket,
     /// Read for each connection, because it may be replaced while the coordinator runs.
     tls: Option<watch::Receiver<Tls>>,
     places: Arc<Semaphore>,
-    handshakes: JoinSet<Option<Connection>>,
+    handshakes: JoinSet<Option<AcceptedConnection>>,
     /// Time of the last log line about failures to accept connections.
     complaint: Option<Instant>,
 }
 
 impl Acceptor {
-    async fn next(&mut self) -> Connection {
+    async fn next(&mut self) -> AcceptedConnection {
         loop {
             tokio::select! {
                 Some(ended) = self.handshakes.join_next() => {
@@ -118,7 +118,7 @@ impl Acceptor {
                         }
                         (_, plain) => {
                             let io = Either::Right(plain);
-                            return Connection::new(io, Certificate::Absent, place);
+                            return AcceptedConnection::new(io, Certificate::Absent, place);
                         }
                     }
                 }
@@ -132,34 +132,38 @@ impl Acceptor {
     fn complain(&mut self, error: &io::Error) {
         if self.complaint.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
             self.complaint = Some(Instant::now());
-            tracing::warn!(%error, "cannot accept connections; said at most once a minute");
+            tracing::warn!(%error, "cannot accept connections (logged at most once a minute)");
         }
     }
 }
 
 async fn accept(
-    bound: &Bound,
+    bound: &BoundSocket,
     places: &Arc<Semaphore>,
 ) -> io::Result<(Plain, OwnedSemaphorePermit)> {
     let place = Arc::clone(places).acquire_owned().await.map_err(io::Error::other)?;
     let io = match bound {
-        Bound::Tcp(listener) => {
+        BoundSocket::Tcp(listener) => {
             let (stream, _) = listener.accept().await?;
             // Avoids delays of small messages; if it fails, they are only slower.
             drop(stream.set_nodelay(true));
             Either::Left(stream)
         }
-        Bound::Unix(listener) => Either::Right(listener.accept().await?.0),
+        BoundSocket::Unix(listener) => Either::Right(listener.accept().await?.0),
     };
     Ok((io, place))
 }
 
-async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> Option<Connection> {
+async fn handshake(
+    tls: Tls,
+    stream: TcpStream,
+    place: OwnedSemaphorePermit,
+) -> Option<AcceptedConnection> {
     let peer = stream.peer_addr().ok();
     match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
         Ok(Ok(stream)) => {
             let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
-            Some(Connection::new(Either::Left(Box::new(stream)), certificate, place))
+            Some(AcceptedConnection::new(Either::Left(Box::new(stream)), certificate, place))
         }
         Ok(Err(error)) => {
             tracing::debug!(?peer, %error, "a TLS handshake failed");
@@ -172,7 +176,7 @@ async fn handshake(tls: Tls, stream: TcpStream, place: OwnedSemaphorePermit) -> 
     }
 }
 
-impl Connection {
+impl AcceptedConnection {
     fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
         static LAST: AtomicU64 = AtomicU64::new(0);
         let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
@@ -181,15 +185,15 @@ impl Connection {
     }
 }
 
-impl Connected for Connection {
-    type ConnectInfo = Peer;
+impl Connected for AcceptedConnection {
+    type ConnectInfo = PeerInfo;
 
-    fn connect_info(&self) -> Peer {
-        Peer { connection: self.number, certificate: self.certificate }
+    fn connect_info(&self) -> PeerInfo {
+        PeerInfo { connection: self.number, certificate: self.certificate }
     }
 }
 
-impl AsyncRead for Connection {
+impl AsyncRead for AcceptedConnection {
     fn poll_read(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,
@@ -214,7 +218,7 @@ impl AsyncRead for Connection {
     }
 }
 
-impl AsyncWrite for Connection {
+impl AsyncWrite for AcceptedConnection {
     fn poll_write(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,

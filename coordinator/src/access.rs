@@ -8,7 +8,7 @@ use crate::tokens::{Role, Tokens};
 
 /// Name of the token's holder, stored in the extensions of a call.
 #[derive(Debug, Clone)]
-pub(crate) struct Holder(pub(crate) String);
+pub(crate) struct HolderName(pub(crate) String);
 
 /// The name that marks a worker's certificate (a URI among its subject alternative names).
 pub const WORKER_NAME: &str = "urn:osteon:worker";
@@ -43,13 +43,16 @@ pub enum Certificate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Fault {
     /// An unknown authority signed it.
-    #[error("the coordinator's authority (its --tls-ca) has not signed it; make one with that")]
+    #[error(
+        "it is not signed by the coordinator's certificate authority (its --tls-ca); make a \
+             certificate with that authority"
+    )]
     UnknownAuthority,
     /// It has expired.
     #[error("it has expired; make a new one")]
     Expired,
     /// It is not valid yet.
-    #[error("it is not valid yet; are the clocks right?")]
+    #[error("it is not valid yet; check the clocks")]
     NotYetValid,
     /// Its usage is another one, for example that of a coordinator.
     #[error("it is not for clients or workers; make one with `osteon certs`")]
@@ -94,7 +97,8 @@ pub enum AccessDenied {
     Unreadable,
     /// The token is not in the list.
     #[error(
-        "this coordinator does not accept the token: it was revoked, or belongs to another coordinator"
+        "this coordinator does not accept the token: it was revoked, or belongs to another \
+         coordinator"
     )]
     UnknownToken,
     /// The role of the token is not sufficient.
@@ -117,7 +121,8 @@ pub enum AccessDenied {
     Faulty(Fault),
     /// The certificate is for another purpose.
     #[error(
-        "the certificate is not a worker's: it lacks the name `{WORKER_NAME}`; make one with `osteon certs`"
+        "the certificate is not a worker's: it lacks the name `{WORKER_NAME}`; make one with \
+         `osteon certs`"
     )]
     NotAWorker,
 }
@@ -132,7 +137,7 @@ pub fn need(path: &str) -> Requirement {
     match (service, method) {
         ("grpc.health.v1.Health", _) => Requirement::Nothing,
         ("osteon.v1.Workers", _) => Requirement::Worker,
-        ("osteon.v1.Jobs", "Get" | "List" | "ListExpelled" | "ListWorkers" | "Watch" | "Fetch") => {
+        ("osteon.v1.Jobs", "Get" | "List" | "ListBans" | "ListWorkers" | "Watch" | "Fetch") => {
             Requirement::Role(Role::Read)
         }
         ("osteon.v1.Jobs", "Submit" | "Cancel") => Requirement::Role(Role::Submit),

@@ -15,8 +15,8 @@ use tonic::codegen::{Service, http};
 use tonic::{Code, Status};
 use tower::Layer;
 
-use crate::accept::Peer;
-use crate::access::{self, AccessDenied, Certificate, Holder, Policy, Requirement};
+use crate::accept::PeerInfo;
+use crate::access::{self, AccessDenied, Certificate, HolderName, Policy, Requirement};
 use crate::limiter::{Caller, Limiter};
 use crate::message_body::MessageBody;
 use crate::tokens::Role;
@@ -46,9 +46,9 @@ impl AccessLayer {
     }
 
     /// Returns the holder of the call's token, if the policy requires tokens.
-    fn decide<B>(&self, request: &http::Request<B>) -> Result<Option<Holder>, Status> {
+    fn decide<B>(&self, request: &http::Request<B>) -> Result<Option<HolderName>, Status> {
         let path = request.uri().path();
-        let peer = request.extensions().get::<Peer>();
+        let peer = request.extensions().get::<PeerInfo>();
         let certificate = peer.map_or(Certificate::Absent, |peer| peer.certificate);
         let header = request.headers().get(http::header::AUTHORIZATION);
         let presented = access::presented(header.map(http::HeaderValue::as_bytes));
@@ -62,7 +62,7 @@ impl AccessLayer {
                 {
                     tracing::info!(path, holder, "admitted");
                 }
-                Ok(holder.map(|name| Holder(name.to_owned())))
+                Ok(holder.map(|name| HolderName(name.to_owned())))
             }
             Err(denied) => {
                 tracing::debug!(path, %denied, "a call was refused");
@@ -120,7 +120,8 @@ where
                 return inner.call(http::Request::from_parts(head, Body::new(message))).await;
             }
             // Only a few large messages are held in memory at a time, and not for long.
-            let _place = match submissions.take(Caller::of(&head.extensions)).await {
+            let _permit = match submissions.acquire(Caller::from_extensions(&head.extensions)).await
+            {
                 Ok(place) => place,
                 Err(status) => return Ok(status.into_http()),
             };

@@ -35,7 +35,7 @@ pub(crate) fn streamed(
     tokio::spawn(async move {
         let _place = place;
         let begun = Instant::now();
-        let outgoing = Outgoing { sender, until: begun + Duration::from_secs(BACKUP_S_MAX) };
+        let outgoing = PartSender { sender, until: begun + Duration::from_secs(BACKUP_S_MAX) };
         match send(copied, &outgoing).await {
             Ok(bytes) => {
                 let elapsed_s = begun.elapsed().as_secs_f64();
@@ -61,13 +61,13 @@ enum Unsent {
 }
 
 /// Destination of the parts.
-struct Outgoing {
+struct PartSender {
     sender: mpsc::Sender<Result<BackupResponse, Status>>,
     /// Time limit of the whole copy.
     until: Instant,
 }
 
-impl Outgoing {
+impl PartSender {
     async fn part(&self, part: Part) -> Result<(), Unsent> {
         let left = self.until.saturating_duration_since(Instant::now());
         let patience = Duration::from_secs(READER_PATIENCE_S).min(left);
@@ -76,15 +76,15 @@ impl Outgoing {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) => Err(Unsent::Gone),
             Err(_) => Err(Unsent::Refused(Status::deadline_exceeded(format!(
-                "nothing of the backup was read for {READER_PATIENCE_S} s, or not all within \
-                 {BACKUP_S_MAX} s; begin again"
+                "the client read nothing of the backup for {READER_PATIENCE_S} s, or not all of \
+                 it within {BACKUP_S_MAX} s; start the backup again"
             )))),
         }
     }
 }
 
 /// Waits for the copy and sends it; returns its length.
-async fn send(copied: oneshot::Receiver<Copied>, outgoing: &Outgoing) -> Result<u64, Unsent> {
+async fn send(copied: oneshot::Receiver<Copied>, outgoing: &PartSender) -> Result<u64, Unsent> {
     let file = finished(copied, outgoing).await?;
     let unread = |error: std::io::Error| {
         Unsent::Refused(Status::unavailable(format!("the copy cannot be read: {error}")))
@@ -110,7 +110,7 @@ async fn send(copied: oneshot::Receiver<Copied>, outgoing: &Outgoing) -> Result<
 /// Returns the file of the copy when it is complete.
 async fn finished(
     mut copied: oneshot::Receiver<Copied>,
-    outgoing: &Outgoing,
+    outgoing: &PartSender,
 ) -> Result<File, Unsent> {
     loop {
         outgoing.part(Part::Data(Vec::new())).await?;

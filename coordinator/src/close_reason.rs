@@ -24,7 +24,7 @@ pub enum CloseReason {
     },
     /// It was banned for wrong answers.
     #[error(
-        "this worker is expelled: it {reason}; check its machine, and start it again when it is \
+        "this worker is banned: it {reason}; check its machine, and start it again when it is \
          repaired"
     )]
     Banned {

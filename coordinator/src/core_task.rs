@@ -10,13 +10,13 @@ use crate::close_reason::CloseReason;
 use crate::config::Config;
 use crate::effect::{Answer, Effect, Refusal};
 use crate::event::{Event, Hello, ReadFailure, Request};
-use crate::failing::{Failed, Failing};
+use crate::failing::{ComponentFailure, FailureReporter};
 use crate::ids::{JobId, Token, WorkerId};
 use crate::outbound::{self, NotReading, Outbound};
 use crate::reactor::react;
 use crate::snapshot;
 use crate::state::State;
-use crate::store_thread::Command;
+use crate::store_thread::StoreCommand;
 
 /// A message to the core task.
 pub(crate) enum Message {
@@ -53,7 +53,7 @@ impl Clock {
 pub(crate) struct Core {
     state: State,
     clock: Clock,
-    commands: mpsc::Sender<Command>,
+    commands: mpsc::Sender<StoreCommand>,
     next_token: u64,
     waiting: BTreeMap<Token, oneshot::Sender<Answer>>,
     /// Newest snapshots of the jobs that are being watched.
@@ -61,7 +61,7 @@ pub(crate) struct Core {
     outbound: BTreeMap<WorkerId, Outbound>,
     on_stop: Option<oneshot::Sender<()>>,
     stopped: bool,
-    failing: Failing,
+    failing: FailureReporter,
     config: Config,
 }
 
@@ -69,8 +69,8 @@ impl Core {
     pub(crate) fn new(
         state: State,
         clock: Clock,
-        commands: mpsc::Sender<Command>,
-        failing: Failing,
+        commands: mpsc::Sender<StoreCommand>,
+        failing: FailureReporter,
     ) -> Self {
         let config = state.config;
         Self {
@@ -168,7 +168,7 @@ impl Core {
                 Effect::Close { worker, reason } => self.close(worker, &reason),
                 Effect::Store(record) => {
                     let (job, key) = record.key();
-                    if let Err(refused) = self.commands.try_send(Command::Put(record)) {
+                    if let Err(refused) = self.commands.try_send(StoreCommand::Put(record)) {
                         followups.push_back(Event::StoreFailed {
                             job,
                             key,
@@ -177,13 +177,14 @@ impl Core {
                     }
                 }
                 Effect::Read { job, number } => {
-                    if let Err(refused) = self.commands.try_send(Command::Read { job, number }) {
+                    if let Err(refused) = self.commands.try_send(StoreCommand::Read { job, number })
+                    {
                         let found = Err(ReadFailure::Refused { error: refused.to_string() });
                         followups.push_back(Event::Read { job, number, found });
                     }
                 }
                 Effect::Prune { token, jobs } => {
-                    let command = Command::Prune { token, jobs: jobs.clone() };
+                    let command = StoreCommand::Prune { token, jobs: jobs.clone() };
                     if let Err(refused) = self.commands.try_send(command) {
                         let outcome = Err(refused.to_string());
                         followups.push_back(Event::Pruned { token, jobs, outcome });
@@ -198,7 +199,7 @@ impl Core {
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
                 Effect::GiveUp { error, waited } => {
-                    self.failing.tell(Failed::StoreRefuses { error, waited });
+                    self.failing.report(ComponentFailure::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),
             }
@@ -242,7 +243,7 @@ impl Core {
         job: JobId,
         reply: oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>,
     ) {
-        let answer = match snapshot::of(&self.state, job, self.clock.now()) {
+        let answer = match snapshot::job_snapshot(&self.state, job, self.clock.now()) {
             None => Err(Refusal::NoJob { job }),
             Some(snapshot) => {
                 let sender =

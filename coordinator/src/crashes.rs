@@ -89,7 +89,7 @@ impl Crashes {
     }
 
     /// Returns whether a lost worker ran on `host`.
-    pub(crate) fn are_of(&self, host: &str) -> bool {
+    pub(crate) fn include_host(&self, host: &str) -> bool {
         self.0.iter().any(|loss| loss.worker.host() == host)
     }
 

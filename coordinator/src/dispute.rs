@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use osteon_common::outcome::{Solved, encode};
+use osteon_common::outcome::{RealizationResult, encode};
 
 use crate::crashes::Crashes;
 use crate::ids::BatchId;
@@ -31,7 +31,7 @@ pub struct Vote {
     /// The worker.
     pub by: WorkerName,
     /// Its answer, in index order.
-    pub solved: Vec<Solved>,
+    pub solved: Vec<RealizationResult>,
 }
 
 /// An index at which the answers of two workers differ.
@@ -40,16 +40,16 @@ pub struct Contradiction {
     /// The index.
     pub index: u64,
     /// The two workers and their answers; the answer that arrived first comes first.
-    pub answers: [(WorkerName, Solved); 2],
+    pub answers: [(WorkerName, RealizationResult); 2],
 }
 
 /// A decided dispute.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Verdict {
+pub(crate) struct VoteResult {
     /// The two workers that agree.
-    pub(crate) believed: [WorkerName; 2],
+    pub(crate) agreeing: [WorkerName; 2],
     /// Each of the other workers, with the first index at which it differs from those two.
-    pub(crate) liars: Vec<Contradiction>,
+    pub(crate) outvoted: Vec<Contradiction>,
 }
 
 impl Dispute {
@@ -65,7 +65,7 @@ impl Dispute {
     }
 
     /// Returns whether `name` is one of the workers that have voted.
-    pub(crate) fn involves(&self, name: &WorkerName) -> bool {
+    pub(crate) fn has_vote_of(&self, name: &WorkerName) -> bool {
         self.votes.iter().any(|vote| vote.by == *name)
     }
 
@@ -76,16 +76,16 @@ impl Dispute {
     }
 
     /// Adds the vote of another worker. The dispute is decided as soon as two votes agree.
-    pub(crate) fn vote(&mut self, vote: Vote) -> Option<Verdict> {
+    pub(crate) fn vote(&mut self, vote: Vote) -> Option<VoteResult> {
         let agrees = |other: &&Vote| same_bits(&other.solved, &vote.solved);
         let Some(second) = self.votes.iter().find(agrees) else {
             self.votes.push(vote);
             return None;
         };
-        let believed = [second.by.clone(), vote.by.clone()];
+        let agreeing = [second.by.clone(), vote.by.clone()];
         let others = self.votes.iter().filter(|other| !agrees(other));
-        let liars = others.filter_map(|other| self.difference(&vote, other)).collect();
-        Some(Verdict { believed, liars })
+        let outvoted = others.filter_map(|other| self.difference(&vote, other)).collect();
+        Some(VoteResult { agreeing, outvoted })
     }
 
     /// Removes the vote of a banned worker, and returns whether anything is left to decide.
@@ -103,15 +103,15 @@ impl Dispute {
 }
 
 /// Returns whether two answers agree bit for bit, estimated errors included.
-pub(crate) fn same(a: Solved, b: Solved) -> bool {
-    let bits = |solved: Solved| {
+pub(crate) fn same(a: RealizationResult, b: RealizationResult) -> bool {
+    let bits = |solved: RealizationResult| {
         let (code, velocity) = encode(solved.outcome);
         (code, velocity.to_bits(), solved.estimated_error.to_bits())
     };
     bits(a) == bits(b)
 }
 
-fn same_bits(a: &[Solved], b: &[Solved]) -> bool {
+fn same_bits(a: &[RealizationResult], b: &[RealizationResult]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(*a, *b))
 }
 
@@ -120,8 +120,8 @@ mod tests {
     use super::*;
 
     fn vote(process: u32, velocity: f64) -> Vote {
-        let right = Solved { outcome: Ok(1.0), estimated_error: 0.0 };
-        let solved = vec![right, Solved { outcome: Ok(velocity), estimated_error: 0.0 }];
+        let right = RealizationResult { outcome: Ok(1.0), estimated_error: 0.0 };
+        let solved = vec![right, RealizationResult { outcome: Ok(velocity), estimated_error: 0.0 }];
         Vote { by: WorkerName::new("node", process, 0), solved }
     }
 
@@ -130,19 +130,19 @@ mod tests {
         let indices = Indices { first: 10, count: 2 };
         let votes = [vote(1, velocities[0]), vote(2, velocities[1])];
         let mut dispute = Dispute::new(indices, votes, Duration::ZERO);
-        let mut verdict = None;
+        let mut result = None;
         for (process, velocity) in (3..).zip(&velocities[2..]) {
-            assert_eq!(verdict, None);
-            verdict = dispute.vote(vote(process, *velocity));
+            assert_eq!(result, None);
+            result = dispute.vote(vote(process, *velocity));
         }
-        let liars = verdict.map(|verdict| {
-            let liar = |liar: &Contradiction| {
-                assert_eq!(liar.index, 11);
-                liar.answers[1].0.process()
+        let outvoted = result.map(|result| {
+            let worker = |worker: &Contradiction| {
+                assert_eq!(worker.index, 11);
+                worker.answers[1].0.process()
             };
-            verdict.liars.iter().map(liar).collect::<Vec<_>>()
+            result.outvoted.iter().map(worker).collect::<Vec<_>>()
         });
-        assert_eq!(liars.as_deref(), expected, "{velocities:?}");
+        assert_eq!(outvoted.as_deref(), expected, "{velocities:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use osteon_common::outcome::{Outcome, Solved, encode};
+use osteon_common::outcome::{Outcome, RealizationResult, encode};
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
@@ -26,19 +26,19 @@ pub(crate) struct Audit {
 
 /// Contents of the store for an evaluation that is being computed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) enum Before {
+pub(crate) enum StoredRecord {
     /// No record.
     #[default]
-    Nothing,
+    Missing,
     /// A record that cannot be read.
     Damaged,
     /// Outcomes, some of them from a worker that was banned.
-    Stored(Arc<[Outcome]>),
+    Outcomes(Arc<[Outcome]>),
 }
 
 /// The realizations of one point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evaluation {
+pub struct PendingEvaluation {
     /// Number of the evaluation, from 0.
     pub number: u64,
     /// Number of this attempt: batches of earlier attempts do not count in this one.
@@ -46,9 +46,9 @@ pub struct Evaluation {
     /// The point.
     pub point: Point,
     /// Contents of the store for it.
-    pub(crate) before: Before,
+    pub(crate) stored: StoredRecord,
     /// Result of each index.
-    pub(crate) results: Vec<Option<Solved>>,
+    pub(crate) results: Vec<Option<RealizationResult>>,
     /// Number of results that are filled.
     pub(crate) filled: u64,
     /// Indices to be sent, from the front.
@@ -74,7 +74,7 @@ pub struct Evaluation {
     pub(crate) has_crashed_worker: bool,
 }
 
-impl Evaluation {
+impl PendingEvaluation {
     /// Returns attempt `attempt` at an evaluation without any results.
     pub fn new(number: u64, attempt: u64, point: Point, realizations: u64) -> Self {
         let length = usize::try_from(realizations).unwrap_or(usize::MAX);
@@ -82,7 +82,7 @@ impl Evaluation {
             number,
             attempt,
             point,
-            before: Before::Nothing,
+            stored: StoredRecord::Missing,
             results: vec![None; length],
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
@@ -160,7 +160,7 @@ impl Evaluation {
     }
 
     /// Fills the empty results of `indices` with the answer of `by`.
-    pub fn fill(&mut self, indices: Indices, solved: &[Solved], by: &WorkerName) {
+    pub fn fill(&mut self, indices: Indices, solved: &[RealizationResult], by: &WorkerName) {
         let known = self.workers.iter().position(|worker| worker == by);
         let place = known.unwrap_or_else(|| {
             self.workers.push(by.clone());
@@ -184,19 +184,19 @@ impl Evaluation {
     pub(crate) fn compare(
         &self,
         indices: Indices,
-        solved: &[Solved],
+        solved: &[RealizationResult],
         by: &WorkerName,
     ) -> Option<(Indices, [Vote; 2])> {
         let first = usize::try_from(indices.first).ok()?;
         let results = self.results.get(first..)?;
-        let differs = |(result, later): (&Option<Solved>, &Solved)| {
+        let differs = |(result, later): (&Option<RealizationResult>, &RealizationResult)| {
             result.is_some_and(|earlier| !dispute::same(earlier, *later))
         };
         let at = results.iter().zip(solved).position(differs)?;
         let owner = self.owners.get(first + at)?;
         let whose = self.owners.get(first + at..)?.iter().zip(results.get(at..)?);
         let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, result)| *result);
-        let earlier: Vec<Solved> = run.take(solved.len() - at).collect();
+        let earlier: Vec<RealizationResult> = run.take(solved.len() - at).collect();
         let later = solved.get(at..at + earlier.len())?.to_vec();
         let indices = Indices { first: indices.first + at as u64, count: earlier.len() as u64 };
         let owner = self.workers.get(usize::try_from(*owner).ok()?)?.clone();
@@ -220,15 +220,17 @@ impl Evaluation {
 
     /// Returns whether the evaluations stored after this one cannot be on its path, because the
     /// store has outcomes other than `outcomes` for it, or none.
-    pub(crate) fn changes(&self, outcomes: &[Outcome]) -> bool {
+    pub(crate) fn diverges_from_store(&self, outcomes: &[Outcome]) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
         };
-        match &self.before {
-            Before::Nothing => true,
-            Before::Damaged => false,
-            Before::Stored(before) => !before.iter().map(bits).eq(outcomes.iter().map(bits)),
+        match &self.stored {
+            StoredRecord::Missing => true,
+            StoredRecord::Damaged => false,
+            StoredRecord::Outcomes(before) => {
+                !before.iter().map(bits).eq(outcomes.iter().map(bits))
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Solved;
+use osteon_common::outcome::RealizationResult;
 
 use crate::close_reason::CloseReason;
 use crate::effect::RecordKey;
@@ -37,7 +37,7 @@ pub enum Event {
         /// The batch.
         batch: BatchId,
         /// Its realizations in index order.
-        solved: Vec<Solved>,
+        solved: Vec<RealizationResult>,
         /// Computing time, s, as the worker measured it.
         elapsed_s: f64,
     },

@@ -7,7 +7,7 @@ use tokio::sync::watch;
 
 /// Reason why a running coordinator cannot continue.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Failed {
+pub enum ComponentFailure {
     /// The core task ended unexpectedly.
     #[error("the coordinator's core ended unexpectedly; {START_AGAIN}")]
     Core,
@@ -38,27 +38,27 @@ enum Health {
     Well,
     /// A shutdown has been requested: the end of a part is no failure from now on.
     Stopping,
-    Failed(Failed),
+    Failed(ComponentFailure),
 }
 
 /// Shared channel on which the parts of a coordinator report that it cannot continue.
 #[derive(Debug, Clone)]
-pub(crate) struct Failing(watch::Sender<Health>);
+pub(crate) struct FailureReporter(watch::Sender<Health>);
 
 /// Held by a part of a coordinator while it runs; reports its end, by panic or otherwise.
 #[derive(Debug)]
 pub(crate) struct Guard {
-    part: Failed,
-    failing: Failing,
+    part: ComponentFailure,
+    failing: FailureReporter,
 }
 
-impl Failing {
+impl FailureReporter {
     pub(crate) fn new() -> Self {
         Self(watch::Sender::new(Health::Well))
     }
 
     /// Reports that the coordinator cannot continue.
-    pub(crate) fn tell(&self, failed: Failed) {
+    pub(crate) fn report(&self, failed: ComponentFailure) {
         self.leave_well(Health::Failed(failed));
     }
 
@@ -67,12 +67,12 @@ impl Failing {
         self.leave_well(Health::Stopping);
     }
 
-    pub(crate) fn guard(&self, part: Failed) -> Guard {
+    pub(crate) fn guard(&self, part: ComponentFailure) -> Guard {
         Guard { part, failing: self.clone() }
     }
 
     /// Returns the first failure; never completes if there is none.
-    pub(crate) fn first(&self) -> impl Future<Output = Failed> + Send + use<> {
+    pub(crate) fn first(&self) -> impl Future<Output = ComponentFailure> + Send + use<> {
         let mut health = self.0.subscribe();
         async move {
             let failed = |health: &Health| matches!(health, Health::Failed(_));
@@ -100,7 +100,7 @@ impl Failing {
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        self.failing.tell(self.part.clone());
+        self.failing.report(self.part.clone());
     }
 }
 
@@ -110,8 +110,8 @@ mod tests {
 
     use super::*;
 
-    async fn check(what: impl FnOnce(&Failing), expected: Option<Failed>) {
-        let failing = Failing::new();
+    async fn check(what: impl FnOnce(&FailureReporter), expected: Option<ComponentFailure>) {
+        let failing = FailureReporter::new();
         let mut first = std::pin::pin!(failing.first());
         what(&failing);
         let told = futures::poll!(&mut first);
@@ -121,28 +121,29 @@ mod tests {
     #[tokio::test]
     async fn the_first_failure_is_told_and_no_stop() {
         check(|_| {}, None).await;
-        check(|failing| drop(failing.guard(Failed::Core)), Some(Failed::Core)).await;
-        let both = |failing: &Failing| {
-            drop(failing.guard(Failed::Store));
-            drop(failing.guard(Failed::Core));
+        check(|failing| drop(failing.guard(ComponentFailure::Core)), Some(ComponentFailure::Core))
+            .await;
+        let both = |failing: &FailureReporter| {
+            drop(failing.guard(ComponentFailure::Store));
+            drop(failing.guard(ComponentFailure::Core));
         };
-        check(both, Some(Failed::Store)).await;
-        let stopped = |failing: &Failing| {
+        check(both, Some(ComponentFailure::Store)).await;
+        let stopped = |failing: &FailureReporter| {
             failing.disarm();
-            drop(failing.guard(Failed::Core));
+            drop(failing.guard(ComponentFailure::Core));
         };
         check(stopped, None).await;
     }
 
     #[tokio::test]
     async fn a_panic_is_told() {
-        let failing = Failing::new();
-        let guard = failing.guard(Failed::Server);
+        let failing = FailureReporter::new();
+        let guard = failing.guard(ComponentFailure::Server);
         let panics = async move {
             let _guard = guard;
             panic!("a part of the coordinator that this test breaks");
         };
         assert!(tokio::spawn(panics).await.is_err());
-        assert_eq!(failing.first().await, Failed::Server);
+        assert_eq!(failing.first().await, ComponentFailure::Server);
     }
 }

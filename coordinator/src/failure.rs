@@ -1,6 +1,6 @@
 //! Failures of a job that are not caused by its search.
 
-use osteon_common::outcome::{Solved, encode};
+use osteon_common::outcome::{RealizationResult, encode};
 use osteon_common::parameters::Point;
 use osteon_common::results::JobFailure;
 use osteon_search::ReplayError;
@@ -10,11 +10,11 @@ use crate::dispute::Contradiction;
 
 /// A failure of a job.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum Failure {
+pub enum RunFailure {
     /// Two answers for one index differ, and no third worker can decide between them.
     #[error(
         "integrity error: realization {} at the point {:?} is {} by {} and {} by {}; one of them \
-         computes wrongly, and no third worker was there to decide: attach three workers and \
+         computes wrongly, and there was no third worker to decide: attach three workers and \
          submit the job again, or run it on each machine alone and compare the digests",
         contradiction.index, point.0,
         shown(contradiction.answers[0].1), contradiction.answers[0].0,
@@ -28,7 +28,8 @@ pub enum Failure {
     },
     /// Workers are lost over one realization.
     #[error(
-        "realization {index} was alone on {workers} workers that were lost ({hosts}); to reproduce \
+        "{workers} workers ({hosts}) were lost while they computed only realization {index}; to \
+         reproduce \
          it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
          {case}"
     )]
@@ -46,26 +47,26 @@ pub enum Failure {
     #[error(transparent)]
     Replay(#[from] ReplayError),
     /// A stored evaluation is missing.
-    #[error("the store has no evaluation {number} of this job any more; submit it again")]
+    #[error("the store no longer has evaluation {number} of this job; submit the job again")]
     Missing {
         /// Number of the evaluation.
         number: u64,
     },
 }
 
-impl Failure {
+impl RunFailure {
     /// Returns the kind of the failure.
     pub fn kind(&self) -> JobFailure {
         match self {
             Self::Contradiction { .. } => JobFailure::IntegrityError,
-            Self::PoisonRealization { .. } => JobFailure::LostRealization,
+            Self::PoisonRealization { .. } => JobFailure::PoisonRealization,
             Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
         }
     }
 }
 
 /// Describes an answer, for people.
-pub(crate) fn shown(solved: Solved) -> String {
+pub(crate) fn shown(solved: RealizationResult) -> String {
     match solved.outcome {
         Ok(velocity) => format!(
             "{velocity} m/s (bits {:016x}, estimated error {:?})",

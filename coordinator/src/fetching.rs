@@ -19,9 +19,9 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use crate::ids::JobId;
-use crate::job_output::{Left, ReadError, Reading, Reply};
+use crate::job_output::{OutputError, ReadRequest, Reply, StoredOutput};
 use crate::store::EndRecord;
-use crate::store_thread::Command;
+use crate::store_thread::StoreCommand;
 
 /// Number of messages that are prepared before they are read.
 const AHEAD: usize = 2;
@@ -35,26 +35,26 @@ const REALIZATION_BLOCK: usize = 65_536;
 /// Requests one record from the store. The channel to the store is released at once, so that a
 /// pending read does not keep a coordinator from stopping.
 async fn read<T>(
-    store: &mpsc::WeakSender<Command>,
-    what: impl FnOnce(Reply<T>) -> Reading,
+    store: &mpsc::WeakSender<StoreCommand>,
+    what: impl FnOnce(Reply<T>) -> ReadRequest,
 ) -> Result<T, Status> {
     let (reply, record) = oneshot::channel();
     let sender = store.upgrade().ok_or_else(stopped)?;
-    sender.send(Command::Fetch(what(reply))).await.map_err(|_| stopped())?;
+    sender.send(StoreCommand::Fetch(what(reply))).await.map_err(|_| stopped())?;
     drop(sender);
     record.await.map_err(|_| stopped())?.map_err(|error| match error {
-        ReadError::Pruned { .. } => Status::not_found(error.to_string()),
+        OutputError::Pruned { .. } => Status::not_found(error.to_string()),
         _ => Status::data_loss(error.to_string()),
     })
 }
 
 async fn outcomes(
-    store: &mpsc::WeakSender<Command>,
+    store: &mpsc::WeakSender<StoreCommand>,
     job: JobId,
     number: Option<u64>,
 ) -> Result<Option<Arc<[Outcome]>>, Status> {
     let Some(number) = number else { return Ok(None) };
-    read(store, |reply| Reading::Outcomes(job, number, reply)).await.map(Some)
+    read(store, |reply| ReadRequest::Outcomes(job, number, reply)).await.map(Some)
 }
 
 fn stopped() -> Status {
@@ -62,21 +62,24 @@ fn stopped() -> Status {
 }
 
 /// Reads the output of an ended job except its outcomes.
-async fn left(store: &mpsc::WeakSender<Command>, end: EndRecord) -> Result<Left, Status> {
+async fn left(
+    store: &mpsc::WeakSender<StoreCommand>,
+    end: EndRecord,
+) -> Result<StoredOutput, Status> {
     let job = end.job;
-    let record = read(store, |reply| Reading::Job(job, reply)).await?;
-    let summary = read(store, |reply| Reading::Summary(job, reply)).await?;
-    Ok(Left { end, specification: record.specification, summary })
+    let record = read(store, |reply| ReadRequest::Job(job, reply)).await?;
+    let summary = read(store, |reply| ReadRequest::Summary(job, reply)).await?;
+    Ok(StoredOutput { end, specification: record.specification, summary })
 }
 
 /// Sends one specification, one result, history blocks and realization blocks; where the data are
 /// groups, also the result and the realization blocks of each. The parts are read and made while
 /// they are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
-    store: mpsc::WeakSender<Command>,
+    store: mpsc::WeakSender<StoreCommand>,
     end: EndRecord,
-    reader: Reader,
-) -> Result<(), Stop> {
+    reader: FetchStream,
+) -> Result<(), StreamEnd> {
     let job = end.job;
     let left = Arc::new(reader.kept_waiting(left(&store, end)).await?);
     reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
@@ -115,13 +118,13 @@ fn outcomes_of(best: Option<BestPoint>) -> Vec<Outcome> {
 /// so it holds the permit of its fetch until it ends: clients that disconnect and come back cannot
 /// start more of these threads than there are permits.
 async fn computed<T: Send + 'static>(
-    left: &Arc<Left>,
-    reader: &Reader,
-    compute: impl FnOnce(&Left) -> T + Send + 'static,
-) -> Result<T, Stop> {
-    let (left, place) = (Arc::clone(left), Arc::clone(&reader.place));
+    left: &Arc<StoredOutput>,
+    reader: &FetchStream,
+    compute: impl FnOnce(&StoredOutput) -> T + Send + 'static,
+) -> Result<T, StreamEnd> {
+    let (left, permit) = (Arc::clone(left), Arc::clone(&reader.permit));
     let computing = spawn_blocking(move || {
-        let _place = place;
+        let _place = permit;
         compute(&left)
     });
     let failed = |_| Status::internal("the result could not be computed; see the log");
@@ -131,8 +134,8 @@ async fn computed<T: Send + 'static>(
 async fn send_realizations(
     group: Option<u32>,
     outcomes: &[Outcome],
-    reader: &Reader,
-) -> Result<(), Stop> {
+    reader: &FetchStream,
+) -> Result<(), StreamEnd> {
     for (block, outcomes) in outcomes.chunks(REALIZATION_BLOCK).enumerate() {
         let first = (block * REALIZATION_BLOCK) as u64;
         let block = realizations::to_message(group, first, outcomes);
@@ -142,36 +145,36 @@ async fn send_realizations(
 }
 
 /// The reading end of a fetch.
-pub(crate) struct Reader {
+pub(crate) struct FetchStream {
     parts: mpsc::Sender<Result<FetchResponse, Status>>,
     until: Instant,
     /// Its concurrency permit.
-    place: Arc<dyn Send + Sync>,
+    permit: Arc<dyn Send + Sync>,
 }
 
 /// Reason for ending the stream.
-pub(crate) enum Stop {
+pub(crate) enum StreamEnd {
     /// The reader is gone.
     Gone,
     /// The reader receives this status.
     Told(Status),
 }
 
-impl From<Status> for Stop {
+impl From<Status> for StreamEnd {
     fn from(status: Status) -> Self {
         Self::Told(status)
     }
 }
 
-impl Reader {
+impl FetchStream {
     /// Sends a part as soon as the parts before it have been read.
-    pub(crate) async fn send(&self, part: Part) -> Result<(), Stop> {
+    pub(crate) async fn send(&self, part: Part) -> Result<(), StreamEnd> {
         let patience = patience().min(self.until.saturating_duration_since(Instant::now()));
         let message = Ok(FetchResponse { part: Some(part) });
         match timeout(patience, self.parts.send(message)).await {
             Ok(Ok(())) => Ok(()),
-            Ok(Err(_)) => Err(Stop::Gone),
-            Err(_) => Err(Stop::Told(too_late())),
+            Ok(Err(_)) => Err(StreamEnd::Gone),
+            Err(_) => Err(StreamEnd::Told(too_late())),
         }
     }
 
@@ -180,18 +183,18 @@ impl Reader {
     async fn kept_waiting<T>(
         &self,
         work: impl Future<Output = Result<T, Status>>,
-    ) -> Result<T, Stop> {
+    ) -> Result<T, StreamEnd> {
         let mut work = pin!(work);
         loop {
             let left = self.until.saturating_duration_since(Instant::now());
             tokio::select! {
                 biased;
-                done = &mut work => return done.map_err(Stop::Told),
-                () = self.parts.closed() => return Err(Stop::Gone),
+                done = &mut work => return done.map_err(StreamEnd::Told),
+                () = self.parts.closed() => return Err(StreamEnd::Gone),
                 () = sleep(SIGN_OF_LIFE.min(left)) => {}
             }
             if Instant::now() >= self.until {
-                return Err(Stop::Told(too_slow()));
+                return Err(StreamEnd::Told(too_slow()));
             }
             let sign = Part::History(HistoryBlock::default());
             // A reader that still has parts to read needs no heartbeat.
@@ -202,22 +205,22 @@ impl Reader {
 
 /// Returns the parts that `produce` sends as a stream. A reader that reads nothing for a while, or
 /// takes too long in all, receives no more parts, so that the output of the job and the permit
-/// `place` are not held indefinitely.
+/// `permit` are not held indefinitely.
 pub(crate) fn paced<F>(
-    place: impl Send + Sync + 'static,
-    produce: impl FnOnce(Reader) -> F,
+    permit: impl Send + Sync + 'static,
+    produce: impl FnOnce(FetchStream) -> F,
 ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send
 where
-    F: Future<Output = Result<(), Stop>> + Send + 'static,
+    F: Future<Output = Result<(), StreamEnd>> + Send + 'static,
 {
     let (parts, sent) = mpsc::channel(AHEAD);
     let (told, ending) = oneshot::channel();
     let until = Instant::now() + Duration::from_secs(FETCH_S_MAX);
-    let producing = produce(Reader { parts, until, place: Arc::new(place) });
+    let producing = produce(FetchStream { parts, until, permit: Arc::new(permit) });
     tokio::spawn(async move {
         // The reader's permit is released with it.
         let stopped = producing.await;
-        if let Err(Stop::Told(status)) = stopped {
+        if let Err(StreamEnd::Told(status)) = stopped {
             // The reader may have gone by now.
             drop(told.send(status));
         }
@@ -232,8 +235,8 @@ fn patience() -> Duration {
 
 fn too_late() -> Status {
     Status::deadline_exceeded(format!(
-        "nothing of the results was read for {READER_PATIENCE_S} s, or not all within {FETCH_S_MAX} s; \
-         fetch them again"
+        "the client read nothing of the results for {READER_PATIENCE_S} s, or not all of them \
+         within {FETCH_S_MAX} s; fetch them again"
     ))
 }
 
@@ -259,9 +262,9 @@ mod tests {
     /// Returns a fetch of `count` parts.
     fn parts(
         count: usize,
-        place: OwnedSemaphorePermit,
+        permit: OwnedSemaphorePermit,
     ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send {
-        paced(place, move |reader| async move {
+        paced(permit, move |reader| async move {
             for _ in 0..count {
                 reader.send(Part::History(HistoryBlock::default())).await?;
             }
@@ -269,14 +272,14 @@ mod tests {
         })
     }
 
-    async fn place(places: &Arc<Semaphore>) -> OwnedSemaphorePermit {
-        Arc::clone(places).acquire_owned().await.unwrap()
+    async fn permit(semaphore: &Arc<Semaphore>) -> OwnedSemaphorePermit {
+        Arc::clone(semaphore).acquire_owned().await.unwrap()
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_steady_reader_gets_everything() {
-        let places = Arc::new(Semaphore::new(1));
-        let mut stream = Box::pin(parts(10, place(&places).await));
+        let semaphore = Arc::new(Semaphore::new(1));
+        let mut stream = Box::pin(parts(10, permit(&semaphore).await));
         let mut count = 0;
         while let Some(part) = stream.next().await {
             part.unwrap();
@@ -284,15 +287,15 @@ mod tests {
             sleep(patience() / 2).await;
         }
         assert_eq!(count, 10);
-        drop(place(&places).await);
+        drop(permit(&semaphore).await);
     }
 
     #[tokio::test(start_paused = true)]
     async fn who_does_not_read_gives_the_place_back_and_is_told() {
-        let places = Arc::new(Semaphore::new(1));
-        let stream = parts(10, place(&places).await);
+        let semaphore = Arc::new(Semaphore::new(1));
+        let stream = parts(10, permit(&semaphore).await);
         // A permit is available only when the first fetch has lost its own.
-        drop(place(&places).await);
+        drop(permit(&semaphore).await);
         let read: Vec<_> = stream.collect().await;
         assert_eq!(read.len(), AHEAD + 1);
         let last = read.last().unwrap().as_ref().unwrap_err();
@@ -301,22 +304,22 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_reads_a_little_now_and_then_does_not_hold_the_place_for_ever() {
-        let places = Arc::new(Semaphore::new(1));
-        let mut stream = Box::pin(parts(100, place(&places).await));
+        let semaphore = Arc::new(Semaphore::new(1));
+        let mut stream = Box::pin(parts(100, permit(&semaphore).await));
         let begun = Instant::now();
         while let Some(Ok(_)) = stream.next().await {
             sleep(patience() * 9 / 10).await;
         }
         let held = begun.elapsed();
         assert!(held < Duration::from_secs(FETCH_S_MAX) + 4 * patience(), "{held:?}");
-        drop(place(&places).await);
+        drop(permit(&semaphore).await);
     }
 
     #[tokio::test(start_paused = true)]
     async fn who_goes_gives_the_place_back_at_once() {
-        let places = Arc::new(Semaphore::new(1));
-        drop(parts(10, place(&places).await));
-        let back = timeout(patience() / 2, place(&places)).await;
+        let semaphore = Arc::new(Semaphore::new(1));
+        drop(parts(10, permit(&semaphore).await));
+        let back = timeout(patience() / 2, permit(&semaphore)).await;
         assert!(back.is_ok());
     }
 
@@ -330,12 +333,12 @@ mod tests {
         let (store, mut commands) = mpsc::channel(1);
         let weak = store.downgrade();
         let slow = tokio::spawn(async move {
-            while let Some(Command::Fetch(reading)) = commands.recv().await {
+            while let Some(StoreCommand::Fetch(reading)) = commands.recv().await {
                 sleep(patience()).await;
                 let answered = match reading {
-                    Reading::Job(_, reply) => reply.send(Ok(job.clone())).is_ok(),
-                    Reading::Summary(_, reply) => reply.send(Ok(search.summary())).is_ok(),
-                    Reading::Outcomes(_, _, reply) => {
+                    ReadRequest::Job(_, reply) => reply.send(Ok(job.clone())).is_ok(),
+                    ReadRequest::Summary(_, reply) => reply.send(Ok(search.summary())).is_ok(),
+                    ReadRequest::Outcomes(_, _, reply) => {
                         reply.send(Ok(Arc::clone(&best.outcomes))).is_ok()
                     }
                 };
@@ -366,15 +369,15 @@ mod tests {
     async fn a_store_that_never_answers_is_not_waited_for_for_ever() {
         let (_, _, end, _) = ended();
         let (store, _commands) = mpsc::channel(1);
-        let places = Arc::new(Semaphore::new(1));
-        let place = place(&places).await;
-        let stream = paced(place, |reader| send_all(store.downgrade(), end, reader));
+        let semaphore = Arc::new(Semaphore::new(1));
+        let permit = permit(&semaphore).await;
+        let stream = paced(permit, |reader| send_all(store.downgrade(), end, reader));
         let limit = Duration::from_secs(FETCH_S_MAX) + patience();
         let parts: Vec<_> = timeout(limit, stream.collect()).await.unwrap();
         let last = parts.last().unwrap().as_ref().unwrap_err();
         assert_eq!(last.code(), Code::DeadlineExceeded);
         assert!(last.message().contains("not read and computed"), "{last}");
-        assert_eq!(places.available_permits(), 1);
+        assert_eq!(semaphore.available_permits(), 1);
     }
 
     /// Advances time until the stream has an item.
@@ -395,11 +398,11 @@ mod tests {
     async fn signs_of_life_come_while_the_result_is_computed_which_keeps_its_place() {
         let (job, search, end, _) = ended();
         let summary = search.summary();
-        let left = Arc::new(Left { end, specification: job.specification, summary });
-        let places = Arc::new(Semaphore::new(1));
+        let left = Arc::new(StoredOutput { end, specification: job.specification, summary });
+        let semaphore = Arc::new(Semaphore::new(1));
         let (release, released) = blocking::channel();
-        let place = place(&places).await;
-        let mut stream = Box::pin(paced(place, |reader| async move {
+        let permit = permit(&semaphore).await;
+        let mut stream = Box::pin(paced(permit, |reader| async move {
             computed(&left, &reader, move |_| released.recv().unwrap()).await
         }));
         for _ in 0..10 {
@@ -410,8 +413,8 @@ mod tests {
         for _ in 0..10 {
             tokio::task::yield_now().await;
         }
-        assert_eq!(places.available_permits(), 0, "others may begin to compute");
+        assert_eq!(semaphore.available_permits(), 0, "others may begin to compute");
         release.send(()).unwrap();
-        drop(places.acquire().await.unwrap());
+        drop(semaphore.acquire().await.unwrap());
     }
 }

@@ -8,7 +8,7 @@ use osteon_common::parameters::Point;
 use osteon_proto::specification;
 use prost::Message as _;
 
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::ids::{BatchId, Token};
 use crate::rate::Rate;
 use crate::realization_time::RealizationTime;
@@ -21,7 +21,7 @@ use osteon_search::Search;
 pub(crate) struct Job {
     pub(crate) record: JobRecord,
     /// Digest of its specification, to compare two submissions with the same request id.
-    pub(crate) identity: Identity,
+    pub(crate) identity: SpecificationDigest,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// Speculative evaluations of points that its search may ask for next.
@@ -79,7 +79,7 @@ impl Job {
     }
 
     /// Returns the evaluation that the search asked for, while it is under way.
-    pub(crate) fn evaluation(&self) -> Option<&Evaluation> {
+    pub(crate) fn evaluation(&self) -> Option<&PendingEvaluation> {
         match &self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
@@ -87,12 +87,12 @@ impl Job {
     }
 
     /// Returns all evaluations under way; the one that the search asked for comes first.
-    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &Evaluation> {
+    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
         self.evaluation().into_iter().chain(&self.speculation.evaluations)
     }
 
     /// As [`Job::evaluations`].
-    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut Evaluation> {
+    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
         let asked_for = match &mut self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
@@ -114,7 +114,7 @@ pub(crate) enum Stage {
         asked: bool,
     },
     /// Batches of its evaluation are sent to workers.
-    Computing(Evaluation),
+    Computing(PendingEvaluation),
     /// A complete evaluation is being stored.
     Storing {
         /// The evaluation.
@@ -139,7 +139,7 @@ pub(crate) struct Speculation {
     /// Candidate points, most likely first.
     pub(crate) candidates: Vec<Point>,
     /// Evaluations of candidates that have begun, in the order of their beginning.
-    pub(crate) evaluations: Vec<Evaluation>,
+    pub(crate) evaluations: Vec<PendingEvaluation>,
 }
 
 /// A refusal of the store.
@@ -156,7 +156,7 @@ pub(crate) struct StoreRetry {
 #[derive(Debug)]
 pub(crate) struct EndedJob {
     pub(crate) request: Option<RequestName>,
-    pub(crate) identity: Identity,
+    pub(crate) identity: SpecificationDigest,
     pub(crate) kind: JobKind,
     /// The client that submitted it.
     pub(crate) client: String,
@@ -179,7 +179,7 @@ impl EndedJob {
     pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
         let specification = &record.specification;
         Self {
-            request: RequestName::of(record),
+            request: RequestName::from_record(record),
             identity: identity(specification),
             kind: specification.kind,
             client: record.client.clone(),
@@ -209,16 +209,16 @@ impl RequestName {
     }
 
     /// Returns the name of the request that submitted a job.
-    pub(crate) fn of(record: &JobRecord) -> Option<Self> {
+    pub(crate) fn from_record(record: &JobRecord) -> Option<Self> {
         Self::new(&record.client, &record.request_id)
     }
 }
 
 /// Digest of a specification.
-pub(crate) type Identity = [u8; 32];
+pub(crate) type SpecificationDigest = [u8; 32];
 
 /// Returns the digest of a specification; different specifications have different digests.
-pub(crate) fn identity(specification: &JobSpecification) -> Identity {
+pub(crate) fn identity(specification: &JobSpecification) -> SpecificationDigest {
     let encoded = specification::to_message(specification).encode_to_vec();
     *blake3::hash(&encoded).as_bytes()
 }

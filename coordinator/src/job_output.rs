@@ -27,12 +27,12 @@ pub struct JobOutput {
 
 /// Error when the output of a job cannot be read.
 #[derive(Debug, Error)]
-pub enum ReadError {
+pub enum OutputError {
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The job has been deleted meanwhile.
-    #[error("no such job: {job}; it was pruned meanwhile")]
+    #[error("no such job: {job}; it was deleted in the meantime")]
     Pruned {
         /// The job.
         job: JobId,
@@ -57,24 +57,24 @@ pub enum ReadError {
 ///
 /// # Errors
 /// When the store cannot be read, or something is missing in it.
-pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<JobOutput, ReadError> {
+pub fn read(store: &mut dyn Store, end: &EndRecord) -> Result<JobOutput, OutputError> {
     let job = end.job;
     let JobRecord { specification, .. } = job_record(store, job)?;
-    let left = Left { end: end.clone(), specification, summary: summary(store, job)? };
+    let left = StoredOutput { end: end.clone(), specification, summary: summary(store, job)? };
     let mut read =
         |number: Option<u64>| number.map(|number| outcomes(store, job, number)).transpose();
     let groups = (0..left.groups()).map(|set| Ok(left.group(set, read(left.best_of(set))?)));
-    let groups: Vec<_> = groups.collect::<Result<_, ReadError>>()?;
+    let groups: Vec<_> = groups.collect::<Result<_, OutputError>>()?;
     let mut result = left.result(read(left.best())?);
     result.groups = groups.into_iter().flatten().collect();
-    let Left { specification, summary, .. } = left;
+    let StoredOutput { specification, summary, .. } = left;
     let specification = Arc::unwrap_or_clone(specification);
     Ok(JobOutput { specification, result, history: summary.history })
 }
 
 /// Output of an ended job without its outcomes, which may need more memory than there is.
 #[derive(Debug)]
-pub(crate) struct Left {
+pub(crate) struct StoredOutput {
     /// The end of the job.
     pub(crate) end: EndRecord,
     /// The specification.
@@ -83,7 +83,7 @@ pub(crate) struct Left {
     pub(crate) summary: Summary,
 }
 
-impl Left {
+impl StoredOutput {
     /// Returns the number of the best evaluation, if one was feasible; `None` where the data are
     /// groups.
     pub(crate) fn best(&self) -> Option<u64> {
@@ -134,7 +134,7 @@ impl Left {
 
 /// A request to read one record of an ended job.
 #[derive(Debug)]
-pub(crate) enum Reading {
+pub(crate) enum ReadRequest {
     /// The job record.
     Job(JobId, Reply<JobRecord>),
     /// The summary of the path of its search.
@@ -144,9 +144,9 @@ pub(crate) enum Reading {
 }
 
 /// Channel for a record that was read.
-pub(crate) type Reply<T> = oneshot::Sender<Result<T, ReadError>>;
+pub(crate) type Reply<T> = oneshot::Sender<Result<T, OutputError>>;
 
-impl Reading {
+impl ReadRequest {
     /// Reads the record, unless the receiver has gone. Blocks meanwhile.
     pub(crate) fn serve(self, store: &mut dyn Store) {
         // The receiver may be dropped during the read.
@@ -165,18 +165,18 @@ impl Reading {
     }
 }
 
-fn job_record(store: &mut dyn Store, job: JobId) -> Result<JobRecord, ReadError> {
-    store.job(job)?.ok_or(ReadError::Pruned { job })
+fn job_record(store: &mut dyn Store, job: JobId) -> Result<JobRecord, OutputError> {
+    store.job(job)?.ok_or(OutputError::Pruned { job })
 }
 
-fn summary(store: &mut dyn Store, job: JobId) -> Result<Summary, ReadError> {
+fn summary(store: &mut dyn Store, job: JobId) -> Result<Summary, OutputError> {
     let summary = store.summary(job)?;
-    found(store, job, summary, ReadError::NoSummary { job })
+    found(store, job, summary, OutputError::NoSummary { job })
 }
 
-fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Arc<[Outcome]>, ReadError> {
+fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Arc<[Outcome]>, OutputError> {
     let evaluation = store.evaluation(job, number)?;
-    let evaluation = found(store, job, evaluation, ReadError::NoBest { job, number })?;
+    let evaluation = found(store, job, evaluation, OutputError::NoBest { job, number })?;
     Ok(evaluation.outcomes)
 }
 
@@ -186,11 +186,11 @@ fn found<T>(
     store: &mut dyn Store,
     job: JobId,
     read: Option<T>,
-    lost: ReadError,
-) -> Result<T, ReadError> {
+    lost: OutputError,
+) -> Result<T, OutputError> {
     match read {
         Some(read) => Ok(read),
-        None if store.job(job)?.is_none() => Err(ReadError::Pruned { job }),
+        None if store.job(job)?.is_none() => Err(OutputError::Pruned { job }),
         None => Err(lost),
     }
 }

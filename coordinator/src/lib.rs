@@ -54,7 +54,7 @@ pub mod worker_name;
 
 pub use access::Policy;
 pub use config::Config;
-pub use failing::Failed;
+pub use failing::ComponentFailure;
 pub use listen::{BindError, ListenAddress, Listener};
 pub use shell::{Coordinator, StartError, start};
 pub use tls::Tls;

@@ -11,8 +11,8 @@ use tokio::time::timeout;
 use tonic::Status;
 use tonic::codegen::http::Extensions;
 
-use crate::accept::Peer;
-use crate::access::Holder;
+use crate::accept::PeerInfo;
+use crate::access::HolderName;
 
 /// A call that gets no permit within this time is refused.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -46,9 +46,9 @@ pub(crate) struct Permit {
 
 impl Caller {
     /// Returns the caller as noted by the access layer and the listener.
-    pub(crate) fn of(extensions: &Extensions) -> Self {
-        match (extensions.get::<Holder>(), extensions.get::<Peer>()) {
-            (Some(Holder(name)), _) => Self::Holder(name.clone()),
+    pub(crate) fn from_extensions(extensions: &Extensions) -> Self {
+        match (extensions.get::<HolderName>(), extensions.get::<PeerInfo>()) {
+            (Some(HolderName(name)), _) => Self::Holder(name.clone()),
             (None, Some(peer)) => Self::Connection(peer.connection),
             // Numbers of connections begin above 0.
             (None, None) => Self::Connection(0),
@@ -66,7 +66,7 @@ impl Limiter {
     ///
     /// # Errors
     /// `RESOURCE_EXHAUSTED` when there is no permit within the time limit.
-    pub(crate) async fn take(&self, caller: Caller) -> Result<Permit, Status> {
+    pub(crate) async fn acquire(&self, caller: Caller) -> Result<Permit, Status> {
         let own = self.own(caller);
         let both = async {
             // The caller's own permit comes first: whoever waits for it blocks nobody else.
@@ -81,20 +81,21 @@ impl Limiter {
     fn own(&self, caller: Caller) -> Arc<Semaphore> {
         // Nothing panics while the lock is held.
         let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
-        own.retain(|_, places| places.strong_count() > 0);
-        if let Some(places) = own.get(&caller).and_then(Weak::upgrade) {
-            return places;
+        own.retain(|_, semaphore| semaphore.strong_count() > 0);
+        if let Some(semaphore) = own.get(&caller).and_then(Weak::upgrade) {
+            return semaphore;
         }
-        let places = Arc::new(Semaphore::new(self.per_caller));
-        own.insert(caller, Arc::downgrade(&places));
-        places
+        let semaphore = Arc::new(Semaphore::new(self.per_caller));
+        own.insert(caller, Arc::downgrade(&semaphore));
+        semaphore
     }
 }
 
 fn full() -> Status {
     let waited = PATIENCE.as_secs();
     let message = format!(
-        "others have sent or fetched so much that no place was free for {waited} s; try again"
+        "too many large requests of other callers are in progress; this one waited {waited} s; \
+         try again"
     );
     status::resource_exhausted(message, RETRY)
 }
@@ -107,36 +108,37 @@ mod tests {
 
     use super::*;
 
-    async fn take(places: &Limiter, connection: u64) -> Result<Permit, Code> {
-        places.take(Caller::Connection(connection)).await.map_err(|status| status.code())
+    async fn acquire(limiter: &Limiter, connection: u64) -> Result<Permit, Code> {
+        limiter.acquire(Caller::Connection(connection)).await.map_err(|status| status.code())
     }
 
     #[tokio::test(start_paused = true)]
     async fn nobody_takes_all_and_nobody_waits_for_ever() {
-        let places = Limiter::new(3, 2);
-        let mut held = vec![take(&places, 1).await.unwrap(), take(&places, 1).await.unwrap()];
-        assert_eq!(take(&places, 1).await.unwrap_err(), Code::ResourceExhausted);
-        held.push(take(&places, 2).await.unwrap());
-        assert_eq!(take(&places, 3).await.unwrap_err(), Code::ResourceExhausted);
+        let limiter = Limiter::new(3, 2);
+        let mut held =
+            vec![acquire(&limiter, 1).await.unwrap(), acquire(&limiter, 1).await.unwrap()];
+        assert_eq!(acquire(&limiter, 1).await.unwrap_err(), Code::ResourceExhausted);
+        held.push(acquire(&limiter, 2).await.unwrap());
+        assert_eq!(acquire(&limiter, 3).await.unwrap_err(), Code::ResourceExhausted);
         drop(held.remove(0));
-        let per_caller = take(&places, 1).await.unwrap();
+        let per_caller = acquire(&limiter, 1).await.unwrap();
         drop((per_caller, held));
         // Callers that have gone are not remembered.
-        drop(take(&places, 4).await.unwrap());
-        let known: Vec<Caller> = places.own.lock().unwrap().keys().cloned().collect();
+        drop(acquire(&limiter, 4).await.unwrap());
+        let known: Vec<Caller> = limiter.own.lock().unwrap().keys().cloned().collect();
         assert_eq!(known, slice::from_ref(&Caller::Connection(4)));
     }
 
     #[tokio::test(start_paused = true)]
     async fn who_waits_for_an_own_place_is_in_nobodys_way() {
-        let places = Limiter::new(2, 1);
-        let _held = take(&places, 1).await.unwrap();
+        let limiter = Limiter::new(2, 1);
+        let _held = acquire(&limiter, 1).await.unwrap();
         let waiting = tokio::spawn({
-            let places = places.clone();
-            async move { take(&places, 1).await.map(drop) }
+            let limiter = limiter.clone();
+            async move { acquire(&limiter, 1).await.map(drop) }
         });
         tokio::task::yield_now().await;
-        assert!(timeout(Duration::ZERO, take(&places, 2)).await.is_ok());
+        assert!(timeout(Duration::ZERO, acquire(&limiter, 2)).await.is_ok());
         assert_eq!(waiting.await.unwrap(), Err(Code::ResourceExhausted));
     }
 }

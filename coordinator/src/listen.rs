@@ -14,7 +14,7 @@ use osteon_proto::identity::host_name;
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
 
-use crate::accept::Bound;
+use crate::accept::BoundSocket;
 use crate::access::Policy;
 use crate::tls::Tls;
 use crate::tokens::Tokens;
@@ -77,7 +77,7 @@ pub enum BindError {
     },
     /// The path exists and is not a socket.
     #[error(
-        "{} exists, is not a socket and is left as it is; choose another path",
+        "{} exists, is not a socket and is not changed; choose another path",
         path.display()
     )]
     NotASocket {
@@ -89,7 +89,7 @@ pub enum BindError {
 /// A bound address, ready to be served by [`crate::start`].
 #[derive(Debug)]
 pub struct Listener {
-    pub(crate) bound: Bound,
+    pub(crate) bound: BoundSocket,
     /// Present for a Unix socket.
     pub(crate) file: Option<SocketFile>,
     pub(crate) tls: Option<Tls>,
@@ -141,7 +141,7 @@ impl Listener {
             Some(host) if local.ip().is_unspecified() => format!("https://{host}:{}", local.port()),
             _ => format!("https://{local}"),
         };
-        let (bound, policy) = (Bound::Tcp(listener), Policy::Tls(tokens));
+        let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
         Ok(Self { bound, file: None, tls: Some(tls), policy, url })
     }
 
@@ -164,7 +164,7 @@ impl Listener {
         let refused = |source| BindError::Tcp { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let url = url(listener.local_addr().map_err(refused)?).await;
-        Ok(Self::open(Bound::Tcp(listener), None, url))
+        Ok(Self::open(BoundSocket::Tcp(listener), None, url))
     }
 
     async fn bind_unix(path: &Path) -> Result<Self, BindError> {
@@ -179,11 +179,11 @@ impl Listener {
         let identity = identity(path).map_err(refused)?;
         let file = SocketFile { path: path.to_owned(), identity };
         let url = format!("unix:{}", path.display());
-        Ok(Self::open(Bound::Unix(listener), Some(file), url))
+        Ok(Self::open(BoundSocket::Unix(listener), Some(file), url))
     }
 
     /// Returns a listener that admits everybody.
-    fn open(bound: Bound, file: Option<SocketFile>, url: String) -> Self {
+    fn open(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
         Self { bound, file, tls: None, policy: Policy::Everybody, url }
     }
 }

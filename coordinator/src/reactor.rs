@@ -42,7 +42,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let frees = !matches!(event, Event::Heartbeat { .. });
     apply(&mut turn, event);
     if frees {
-        dispatch::hand_out(&mut turn);
+        dispatch::dispatch(&mut turn);
     }
     if turn.state.draining && turn.state.unstored() == 0 {
         turn.effects.push(Effect::Stop);

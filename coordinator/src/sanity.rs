@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::batch::{Batch, Purpose};
 use crate::dispute::Dispute;
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::job::{Job, RequestName, Speculation, Stage};
 use crate::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
@@ -54,19 +54,19 @@ pub enum Inconsistency {
     #[error("the request id of job {0} leads elsewhere")]
     RequestId(JobId),
     /// A search has received more evaluations than the store has.
-    #[error("the search of job {0} was told more evaluations than are stored")]
+    #[error("the search of job {0} has more evaluations than the store")]
     Stored(JobId),
     /// The audits and disputes of an evaluation do not match the batches for them.
-    #[error("job {0} miscounts what is being checked")]
+    #[error("job {0} has a wrong count of the audits in progress")]
     Checks(JobId),
     /// A banned worker is attached, or one of its answers counts.
-    #[error("worker {0} is expelled, and still counts")]
+    #[error("worker {0} is banned, but its answers are still used")]
     Banned(WorkerName),
     /// A speculative evaluation is not of one of the candidate points.
-    #[error("job {0} is ahead with what its search does not ask for")]
+    #[error("job {0} has a speculative evaluation that is not a candidate of its search")]
     Speculation(JobId),
     /// The next identifier is not above all that are in use.
-    #[error("a number is about to be given twice")]
+    #[error("an identifier would be assigned twice")]
     Numbers,
 }
 
@@ -109,7 +109,7 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
         if job.search.evaluations() > job.stored {
             return Err(Inconsistency::Stored(id));
         }
-        let request = RequestName::of(&job.record);
+        let request = RequestName::from_record(&job.record);
         if request.is_some_and(|request| state.requests.get(&request) != Some(&id)) {
             return Err(Inconsistency::RequestId(id));
         }
@@ -139,7 +139,7 @@ fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
-    let known = |of: &Evaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
+    let known = |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
     let fits = evaluations.iter().all(known)
         && points.len() == job.evaluations().count()
         && candidates.len() <= CANDIDATES_MAX
@@ -149,13 +149,17 @@ fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
 }
 
 /// Returns whether a batch belongs to this evaluation.
-fn is_of(batch: &Batch, job: JobId, evaluation: &Evaluation) -> bool {
+fn is_of(batch: &Batch, job: JobId, evaluation: &PendingEvaluation) -> bool {
     batch.assignment.job == job && batch.assignment.attempt == evaluation.attempt
 }
 
 /// Checks that audits and tie-breakers are held by workers, and that no answer of a banned worker
 /// counts.
-fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<(), Inconsistency> {
+fn check_checks(
+    state: &State,
+    job: JobId,
+    evaluation: &PendingEvaluation,
+) -> Result<(), Inconsistency> {
     let with = |purpose: fn(&Purpose) -> bool| {
         let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
         state.batches.values().filter(of).count()
@@ -179,7 +183,7 @@ fn check_checks(state: &State, job: JobId, evaluation: &Evaluation) -> Result<()
     for Banned { record, .. } in &state.banned {
         let name = &record.worker;
         let attached = state.workers.values().any(|worker| worker.name == *name);
-        let disputes = disputes.iter().any(|dispute| dispute.involves(name));
+        let disputes = disputes.iter().any(|dispute| dispute.has_vote_of(name));
         let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
         if attached || disputes || told || evaluation.workers.contains(name) {
             return Err(Inconsistency::Banned(name.clone()));
@@ -250,7 +254,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
 fn check_evaluation(
     state: &State,
     job: JobId,
-    evaluation: &Evaluation,
+    evaluation: &PendingEvaluation,
 ) -> Result<(), Inconsistency> {
     let mut places: Vec<u32> =
         evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();

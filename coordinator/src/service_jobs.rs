@@ -11,11 +11,11 @@ use osteon_common::limits::{
 use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
-    BackupRequest, BackupResponse, CancelRequest, CancelResponse, DrainWorkerRequest,
-    DrainWorkerResponse, ExpelledWorker, FetchRequest, FetchResponse, GetRequest, GetResponse,
-    JobSnapshot, ListExpelledRequest, ListExpelledResponse, ListRequest, ListResponse,
-    ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest,
-    SubmitResponse, WatchRequest, WatchResponse,
+    BackupRequest, BackupResponse, BannedWorker, CancelRequest, CancelResponse, DrainWorkerRequest,
+    DrainWorkerResponse, FetchRequest, FetchResponse, GetRequest, GetResponse, JobSnapshot,
+    ListBansRequest, ListBansResponse, ListRequest, ListResponse, ListWorkersRequest,
+    ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest,
+    WatchResponse,
 };
 use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -23,7 +23,7 @@ use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
-use crate::access::Holder;
+use crate::access::HolderName;
 use crate::backing_up;
 use crate::core_task::Message;
 use crate::effect::{Answer, Refusal};
@@ -34,7 +34,7 @@ use crate::ids::{JobId, WorkerId};
 use crate::limiter::{Caller, Limiter};
 use crate::observers;
 use crate::store::EndRecord;
-use crate::store_thread::Command;
+use crate::store_thread::StoreCommand;
 
 /// Maximum number of jobs in one page.
 const PAGE_JOBS_MAX: u32 = 1000;
@@ -48,7 +48,7 @@ const RETRY: Duration = Duration::from_secs(10);
 /// The gRPC service for clients.
 pub(crate) struct JobsService {
     messages: mpsc::Sender<Message>,
-    store: mpsc::Sender<Command>,
+    store: mpsc::Sender<StoreCommand>,
     /// Permits of fetches: the output of a job may be large, so that of only a few is held in
     /// memory at a time.
     fetches: Limiter,
@@ -60,7 +60,7 @@ pub(crate) struct JobsService {
 type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
-    pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<Command>) -> Self {
+    pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<StoreCommand>) -> Self {
         let fetches = Limiter::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
         Self { messages, store, fetches, backups: Arc::new(Semaphore::new(1)) }
     }
@@ -120,7 +120,7 @@ impl Jobs for JobsService {
         &self,
         request: Request<SubmitRequest>,
     ) -> Result<Response<SubmitResponse>, Status> {
-        let holder = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
+        let holder = request.extensions().get::<HolderName>().map(|HolderName(name)| name.clone());
         let SubmitRequest { specification: message, request_id, client, priority, name } =
             request.into_inner();
         // A token determines the client's name, whatever the message says.
@@ -162,7 +162,7 @@ impl Jobs for JobsService {
             token => Some(JobId::parse(token).ok_or_else(|| {
                 status::bad_field(
                     "page_token",
-                    "is not one that List returned; leave it empty for the first page",
+                    "is not a page token that List returned; leave it empty for the first page",
                 )
             })?),
         };
@@ -192,7 +192,7 @@ impl Jobs for JobsService {
         &self,
         request: Request<CancelRequest>,
     ) -> Result<Response<CancelResponse>, Status> {
-        let user = request.extensions().get::<Holder>().map(|Holder(name)| name.clone());
+        let user = request.extensions().get::<HolderName>().map(|HolderName(name)| name.clone());
         let job = job(&request.into_inner().job)?;
         tracing::info!(%job, user, "job is to be cancelled");
         let cancelled = self.snapshot(event::Request::Cancel(job));
@@ -207,12 +207,12 @@ impl Jobs for JobsService {
         &self,
         request: Request<FetchRequest>,
     ) -> Result<Response<Self::FetchStream>, Status> {
-        let caller = Caller::of(request.extensions());
+        let caller = Caller::from_extensions(request.extensions());
         let job = job(&request.into_inner().job)?;
-        let place = self.fetches.take(caller).await?;
+        let permit = self.fetches.acquire(caller).await?;
         let end = self.end(job).await?;
         let store = self.store.downgrade();
-        let sent = fetching::paced(place, |reader| fetching::send_all(store, end, reader));
+        let sent = fetching::paced(permit, |reader| fetching::send_all(store, end, reader));
         Ok(Response::new(Box::pin(sent)))
     }
 
@@ -240,12 +240,12 @@ impl Jobs for JobsService {
     ) -> Result<Response<Self::BackupStream>, Status> {
         let place = Arc::clone(&self.backups).try_acquire_owned().map_err(|_| {
             status::resource_exhausted(
-                "another backup is under way; try again when it ended",
+                "another backup is in progress; try again when it has ended",
                 RETRY,
             )
         })?;
         let (reply, copied) = oneshot::channel();
-        self.store.send(Command::Copy { reply }).await.map_err(|_| stopped())?;
+        self.store.send(StoreCommand::Copy { reply }).await.map_err(|_| stopped())?;
         Ok(Response::new(Box::pin(backing_up::streamed(copied, place))))
     }
 
@@ -272,21 +272,21 @@ impl Jobs for JobsService {
         }
     }
 
-    async fn list_expelled(
+    async fn list_bans(
         &self,
-        _: Request<ListExpelledRequest>,
-    ) -> Result<Response<ListExpelledResponse>, Status> {
+        _: Request<ListBansRequest>,
+    ) -> Result<Response<ListBansResponse>, Status> {
         let Answer::Banned(banned) = self.ask(event::Request::Banned).await? else {
             return Err(unexpected());
         };
-        let workers = banned.into_iter().map(|(record, elapsed)| ExpelledWorker {
+        let workers = banned.into_iter().map(|(record, elapsed)| BannedWorker {
             host: record.worker.host().to_owned(),
             process: record.worker.process(),
             job: record.job.to_string(),
             reason: record.reason,
             elapsed_s: elapsed.as_secs_f64(),
         });
-        Ok(Response::new(ListExpelledResponse { workers: workers.collect() }))
+        Ok(Response::new(ListBansResponse { workers: workers.collect() }))
     }
 }
 
@@ -326,7 +326,7 @@ fn stopped() -> Status {
 }
 
 fn unexpected() -> Status {
-    Status::internal("the coordinator answered another question than was asked")
+    Status::internal("the coordinator gave an answer of another type than requested")
 }
 
 #[cfg(test)]

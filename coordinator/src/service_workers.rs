@@ -102,7 +102,7 @@ async fn forward(
             Some(Ok(message)) => event(worker, message),
             None => return,
             Some(Err(status)) => {
-                tracing::debug!(%worker, %status, "a worker's stream broke");
+                tracing::debug!(%worker, %status, "the stream of a worker broke");
                 return;
             }
         };

@@ -23,14 +23,14 @@ use crate::access_layer::AccessLayer;
 use crate::audit::AuditKey;
 use crate::config::Config;
 use crate::core_task::{Clock, Core, Message};
-use crate::failing::{Failed, Failing, Guard};
+use crate::failing::{ComponentFailure, FailureReporter, Guard};
 use crate::listen::Listener;
 use crate::reactor::Restored;
 use crate::service_jobs::JobsService;
 use crate::service_workers::WorkersService;
 use crate::state::State;
 use crate::store::{Store, StoreError};
-use crate::store_thread::{self, Command};
+use crate::store_thread::{self, StoreCommand};
 use crate::tls::Tls;
 use crate::tokens::Tokens;
 
@@ -78,7 +78,7 @@ pub enum StartError {
 #[derive(Debug)]
 pub struct Coordinator {
     url: String,
-    failing: Failing,
+    failing: FailureReporter,
     messages: mpsc::Sender<Message>,
     policy: watch::Sender<Arc<Policy>>,
     tls: Option<watch::Sender<Tls>>,
@@ -107,24 +107,25 @@ pub async fn start(
     tracing::info!(
         unfinished_jobs = restored.unfinished(),
         ended_jobs = restored.ended(),
-        expelled_workers = restored.banned(),
+        banned_workers = restored.banned(),
         "jobs recovered from the store"
     );
     let (state, effects) = State::restore(config, restored, clock.now());
 
-    let failing = Failing::new();
+    let failing = FailureReporter::new();
     let (messages, inbox) = mpsc::channel(EVENTS_MAX);
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
-    let (commands, store) = store_thread::start(store, events, failing.guard(Failed::Store))
-        .map_err(|source| StartError::Thread { source })?;
+    let (commands, store) =
+        store_thread::start(store, events, failing.guard(ComponentFailure::Store))
+            .map_err(|source| StartError::Thread { source })?;
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
     let server = serve(router, listener, shown, stopped);
-    let server = tokio::spawn(guarded(failing.guard(Failed::Server), server));
-    let guard = failing.guard(Failed::Core);
+    let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
+    let guard = failing.guard(ComponentFailure::Core);
     let core = Core::new(state, clock, commands, failing.clone());
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
@@ -171,7 +172,7 @@ impl Coordinator {
     /// Waits until a part of the coordinator has ended unexpectedly, or the store has refused a
     /// record for [`Config::store_give_up_after`]; otherwise the future never completes. The coordinator
     /// cannot continue then: shut it down and report the reason.
-    pub fn failed(&self) -> impl Future<Output = Failed> + Send + use<> {
+    pub fn failed(&self) -> impl Future<Output = ComponentFailure> + Send + use<> {
         self.failing.first()
     }
 
@@ -214,7 +215,7 @@ async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
 /// Builds the services of one port.
 async fn services(
     messages: &mpsc::Sender<Message>,
-    commands: &mpsc::Sender<Command>,
+    commands: &mpsc::Sender<StoreCommand>,
     policy: watch::Receiver<Arc<Policy>>,
     config: Config,
 ) -> Result<GuardedRouter, StartError> {

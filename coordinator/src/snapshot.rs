@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const UNFIT_SHOWN_MAX: usize = 3;
 
 /// Returns the snapshot of `id` at `now`; `None` if no client can know the job yet.
-pub(crate) fn of(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
+pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
     if let Some(job) = state.ended.get(&id) {
         return Some(ended(state, job));
     }

@@ -13,7 +13,7 @@ use osteon_proto::evaluation;
 
 use crate::batch::{Assignment, Batch, Purpose};
 use crate::config::Config;
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::event::Hello;
 use crate::fairness::Shares;
 use crate::ids::{BatchId, JobId, LeaseId, WorkerId};
@@ -65,7 +65,7 @@ pub struct State {
     pub(crate) started: Duration,
     /// Time of the last search for jobs to prune; `None` if there was none.
     pub(crate) pruned: Option<Duration>,
-    pub(crate) workers: BTreeMap<WorkerId, Worker>,
+    pub(crate) workers: BTreeMap<WorkerId, AttachedWorker>,
     /// The workers that departed last, newest at the end, at most [`DEPARTED_MAX`].
     pub(crate) departed: VecDeque<Departed>,
     /// Workers that returned wrong answers, in the order of their detection.
@@ -123,7 +123,7 @@ pub(crate) struct Departed {
 
 /// One stay of a worker, from its attachment to its departure.
 #[derive(Debug)]
-pub(crate) struct Worker {
+pub(crate) struct AttachedWorker {
     pub(crate) lease: LeaseId,
     pub(crate) name: WorkerName,
     pub(crate) hello: Hello,
@@ -231,7 +231,7 @@ impl State {
     }
 
     /// Returns the evaluation that the job's search asked for, while it is under way.
-    pub(crate) fn evaluation_mut(&mut self, job: JobId) -> Option<&mut Evaluation> {
+    pub(crate) fn evaluation_mut(&mut self, job: JobId) -> Option<&mut PendingEvaluation> {
         match &mut self.jobs.get_mut(&job)?.stage {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
@@ -239,13 +239,16 @@ impl State {
     }
 
     /// Returns the evaluation of an assignment while this attempt at it is under way.
-    pub(crate) fn evaluation_of(&self, assignment: &Assignment) -> Option<&Evaluation> {
+    pub(crate) fn evaluation_of(&self, assignment: &Assignment) -> Option<&PendingEvaluation> {
         let job = self.jobs.get(&assignment.job)?;
         job.evaluations().find(|found| found.attempt == assignment.attempt)
     }
 
     /// As [`State::evaluation_of`].
-    pub(crate) fn evaluation_of_mut(&mut self, assignment: &Assignment) -> Option<&mut Evaluation> {
+    pub(crate) fn evaluation_of_mut(
+        &mut self,
+        assignment: &Assignment,
+    ) -> Option<&mut PendingEvaluation> {
         let job = self.jobs.get_mut(&assignment.job)?;
         job.evaluations_mut().find(|found| found.attempt == assignment.attempt)
     }
@@ -298,20 +301,20 @@ impl State {
     }
 
     /// Returns whether a worker accepts batches and is expected to answer them.
-    pub(crate) fn is_sound(&self, worker: &Worker) -> bool {
+    pub(crate) fn is_sound(&self, worker: &AttachedWorker) -> bool {
         !worker.draining && !self.probation.has(&worker.name)
     }
 
     /// Returns whether a worker that satisfies `of` accepts batches and is expected to answer them.
     pub(crate) fn answers_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
-        let answers = |worker: &Worker| of(&worker.name) && self.is_sound(worker);
+        let answers = |worker: &AttachedWorker| of(&worker.name) && self.is_sound(worker);
         !self.draining && self.workers.values().any(answers)
     }
 
     /// Returns the batches that a worker holds for one purpose.
     pub(crate) fn held_for<'a>(
         &'a self,
-        worker: &'a Worker,
+        worker: &'a AttachedWorker,
         purpose: Purpose,
     ) -> impl Iterator<Item = BatchId> + 'a {
         let is_for =

@@ -155,7 +155,7 @@ pub enum StoreError {
     /// The lock file, which names the process that has the store open, cannot be written.
     #[error(
         "cannot write and lock {}: {error}; give the coordinator's user write permission to its \
-         directory, or choose another one, on a disk that knows locks",
+         directory, or choose another directory, on a disk that supports file locks",
         path.display()
     )]
     Lock {
@@ -174,7 +174,8 @@ pub enum StoreError {
     },
     /// The file cannot be created.
     #[error(
-        "cannot make {}: {error}; give the coordinator's user write permission to its directory, or \
+        "cannot make {}: {error}; give the coordinator's user write permission to its directory, \
+         or \
          choose another directory",
         path.display()
     )]
@@ -242,7 +243,7 @@ pub enum StoreError {
     #[error("this coordinator keeps its jobs in memory; there is nothing to copy")]
     NoFile,
     /// A copy of it cannot be made or removed.
-    #[error("{} cannot be made or removed: {error}; look at its directory", path.display())]
+    #[error("{} cannot be created or removed: {error}; check its directory", path.display())]
     Copy {
         /// The file of the copy.
         path: PathBuf,
@@ -262,7 +263,7 @@ pub enum StoreError {
     },
     /// It holds tables of another program.
     #[error(
-        "{} is a database of another program and is left as it is; choose another directory",
+        "{} is a database of another program and is not changed; choose another directory",
         path.display()
     )]
     Foreign {
@@ -271,7 +272,8 @@ pub enum StoreError {
     },
     /// It was written by a version of osteon with another format.
     #[error(
-        "{}: this store has format {found}; this version writes {known}: run the version that wrote \
+        "{}: this store has format {found}; this version writes {known}: run the version that \
+         wrote \
          it, or choose another directory",
         path.display()
     )]
@@ -286,7 +288,7 @@ pub enum StoreError {
     /// The mark of acknowledged jobs cannot be read or written.
     #[error(
         "cannot read or write {}: {error}; give the coordinator's user write permission to it and \
-         its directory, and see that its disk is sound",
+         its directory, and check its disk",
         path.display()
     )]
     Mark {
@@ -297,8 +299,8 @@ pub enum StoreError {
     },
     /// The mark of acknowledged jobs is damaged.
     #[error(
-        "{} is damaged: it cannot be determined whether acknowledged jobs are missing; look at the disk, \
-         restore the store from a copy, or start with --accept-lost-jobs",
+        "{} is damaged: it cannot be determined whether acknowledged jobs are missing; check the \
+         disk, restore the store from a copy, or start with --accept-lost-jobs",
         path.display()
     )]
     MarkDamaged {
@@ -307,8 +309,8 @@ pub enum StoreError {
     },
     /// Jobs that clients had been told were accepted are missing.
     #[error(
-        "{} has lost {}, which had been accepted: its write-ahead log was cut short or damaged, or \
-         an older copy of it was put in place; look at the disk, restore the store from a copy, or \
+        "{} has lost {}, which had been accepted: its write-ahead log was cut short or damaged, \
+         or it was replaced by an older copy; check the disk, restore the store from a copy, or \
          start with --accept-lost-jobs to go on without them",
         path.display(),
         if first == last { format!("job {first}") } else { format!("jobs {first} to {last}") }
@@ -369,12 +371,12 @@ pub enum DamagedRecord {
     #[error("the summary")]
     Summary,
     /// The ban of a worker that gave a wrong answer in the job.
-    #[error("the expulsion of a worker, found in a realization")]
+    #[error("the ban of a worker, found in a realization")]
     Ban,
 }
 
 /// Callback between two pieces of a copy; `Break` ends the copy.
-pub type Between<'a> = dyn FnMut(&mut dyn Store) -> ControlFlow<()> + 'a;
+pub type BetweenPieces<'a> = dyn FnMut(&mut dyn Store) -> ControlFlow<()> + 'a;
 
 /// Durable storage for jobs.
 pub trait Store {
@@ -395,7 +397,7 @@ pub trait Store {
     ///
     /// # Errors
     /// When the store is not a file or cannot be read, or the copy cannot be written beside it.
-    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+    fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {
         // A store that copies nothing never calls it.
         let _ = between;
         Err(StoreError::NoFile)
@@ -471,7 +473,7 @@ pub trait Store {
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError>;
+    fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError>;
 
     /// Makes the ban of a worker durable.
     ///
@@ -489,11 +491,11 @@ pub trait Store {
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
+    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
 
     /// Deletes all bans.
     ///
     /// # Errors
     /// When that is not durable.
-    fn forget_bans(&mut self) -> Result<(), StoreError>;
+    fn delete_bans(&mut self) -> Result<(), StoreError>;
 }

@@ -14,7 +14,7 @@ use crate::effect::Record;
 use crate::event::{Event, ReadFailure};
 use crate::failing::Guard;
 use crate::ids::{JobId, Token};
-use crate::job_output::Reading;
+use crate::job_output::ReadRequest;
 use crate::store::{BanRecord, Store, StoreError};
 
 /// Maximum number of waiting commands: a record for every job, and some reads.
@@ -24,7 +24,7 @@ const COMMANDS_MAX: usize = JOBS_MAX + 64;
 const COMMANDS_BETWEEN: usize = 64;
 
 /// A command for the store.
-pub(crate) enum Command {
+pub(crate) enum StoreCommand {
     /// Make a record durable.
     Put(Record),
     /// Read an evaluation of a job.
@@ -32,7 +32,7 @@ pub(crate) enum Command {
     /// Delete ended jobs.
     Prune { token: Option<Token>, jobs: Vec<JobId> },
     /// Read a record of an ended job's output.
-    Fetch(Reading),
+    Fetch(ReadRequest),
     /// Copy the whole store.
     Copy { reply: CopyReply },
 }
@@ -42,7 +42,7 @@ pub(crate) fn start(
     mut store: Box<dyn Store + Send>,
     events: mpsc::Sender<Event>,
     guard: Guard,
-) -> std::io::Result<(mpsc::Sender<Command>, JoinHandle<()>)> {
+) -> std::io::Result<(mpsc::Sender<StoreCommand>, JoinHandle<()>)> {
     let (sender, mut commands) = mpsc::channel(COMMANDS_MAX);
     let serve = move || {
         let _guard = guard;
@@ -57,7 +57,7 @@ pub(crate) fn start(
 /// longer than it takes to read one piece.
 pub(crate) fn serve(
     store: &mut dyn Store,
-    commands: &mut mpsc::Receiver<Command>,
+    commands: &mut mpsc::Receiver<StoreCommand>,
     events: &mpsc::Sender<Event>,
 ) {
     let mut desk = PendingWork { events, readings: VecDeque::new(), copies: VecDeque::new() };
@@ -70,7 +70,7 @@ pub(crate) fn serve(
         } else {
             commands.try_recv().ok()
         };
-        let others_first = matches!(command, Some(Command::Fetch(_)));
+        let others_first = matches!(command, Some(StoreCommand::Fetch(_)));
         if let Some(command) = command {
             desk.run(store, command);
         }
@@ -91,26 +91,26 @@ pub(crate) type CopyReply = oneshot::Sender<Result<Option<File>, StoreError>>;
 struct PendingWork<'a> {
     events: &'a mpsc::Sender<Event>,
     /// As many as there are fetches under way.
-    readings: VecDeque<Reading>,
+    readings: VecDeque<ReadRequest>,
     /// One copy, and perhaps another whose reader has gone.
     copies: VecDeque<CopyReply>,
 }
 
 impl PendingWork<'_> {
-    fn run(&mut self, store: &mut dyn Store, command: Command) {
+    fn run(&mut self, store: &mut dyn Store, command: StoreCommand) {
         match command {
             // The receiver is gone when the coordinator has stopped.
-            Command::Put(record) => drop(self.events.blocking_send(put(store, &record))),
-            Command::Read { job, number } => {
+            StoreCommand::Put(record) => drop(self.events.blocking_send(put(store, &record))),
+            StoreCommand::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
                 drop(self.events.blocking_send(Event::Read { job, number, found }));
             }
-            Command::Prune { token, jobs } => {
+            StoreCommand::Prune { token, jobs } => {
                 let outcome = store.delete_jobs(&jobs).map_err(|error| error.to_string());
                 drop(self.events.blocking_send(Event::Pruned { token, jobs, outcome }));
             }
-            Command::Fetch(reading) => self.readings.push_back(reading),
-            Command::Copy { reply } => self.copies.push_back(reply),
+            StoreCommand::Fetch(reading) => self.readings.push_back(reading),
+            StoreCommand::Copy { reply } => self.copies.push_back(reply),
         }
     }
 
@@ -125,7 +125,7 @@ impl PendingWork<'_> {
     fn copy(
         &mut self,
         store: &mut dyn Store,
-        commands: &mut mpsc::Receiver<Command>,
+        commands: &mut mpsc::Receiver<StoreCommand>,
         reply: CopyReply,
     ) {
         let copied = store.copy(&mut |store: &mut dyn Store| {
@@ -180,7 +180,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
 fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
     store.put_ban(record)?;
     // Logging is a courtesy: if its query fails, the stored ban remains.
-    let ended = store.ended_with(&record.worker).unwrap_or_default();
+    let ended = store.ended_jobs_of(&record.worker).unwrap_or_default();
     if !ended.is_empty() {
         let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();
         tracing::error!(worker = %record.worker, jobs = jobs.join(" "),

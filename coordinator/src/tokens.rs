@@ -30,7 +30,7 @@ pub struct Tokens(Vec<Entry>);
 
 /// Holder of a token.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Holder {
+pub struct TokenHolder {
     /// The name, for logs.
     pub name: String,
     /// The holder's permissions.
@@ -39,7 +39,7 @@ pub struct Holder {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Entry {
-    holder: Holder,
+    holder: TokenHolder,
     hash: TokenHash,
 }
 
@@ -137,7 +137,7 @@ impl Tokens {
     /// When the file cannot be used.
     pub fn with_admin(mut self, path: &Path) -> Result<Self, TokensError> {
         let token = credential_file::token(path)?;
-        let holder = Holder { name: "token-file".to_owned(), role: Role::Admin };
+        let holder = TokenHolder { name: "token-file".to_owned(), role: Role::Admin };
         self.0.push(Entry { holder, hash: token.hash() });
         Ok(self)
     }
@@ -148,7 +148,7 @@ impl Tokens {
     }
 
     /// Returns the holder of a token. Every hash is compared, each in constant time.
-    pub fn holder(&self, text: &str) -> Option<&Holder> {
+    pub fn holder(&self, text: &str) -> Option<&TokenHolder> {
         let hash = Token::parse(text).ok()?.hash();
         let mut found = None;
         for entry in &self.0 {
@@ -230,7 +230,7 @@ fn entry(text: &str) -> Result<Entry, LineFault> {
         return Err(LineFault::TokenItself { name });
     }
     let Some(hash) = TokenHash::parse(hash) else { return Err(LineFault::Hash { name }) };
-    Ok(Entry { holder: Holder { name, role }, hash })
+    Ok(Entry { holder: TokenHolder { name, role }, hash })
 }
 
 #[cfg(test)]

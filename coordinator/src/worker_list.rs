@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use osteon_proto::timestamp;
-use osteon_proto::v1::{DepartedWorker, ListWorkersResponse, WorkerSnapshot, WorkerStanding};
+use osteon_proto::v1::{DepartedWorker, ListWorkersResponse, WorkerSnapshot, WorkerState};
 
 use crate::ids::WorkerId;
-use crate::state::{Departed, State, Worker};
+use crate::state::{AttachedWorker, Departed, State};
 
 /// Returns the attached workers, and those that departed last.
 pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
@@ -17,21 +17,25 @@ pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
 }
 
 /// Returns the snapshot of a worker; `None` if it is not attached.
-pub(crate) fn of(state: &State, worker: WorkerId, now: Duration) -> Option<WorkerSnapshot> {
+pub(crate) fn worker_snapshot(
+    state: &State,
+    worker: WorkerId,
+    now: Duration,
+) -> Option<WorkerSnapshot> {
     state.workers.get(&worker).map(|attached| snapshot(state, worker, attached, now))
 }
 
-fn snapshot(state: &State, id: WorkerId, worker: &Worker, now: Duration) -> WorkerSnapshot {
+fn snapshot(state: &State, id: WorkerId, worker: &AttachedWorker, now: Duration) -> WorkerSnapshot {
     let held = worker.in_flight.iter().filter_map(|batch| state.batches.get(batch));
     let oldest = held.map(|batch| batch.sent).min();
-    let standing = if worker.draining {
-        WorkerStanding::Draining
+    let worker_state = if worker.draining {
+        WorkerState::Draining
     } else if state.is_failing(worker.name.host()) {
-        WorkerStanding::Distrusted
+        WorkerState::Distrusted
     } else if state.probation.has(&worker.name) {
-        WorkerStanding::Probation
+        WorkerState::Probation
     } else {
-        WorkerStanding::Ok
+        WorkerState::Ok
     };
     WorkerSnapshot {
         worker: id.0,
@@ -44,7 +48,7 @@ fn snapshot(state: &State, id: WorkerId, worker: &Worker, now: Duration) -> Work
         realizations_per_second: worker.rate.per_second(now),
         batches: u32::try_from(worker.in_flight.len()).unwrap_or(u32::MAX),
         oldest_batch_s: oldest.map(|sent| now.saturating_sub(sent).as_secs_f64()),
-        standing: standing.into(),
+        state: worker_state.into(),
     }
 }
 

@@ -1,5 +1,5 @@
 //! A wall clock that jumps. Within one run of a coordinator time is monotonic: the wall clock is
-//! read once, at the start. Between two runs it may have been set to anything, years before or
+//! read once, at the start. BetweenPieces two runs it may have been set to anything, years before or
 //! after the times in the store.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]

@@ -259,7 +259,7 @@ fn lost_jobs_that_are_accepted_leave_their_numbers_unused() {
     let (directory, store) = opened(&image, LostJobs::Accept);
     let mut store = store.unwrap();
     assert_eq!(numbers(&mut store), [1, 2]);
-    assert_eq!(store.last_forgotten().unwrap(), Some(JobId(6)));
+    assert_eq!(store.last_deleted_job().unwrap(), Some(JobId(6)));
     drop(store);
     drop(SqliteStore::open(directory.path()).unwrap());
     // A damaged mark does not tell which jobs must be there.

@@ -39,7 +39,7 @@ fn check(mut open: impl FnMut() -> Box<dyn Store>) {
     // Deleting an older job does not lower it.
     open().delete_jobs(&[JobId(3)]).unwrap();
     open().delete_jobs(&[JobId(1)]).unwrap();
-    assert_eq!(open().last_forgotten().unwrap(), Some(JobId(3)));
+    assert_eq!(open().last_deleted_job().unwrap(), Some(JobId(3)));
     assert_eq!(next(&mut *open()), JobId(4));
 }
 

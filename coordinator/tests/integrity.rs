@@ -19,7 +19,7 @@ use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
-    AttachRequest, FetchRequest, GetRequest, JobState, ListExpelledRequest, PruneRequest,
+    AttachRequest, FetchRequest, GetRequest, JobState, ListBansRequest, PruneRequest,
     SubmitRequest, WatchRequest,
 };
 use osteon_proto::{batch, specification};
@@ -116,7 +116,7 @@ async fn a_liar_leaves_no_trace_and_stays_out() {
     let expected = fake::plain_run(&specification);
     let found = left(&mut client, &job).await.unwrap();
     assert_eq!(found, (expected.digest, expected.status));
-    let listed = client.list_expelled(ListExpelledRequest {}).await.unwrap().into_inner().workers;
+    let listed = client.list_bans(ListBansRequest {}).await.unwrap().into_inner().workers;
     assert_eq!(listed.len(), 1, "{listed:?}");
     assert_eq!((listed[0].host.as_str(), listed[0].process, &listed[0].job), ("node", LIAR, &job));
     assert!(listed[0].reason.contains(" agree on "), "{listed:?}");

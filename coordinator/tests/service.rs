@@ -16,7 +16,7 @@ use osteon_coordinator::store::{
     BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use osteon_coordinator::worker_name::WorkerName;
-use osteon_coordinator::{Config, Coordinator, Failed, Listener, start};
+use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
@@ -365,8 +365,8 @@ impl Store for BrokenStore {
         self.sound.delete_jobs(jobs)
     }
 
-    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
-        self.sound.last_forgotten()
+    fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError> {
+        self.sound.last_deleted_job()
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
@@ -377,18 +377,18 @@ impl Store for BrokenStore {
         self.sound.bans()
     }
 
-    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        self.sound.ended_with(worker)
+    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        self.sound.ended_jobs_of(worker)
     }
 
-    fn forget_bans(&mut self) -> Result<(), StoreError> {
-        self.sound.forget_bans()
+    fn delete_bans(&mut self) -> Result<(), StoreError> {
+        self.sound.delete_bans()
     }
 }
 
 /// Returns a coordinator whose store accepts no evaluation, and its job, once the coordinator has
 /// reported the failure.
-async fn failed(dies: bool) -> (Coordinator, MemoryStore, String, Failed) {
+async fn failed(dies: bool) -> (Coordinator, MemoryStore, String, ComponentFailure) {
     let sound = MemoryStore::new();
     let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
     let config = Config {
@@ -425,7 +425,7 @@ async fn a_store_that_refuses_is_told_and_leaves_the_job_unfinished() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_store_whose_thread_dies_is_told() {
     let (coordinator, _, _, failed) = failed(true).await;
-    assert_eq!(failed, Failed::Store);
+    assert_eq!(failed, ComponentFailure::Store);
     coordinator.shutdown().await;
 }
 

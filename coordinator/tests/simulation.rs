@@ -40,7 +40,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
     // A simulation in which nothing goes wrong would test nothing.
     if seeds.end - seeds.start == SCHEDULES {
         let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
-        let world::Counts { ahead, dropped, swallowed, .. } = seen;
+        let world::Counts { ahead, dropped, ignored, .. } = seen;
         for (name, count) in [
             ("workers lost", lost),
             ("batches revoked", revoked),
@@ -49,7 +49,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("restarts", restarts),
             ("refusals of the store", refusals),
             ("batches computed again to compare", checked),
-            ("batches that are never answered", swallowed),
+            ("batches that are never answered", ignored),
             ("points computed ahead of their search", ahead),
             ("points computed ahead that no search asked for", dropped),
         ] {
@@ -62,7 +62,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("jobs cancelled", cancelled),
             ("outages of the store", outages),
             ("wrong answers", lies),
-            ("workers expelled", banned),
+            ("workers banned", banned),
             ("jobs forgotten", pruned),
             ("deaths on a bad node", bad_deaths),
             ("pauses of the coordinator", pauses),
@@ -75,7 +75,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("jobs failed over contradicting answers", exposed),
             ("stored evaluations replaced by others", replaced),
             ("stored evaluations computed again and the same", confirmed),
-            ("restarts with expelled workers", remembered),
+            ("restarts with banned workers", remembered),
             ("jobs that ended right although somebody lied", repaired),
         ] {
             assert!(count > SCHEDULES / 200, "{name}: {count}");

@@ -29,7 +29,7 @@ const SOON: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 struct Run {
     time: Duration,
-    swallowed: u64,
+    ignored: u64,
 }
 
 /// Runs a job over `sound` workers of two threads; before them attach so many faulty ones that do
@@ -49,7 +49,7 @@ fn run(
     let ended = clockwork.run(std::slice::from_ref(job));
     // Compared as text: an unknown standard error is NaN, which is not equal to itself.
     assert_eq!(format!("{:?}", ended[0].result), format!("{:?}", fake::plain_run(job)));
-    Run { time: ended[0].at, swallowed: clockwork.swallowed }
+    Run { time: ended[0].at, ignored: clockwork.ignored }
 }
 
 fn jobs() -> [JobSpecification; 3] {
@@ -72,7 +72,7 @@ fn workers_that_never_answer_cost_seconds() {
                         "{faulty} of {sound} more, audits {audit_fraction}: {undisturbed:?}, \
                          {disturbed:?}"
                     );
-                    assert!(disturbed.swallowed >= 2 * faulty as u64, "{disturbed:?}");
+                    assert!(disturbed.ignored >= 2 * faulty as u64, "{disturbed:?}");
                     // Each faulty worker misses three, and then one now and then.
                     let delay = disturbed.time.saturating_sub(undisturbed.time);
                     assert!(delay < 8 * (OVERDUE + SOON), "{delay:?}");
@@ -90,9 +90,9 @@ fn each_batch_that_is_not_answered_costs_seconds() {
                 let undisturbed = run(sound, (0, 1), audit_fraction, &job);
                 let disturbed = run(sound, (sound, 7), audit_fraction, &job);
                 println!("{sound} sound, audits {audit_fraction}: {undisturbed:?}, {disturbed:?}");
-                assert!(disturbed.swallowed > 0, "{disturbed:?}");
+                assert!(disturbed.ignored > 0, "{disturbed:?}");
                 let delay = disturbed.time.saturating_sub(undisturbed.time);
-                let bound = (OVERDUE + SOON) * disturbed.swallowed as u32;
+                let bound = (OVERDUE + SOON) * disturbed.ignored as u32;
                 assert!(delay < bound, "{delay:?} and not {bound:?}");
             }
         }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX};
-use osteon_common::outcome::{self, Solved};
+use osteon_common::outcome::{self, RealizationResult};
 
 use crate::announced::Received;
 use crate::evaluation::Evaluation;
@@ -49,7 +49,7 @@ pub fn from_message(message: &v1::Batch, received: &Received) -> Result<Work, Ma
 
 /// Returns the answer to batch number `batch`: its realizations in index order, and the wall time
 /// in seconds that they took.
-pub fn answer_to_message(batch: u64, solved: &[Solved], elapsed_s: f64) -> v1::BatchResult {
+pub fn answer_to_message(batch: u64, solved: &[RealizationResult], elapsed_s: f64) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
     v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }
@@ -60,7 +60,7 @@ pub fn answer_to_message(batch: u64, solved: &[Solved], elapsed_s: f64) -> v1::B
 /// # Errors
 /// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
 /// error is not allowed for its outcome.
-pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Malformed> {
+pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
     let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
     let (found, expected) = (message.estimated_errors.len(), outcomes.len());
     if found != expected {
@@ -69,7 +69,7 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<Solved>, Mal
     let pairs = outcomes.into_iter().zip(&message.estimated_errors).enumerate();
     pairs
         .map(|(index, (outcome, &estimated_error))| {
-            let solved = Solved { outcome, estimated_error };
+            let solved = RealizationResult { outcome, estimated_error };
             let unsound = Malformed::EstimatedError { index, value: estimated_error };
             solved.is_sound().then_some(solved).ok_or(unsound)
         })
@@ -117,9 +117,9 @@ mod tests {
     #[test]
     fn answers_survive_the_wire_and_unsound_ones_do_not() {
         let solved = [
-            Solved { outcome: Ok(3900.5), estimated_error: 2e-5 },
-            Solved::failed(FailureKind::NoArrival),
-            Solved { outcome: Ok(3901.5), estimated_error: 0.0 },
+            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5 },
+            RealizationResult::failed(FailureKind::NoArrival),
+            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0 },
         ];
         let message = answer_to_message(7, &solved, 0.25);
         assert_eq!((message.batch, message.elapsed_s), (7, 0.25));

@@ -10,13 +10,13 @@ use crate::v1;
 
 /// Mapping of a type of `osteon-common` to an enumeration of messages, whose number 0 is
 /// unspecified.
-pub struct Choice<T: 'static, M> {
+pub struct EnumMapping<T: 'static, M> {
     all: &'static [T],
     message: fn(T) -> M,
     name: fn(&M) -> &'static str,
 }
 
-impl<T: Copy, M: Into<i32>> Choice<T, M> {
+impl<T: Copy, M: Into<i32>> EnumMapping<T, M> {
     /// Returns the number of a value.
     pub fn number(&self, value: T) -> i32 {
         (self.message)(value).into()
@@ -56,7 +56,7 @@ impl<T: Copy, M: Into<i32>> Choice<T, M> {
 }
 
 /// Kind of a job.
-pub static JOB_KIND: Choice<JobKind, v1::JobKind> = Choice {
+pub static JOB_KIND: EnumMapping<JobKind, v1::JobKind> = EnumMapping {
     all: &[JobKind::Identification, JobKind::Propagation],
     message: |kind| match kind {
         JobKind::Identification => v1::JobKind::Identification,
@@ -66,7 +66,7 @@ pub static JOB_KIND: Choice<JobKind, v1::JobKind> = Choice {
 };
 
 /// Sampling of the germs.
-pub static SAMPLING: Choice<Sampling, v1::Sampling> = Choice {
+pub static SAMPLING: EnumMapping<Sampling, v1::Sampling> = EnumMapping {
     all: &Sampling::ALL,
     message: |sampling| match sampling {
         Sampling::MonteCarlo => v1::Sampling::MonteCarlo,
@@ -76,7 +76,7 @@ pub static SAMPLING: Choice<Sampling, v1::Sampling> = Choice {
 };
 
 /// The function to be minimised.
-pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
+pub static OBJECTIVE: EnumMapping<Objective, v1::ObjectiveKind> = EnumMapping {
     all: &Objective::ALL,
     message: |objective| match objective {
         Objective::Moments => v1::ObjectiveKind::Moments,
@@ -86,7 +86,7 @@ pub static OBJECTIVE: Choice<Objective, v1::ObjectiveKind> = Choice {
 };
 
 /// One of the seven parameters.
-pub static PARAMETER: Choice<Parameter, v1::Parameter> = Choice {
+pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {
     all: &Parameter::ALL,
     message: |parameter| match parameter {
         Parameter::Density => v1::Parameter::Density,
@@ -101,7 +101,7 @@ pub static PARAMETER: Choice<Parameter, v1::Parameter> = Choice {
 };
 
 /// Reason why a realization has no velocity.
-pub static FAILURE_KIND: Choice<FailureKind, v1::FailureKind> = Choice {
+pub static FAILURE_KIND: EnumMapping<FailureKind, v1::FailureKind> = EnumMapping {
     all: &FailureKind::ALL,
     message: |kind| match kind {
         FailureKind::NoArrival => v1::FailureKind::NoArrival,
@@ -114,7 +114,7 @@ pub static FAILURE_KIND: Choice<FailureKind, v1::FailureKind> = Choice {
 };
 
 /// Final status of a job; unspecified while it has not ended.
-pub static JOB_STATUS: Choice<Status, v1::JobStatus> = Choice {
+pub static JOB_STATUS: EnumMapping<Status, v1::JobStatus> = EnumMapping {
     all: &Status::ALL,
     message: |status| match status {
         Status::Converged => v1::JobStatus::Converged,
@@ -126,19 +126,19 @@ pub static JOB_STATUS: Choice<Status, v1::JobStatus> = Choice {
 };
 
 /// Reason why a job failed; unspecified if it has not.
-pub static JOB_FAILURE: Choice<JobFailure, v1::JobFailureKind> = Choice {
+pub static JOB_FAILURE: EnumMapping<JobFailure, v1::JobFailureKind> = EnumMapping {
     all: &JobFailure::ALL,
     message: |failure| match failure {
         JobFailure::NoFeasiblePoint => v1::JobFailureKind::NoFeasiblePoint,
         JobFailure::IntegrityError => v1::JobFailureKind::IntegrityError,
-        JobFailure::LostRealization => v1::JobFailureKind::LostRealization,
+        JobFailure::PoisonRealization => v1::JobFailureKind::PoisonRealization,
         JobFailure::Store => v1::JobFailureKind::Store,
     },
     name: v1::JobFailureKind::as_str_name,
 };
 
 /// Meaning of the best point of a search.
-pub static POINT_MEANING: Choice<PointMeaning, v1::PointMeaning> = Choice {
+pub static POINT_MEANING: EnumMapping<PointMeaning, v1::PointMeaning> = EnumMapping {
     all: &PointMeaning::ALL,
     message: |meaning| match meaning {
         PointMeaning::LeastCost => v1::PointMeaning::LeastCost,

@@ -1,8 +1,8 @@
 //! Conclusions from the data as messages.
 
 use osteon_common::inference::{
-    Conclusions, Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity,
-    Solution, Solutions, Spread, Spreads,
+    Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
+    Solution, Solutions, Spread, Spreads, Uncertainty,
 };
 use osteon_common::parameters::Parameter;
 
@@ -84,7 +84,7 @@ fn sensitivity_from_message(message: &v1::Sensitivity) -> Result<Sensitivity, Ma
 }
 
 fn identified_to_message(found: &Inference) -> v1::Identified {
-    let quantity = |(parameter, quantity): &(Parameter, Quantity)| v1::ParameterQuantity {
+    let quantity = |(parameter, quantity): &(Parameter, DerivedQuantity)| v1::ParameterQuantity {
         parameter: PARAMETER.number(*parameter),
         quantity: Some(quantity_to_message(quantity)),
     };
@@ -139,7 +139,7 @@ fn identified_from_message(
     })
 }
 
-fn quantity_to_message(quantity: &Quantity) -> v1::Quantity {
+fn quantity_to_message(quantity: &DerivedQuantity) -> v1::Quantity {
     let interval =
         |[lower, upper]: [f64; 2]| v1::Interval { lower: Some(lower), upper: Some(upper) };
     v1::Quantity {
@@ -154,17 +154,17 @@ fn quantity_to_message(quantity: &Quantity) -> v1::Quantity {
 fn quantity_from_message(
     message: Option<&v1::Quantity>,
     field: &'static str,
-) -> Result<Quantity, Malformed> {
+) -> Result<DerivedQuantity, Malformed> {
     let message = present(message, field)?;
     let known = match (message.standard_error, &message.interval, message.free_share) {
         (None, None, None) => None,
-        (standard_error, interval, free_share) => Some(Known {
+        (standard_error, interval, free_share) => Some(Uncertainty {
             standard_error: present(standard_error, "standard_error")?,
             interval: interval_from_message(interval.as_ref())?,
             free_share: present(free_share, "free_share")?,
         }),
     };
-    Ok(Quantity { value: present(message.value, "value")?, known })
+    Ok(DerivedQuantity { value: present(message.value, "value")?, known })
 }
 
 /// Reads an interval, of which both ends are required.

@@ -22,7 +22,7 @@ use crate::token::{NoToken, Token};
 
 /// Access that other users may have to a file.
 #[derive(Debug, Clone, Copy)]
-enum Kind {
+enum FileAccess {
     /// No access for others. The group may read, as needed by services whose secrets are mounted.
     Secret,
     /// Others may read, but not write.
@@ -53,8 +53,8 @@ pub enum CredentialError {
     },
     /// It is a pipe that delivered no bytes.
     #[error(
-        "nothing came through the pipe {}; what came through a pipe once does not come again: name a \
-         file where it is to be read again",
+        "the pipe {} is empty; a pipe can be read only once: give a regular file if it must be \
+         read again",
         visible::path(path)
     )]
     EmptyPipe {
@@ -69,8 +69,8 @@ pub enum CredentialError {
     },
     /// Others can read a secret.
     #[error(
-        "{0} is open to other users (mode {mode:04o}); it is a secret: chmod 600 {0}, and make it \
-         anew if somebody may have read it",
+        "{0} is open to other users (mode {mode:04o}); it is a secret: run chmod 600 {0}, and \
+         replace it if somebody may have read it",
         visible::path(path)
     )]
     Exposed {
@@ -100,7 +100,8 @@ pub enum CredentialError {
     },
     /// It contains no certificate.
     #[error(
-        "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` makes \
+        "{} holds no certificate; give a PEM file with `BEGIN CERTIFICATE`, as `osteon certs` \
+         makes \
          them",
         visible::path(path)
     )]
@@ -110,7 +111,8 @@ pub enum CredentialError {
     },
     /// It contains no private key.
     #[error(
-        "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` makes \
+        "{} holds no private key; give a PEM file with `BEGIN PRIVATE KEY`, as `osteon certs` \
+         makes \
          them",
         visible::path(path)
     )]
@@ -128,7 +130,8 @@ pub enum CredentialError {
     },
     /// Certificate and key do not match.
     #[error(
-        "the key in {} is not the one of the certificate in {}; give the two that were made together",
+        "the key in {} is not the one of the certificate in {}; give a certificate and a key \
+         that were made together",
         visible::path(key),
         visible::path(certificate)
     )]
@@ -146,7 +149,7 @@ pub enum CredentialError {
     },
     /// The certificate is not valid yet.
     #[error(
-        "the certificate in {} is not valid yet; is this machine's clock right?",
+        "the certificate in {} is not valid yet; check the clock of this machine",
         visible::path(path)
     )]
     NotYetValid {
@@ -192,7 +195,7 @@ pub enum PemFault {
     #[error("a line `-----END …-----` is missing or damaged")]
     End,
     /// The content between the two lines is invalid.
-    #[error("what stands between `-----BEGIN …-----` and `-----END …-----` is damaged")]
+    #[error("the text between `-----BEGIN …-----` and `-----END …-----` is damaged")]
     Content,
 }
 
@@ -208,7 +211,7 @@ impl From<&pem::Error> for PemFault {
 
 /// A certificate with its chain, and its key.
 #[derive(Debug)]
-pub struct Identity {
+pub struct CertificateAndKey {
     /// The chain, which starts with the certificate itself.
     pub chain: Vec<CertificateDer<'static>>,
     /// The private key of the first certificate.
@@ -220,7 +223,7 @@ pub struct Identity {
 ///
 /// # Errors
 /// If a file cannot be used.
-pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialError> {
+pub fn identity(certificate: &Path, key: &Path) -> Result<CertificateAndKey, CredentialError> {
     let chain = certificates(certificate)?;
     check_validity_dates(certificate, &chain)?;
     let private = private_key(key)?;
@@ -234,7 +237,7 @@ pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialEr
         }
         Err(source) => return Err(cannot(source)),
     }
-    Ok(Identity { chain, key: private })
+    Ok(CertificateAndKey { chain, key: private })
 }
 
 /// Reads a file of certificates, which contains at least one.
@@ -242,7 +245,7 @@ pub fn identity(certificate: &Path, key: &Path) -> Result<Identity, CredentialEr
 /// # Errors
 /// If the file cannot be used.
 pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, CredentialError> {
-    let bytes = read(path, Kind::Trusted)?;
+    let bytes = read(path, FileAccess::Trusted)?;
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&bytes).collect();
     let found = found.map_err(|error| damaged(path, &error))?;
     if found.is_empty() {
@@ -265,7 +268,7 @@ pub fn token(path: &Path) -> Result<Token, CredentialError> {
 /// # Errors
 /// If the file cannot be used.
 pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
-    text(path, Kind::Secret)
+    text(path, FileAccess::Secret)
 }
 
 /// Reads a text file that others may read but must not be able to change.
@@ -273,16 +276,16 @@ pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
 /// # Errors
 /// If the file cannot be used.
 pub fn trusted_text(path: &Path) -> Result<String, CredentialError> {
-    text(path, Kind::Trusted)
+    text(path, FileAccess::Trusted)
 }
 
-fn text(path: &Path, kind: Kind) -> Result<String, CredentialError> {
+fn text(path: &Path, kind: FileAccess) -> Result<String, CredentialError> {
     let bytes = read(path, kind)?;
     String::from_utf8(bytes).map_err(|_| CredentialError::NoText { path: path.to_owned() })
 }
 
 fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CredentialError> {
-    let bytes = read(path, Kind::Secret)?;
+    let bytes = read(path, FileAccess::Secret)?;
     PrivateKeyDer::from_pem_slice(&bytes).map_err(|source| match source {
         pem::Error::NoItemsFound => CredentialError::NoKey { path: path.to_owned() },
         error => damaged(path, &error),
@@ -297,19 +300,19 @@ fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
 /// is later given to another one. A pipe is accepted, so that a secret need not be on a disk. Its
 /// permissions are checked, too, since a named pipe that others can read would let them take the
 /// secret.
-fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, CredentialError> {
+fn read(path: &Path, kind: FileAccess) -> Result<Vec<u8>, CredentialError> {
     let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
     let file = user_file::open_or_pipe(path).map_err(unreadable)?;
     let metadata = file.metadata().map_err(unreadable)?;
     let mode = metadata.permissions().mode() & 0o7777;
     match kind {
-        Kind::Secret if mode & 0o027 != 0 => {
+        FileAccess::Secret if mode & 0o027 != 0 => {
             return Err(CredentialError::Exposed { path: path.to_owned(), mode });
         }
-        Kind::Trusted if mode & 0o022 != 0 => {
+        FileAccess::Trusted if mode & 0o022 != 0 => {
             return Err(CredentialError::Changeable { path: path.to_owned(), mode });
         }
-        Kind::Secret | Kind::Trusted => {}
+        FileAccess::Secret | FileAccess::Trusted => {}
     }
     let max = CREDENTIAL_FILE_BYTES_MAX;
     let piped = metadata.file_type().is_fifo();

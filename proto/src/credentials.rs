@@ -37,7 +37,7 @@ pub struct CredentialFiles {
 #[derive(Debug, Clone, Default)]
 pub struct Credentials {
     pub(crate) tls: Option<Connector>,
-    pub(crate) bearer: Bearer,
+    pub(crate) bearer: TokenInterceptor,
 }
 
 /// Reason why the credential options contradict each other or cannot be used.
@@ -61,7 +61,7 @@ pub enum CredentialsError {
         missing: &'static str,
     },
     /// A TLS option is given for an address without TLS.
-    #[error("{option} is for TLS, and {endpoint} has none; write https://HOST:PORT")]
+    #[error("{option} requires TLS, which {endpoint} does not use; write https://HOST:PORT")]
     NoTls {
         /// The option.
         option: &'static str,
@@ -91,7 +91,7 @@ pub(crate) struct Connector(pub(crate) TlsConnector);
 
 /// Adds a token to every call, if there is one.
 #[derive(Debug, Clone, Default)]
-pub struct Bearer(Option<MetadataValue<Ascii>>);
+pub struct TokenInterceptor(Option<MetadataValue<Ascii>>);
 
 impl Credentials {
     /// Reads the credentials for the coordinator at `endpoint`.
@@ -101,7 +101,7 @@ impl Credentials {
     pub fn load(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Self, CredentialsError> {
         let encrypted = matches!(endpoint, Endpoint::Https(_));
         let endpoint_of = || endpoint.clone();
-        for (option, file) in files.of_tls() {
+        for (option, file) in files.tls_options() {
             if file.is_some() && !encrypted {
                 return Err(CredentialsError::NoTls { option, endpoint: endpoint_of() });
             }
@@ -111,25 +111,25 @@ impl Credentials {
         }
         let token = files.token.as_deref().map(credential_file::token).transpose()?;
         let tls = if encrypted { Some(connector(files, endpoint)?) } else { None };
-        Ok(Self { tls, bearer: Bearer::new(token.as_ref()) })
+        Ok(Self { tls, bearer: TokenInterceptor::new(token.as_ref()) })
     }
 }
 
 impl CredentialFiles {
     /// Returns the names of the TLS options, with their files.
-    pub fn of_tls(&self) -> [(&'static str, &Option<PathBuf>); 3] {
+    pub fn tls_options(&self) -> [(&'static str, &Option<PathBuf>); 3] {
         [("--tls-ca", &self.ca), ("--tls-cert", &self.certificate), ("--tls-key", &self.key)]
     }
 
     /// Returns the first option that was given, if any.
     pub fn first_given(&self) -> Option<&'static str> {
         let token = [("--token-file", &self.token)];
-        let mut all = self.of_tls().into_iter().chain(token);
+        let mut all = self.tls_options().into_iter().chain(token);
         all.find(|(_, file)| file.is_some()).map(|(option, _)| option)
     }
 }
 
-impl Bearer {
+impl TokenInterceptor {
     fn new(token: Option<&Token>) -> Self {
         let header = token.and_then(|token| format!("Bearer {}", token.reveal()).parse().ok());
         Self(header.map(|mut header: MetadataValue<Ascii>| {
@@ -140,7 +140,7 @@ impl Bearer {
     }
 }
 
-impl Interceptor for Bearer {
+impl Interceptor for TokenInterceptor {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
         if let Some(header) = &self.0 {
             request.metadata_mut().insert("authorization", header.clone());

@@ -21,7 +21,7 @@ use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint as Transport, Uri};
 use tower::service_fn;
 
-use crate::credentials::{Bearer, Connector, Credentials};
+use crate::credentials::{Connector, Credentials, TokenInterceptor};
 use crate::tls_failure::TlsFailure;
 use crate::v1::jobs_client::JobsClient;
 use crate::v1::workers_client::WorkersClient;
@@ -58,7 +58,7 @@ pub enum EndpointError {
     },
     /// The host or port is invalid.
     #[error(
-        "`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing behind it"
+        "`{text}` must be {scheme}://HOST:PORT with a port from 1 to 65535 and nothing after it"
     )]
     Authority {
         /// `http` or `https`.
@@ -118,17 +118,21 @@ impl FromStr for Endpoint {
             return Ok(Self::Unix(PathBuf::from(path)));
         }
         if let Some(authority) = text.strip_prefix("https://") {
-            return whole(text, "https", authority).map(Self::Https);
+            return host_and_port(text, "https", authority).map(Self::Https);
         }
         match text.strip_prefix("http://") {
-            Some(authority) => whole(text, "http", authority).map(Self::Http),
+            Some(authority) => host_and_port(text, "http", authority).map(Self::Http),
             None => Err(EndpointError::Scheme { text: owned() }),
         }
     }
 }
 
 /// Returns the host and port of a URL, and refuses a URL that has more than these.
-fn whole(text: &str, scheme: &'static str, authority: &str) -> Result<String, EndpointError> {
+fn host_and_port(
+    text: &str,
+    scheme: &'static str,
+    authority: &str,
+) -> Result<String, EndpointError> {
     let authority = authority.strip_suffix('/').unwrap_or(authority);
     let uri: Option<Uri> = format!("{scheme}://{authority}").parse().ok();
     let whole = uri.filter(|uri| {
@@ -153,7 +157,7 @@ impl Endpoint {
         let reason = innermost(cause);
         match self {
             Self::Http(authority) if !ever_answered && !is_refused(cause) => {
-                format!("{reason}; if the coordinator speaks TLS, write https://{authority}")
+                format!("{reason}; if the coordinator uses TLS, write https://{authority}")
             }
             _ => reason,
         }
@@ -192,7 +196,7 @@ impl fmt::Display for Endpoint {
 }
 
 /// A channel that sends a token with every call, if there is one.
-pub type Connection = InterceptedService<Channel, Bearer>;
+pub type Connection = InterceptedService<Channel, TokenInterceptor>;
 
 /// Same as [`connect_with`], without credentials.
 ///
@@ -420,7 +424,7 @@ mod tests {
         let reset = broken(io::ErrorKind::ConnectionReset);
         let refused = broken(io::ErrorKind::ConnectionRefused);
         let answer = Status::unavailable("the coordinator stops");
-        let hint = "; if the coordinator speaks TLS, write https://a:1";
+        let hint = "; if the coordinator uses TLS, write https://a:1";
         for (url, status, ever_answered, expected) in [
             ("http://a:1", &reset, false, format!("connection reset{hint}")),
             ("http://a:1", &reset, true, "connection reset".to_owned()),

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// The operating system provides no random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("the operating system gives no random numbers")]
+#[error("the operating system provides no random numbers")]
 pub struct NoRandomness;
 
 /// Returns random bytes from the operating system, fit for secrets.

@@ -41,7 +41,10 @@ pub enum Malformed {
         allowed: &'static str,
     },
     /// A pair of code and velocity does not encode an outcome.
-    #[error("realization {index} has code {code} with velocity {velocity}, which no outcome has")]
+    #[error(
+        "realization {index} has code {code} with velocity {velocity}, which is not a valid \
+             outcome"
+    )]
     Outcome {
         /// Index within the block.
         index: usize,

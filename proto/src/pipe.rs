@@ -9,7 +9,7 @@ use thiserror::Error;
 
 /// A pipe was not closed by its writers in time; used as the payload of an [`io::Error`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("it is a pipe, and nobody wrote it to its end within {seconds} s")]
+#[error("it is a pipe, and its writer did not close it within {seconds} s")]
 pub(crate) struct Unfinished {
     /// Time waited, s.
     seconds: u64,
@@ -97,7 +97,7 @@ mod tests {
         let check = || {
             let error = read(&pipe, 8, limit).unwrap_err();
             assert_eq!(error.kind(), io::ErrorKind::TimedOut);
-            assert!(error.to_string().contains("nobody wrote it to its end"), "{error}");
+            assert!(error.to_string().contains("its writer did not close it"), "{error}");
         };
         check();
         let mut writer = OpenOptions::new().write(true).open(&path).unwrap();

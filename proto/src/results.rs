@@ -3,11 +3,11 @@
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{Objective, Search};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
-use osteon_common::moments::{Interval, KolmogorovTest, MomentIntervals};
+use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, MomentIntervals};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupEnding, GroupResult,
-    JobResult, Moments, Role,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
+    GroupResult, JobResult, Moments,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
@@ -66,7 +66,7 @@ pub fn from_message(
     groups: Vec<GroupResult>,
 ) -> Result<JobResult, Malformed> {
     let best = message.best.as_ref().map(|best| best_from_message(best, outcomes));
-    let Settings { objective, search, solver, picking } = settings_from_message(message)?;
+    let SpecificationParts { objective, search, solver, picking } = settings_from_message(message)?;
     Ok(JobResult {
         status: JOB_STATUS.required(message.status, "status")?,
         failure: JOB_FAILURE.optional(message.failure, "failure")?,
@@ -178,7 +178,7 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     Ok(Evaluation {
         number: message.number,
-        role: Role { group: message.group, start: message.start, varied },
+        role: EvaluationRole { group: message.group, start: message.start, varied },
         point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,
@@ -245,21 +245,21 @@ fn conclusions_from_message(message: &v1::JobResult) -> Result<Conclusions, Malf
 }
 
 /// The parts of a specification that a result repeats, as messages.
-struct Settings {
+struct SpecificationParts {
     objective: Objective,
     search: Search,
     solver: SolverSettings,
     picking: Picking,
 }
 
-fn settings_from_message(message: &v1::JobResult) -> Result<Settings, Malformed> {
+fn settings_from_message(message: &v1::JobResult) -> Result<SpecificationParts, Malformed> {
     let missing = |field| Malformed::Missing { field };
     let objective = message.objective.as_ref().ok_or(missing("objective"))?;
     let search = message.search.as_ref().ok_or(missing("search"))?;
     let solver = message.solver.as_ref().ok_or(missing("solver"))?;
     let picking = message.picking.as_ref().ok_or(missing("picking"))?;
     let mut violations = Violations::new();
-    let settings = Settings {
+    let settings = SpecificationParts {
         objective: OBJECTIVE.required(objective.kind, "kind")?,
         search: search_from_message(search, &mut violations),
         solver: setup::solver_from_message(solver, &mut violations),
@@ -285,8 +285,10 @@ fn nominal_from_message(message: v1::NominalSampling) -> NominalSampling {
 }
 
 fn data_to_message(data: &DataSummary) -> v1::DataSummary {
-    let interval =
-        |Interval { low, high }: Interval| v1::Interval { lower: Some(low), upper: Some(high) };
+    let interval = |ConfidenceInterval { low, high }: ConfidenceInterval| v1::Interval {
+        lower: Some(low),
+        upper: Some(high),
+    };
     v1::DataSummary {
         moments: Some(moments_to_message(&data.moments)),
         count: data.count,
@@ -301,7 +303,7 @@ fn data_to_message(data: &DataSummary) -> v1::DataSummary {
 fn data_from_message(message: &v1::DataSummary) -> Result<DataSummary, Malformed> {
     let moments = message.moments.as_ref().ok_or(Malformed::Missing { field: "moments" })?;
     let interval = |message: Option<&v1::Interval>| {
-        interval_from_message(message).map(|[low, high]| Interval { low, high })
+        interval_from_message(message).map(|[low, high]| ConfidenceInterval { low, high })
     };
     let intervals = |found: &v1::MomentIntervals| {
         Ok(MomentIntervals {
@@ -382,8 +384,7 @@ fn failures_from_message(messages: &[v1::FailureCount]) -> Result<FailureCounts,
             return Err(Malformed::UnknownValue { field: "kind", value: message.kind.into() });
         }
         if message.count > REALIZATIONS_MAX {
-            let (value, allowed) =
-                (message.count as f64, "no more realizations can fail than 10^7");
+            let (value, allowed) = (message.count as f64, "at most 10^7 realizations can fail");
             return Err(Malformed::OutOfRange { field: "count", value, allowed });
         }
         failures.add(kind, message.count);

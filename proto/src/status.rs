@@ -139,11 +139,11 @@ mod tests {
 
     #[test]
     fn a_field_and_a_job_are_named_for_programs() {
-        let status = bad_field("page_token", "is not one that List returned");
+        let status = bad_field("page_token", "is not a page token that List returned");
         assert_eq!(status.code(), Code::InvalidArgument);
-        assert_eq!(status.message(), "page_token is not one that List returned");
+        assert_eq!(status.message(), "page_token is not a page token that List returned");
         let mut expected = Violations::new();
-        expected.add("page_token", "is not one that List returned");
+        expected.add("page_token", "is not a page token that List returned");
         assert_eq!(violations(&status), Some(expected));
 
         let status = not_found(Resource::Job, "17", "there is no job 17");

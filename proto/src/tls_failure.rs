@@ -10,13 +10,16 @@ use tokio_rustls::rustls::{self, CertificateError};
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TlsFailure {
     /// The peer's certificate was signed by an unknown authority.
-    #[error("its certificate is not signed by the authority in --tls-ca; is that the right file?")]
+    #[error(
+        "its certificate is not signed by the authority in --tls-ca; check that it is the \
+             right file"
+    )]
     UnknownAuthority,
     /// The peer's certificate has expired.
     #[error("its certificate has expired; it needs a new one")]
     Expired,
     /// The peer's certificate is not valid yet.
-    #[error("its certificate is not valid yet; are the clocks right?")]
+    #[error("its certificate is not valid yet; check the clocks")]
     NotYetValid,
     /// The peer's certificate is for another host name.
     #[error("its certificate is not for this host name; it is for {names}")]
@@ -25,10 +28,10 @@ pub enum TlsFailure {
         names: String,
     },
     /// The peer's certificate is not for this purpose.
-    #[error("its certificate is not one for coordinators")]
+    #[error("its certificate is not valid for a coordinator")]
     WrongPurpose,
-    /// The peer does not speak TLS.
-    #[error("it does not speak TLS; write http://HOST:PORT if that is meant")]
+    /// The peer does not use TLS.
+    #[error("it does not use TLS; write http://HOST:PORT if that is intended")]
     NoTls,
     /// Any other TLS error.
     #[error("TLS failed: {0}")]
@@ -70,7 +73,7 @@ impl TlsFailure {
             Certificate::NotValidYet | Certificate::NotValidYetContext { .. } => Self::NotYetValid,
             Certificate::NotValidForName => Self::WrongHostName { names: "other names".to_owned() },
             Certificate::NotValidForNameContext { presented, .. } if presented.is_empty() => {
-                Self::WrongHostName { names: "no name at all".to_owned() }
+                Self::WrongHostName { names: "no name".to_owned() }
             }
             Certificate::NotValidForNameContext { presented, .. } => {
                 Self::WrongHostName { names: presented.join(", ") }
@@ -100,7 +103,7 @@ mod tests {
         check(certificate(CertificateError::Expired), "expired");
         check(certificate(CertificateError::NotValidYet), "clocks");
         check(certificate(CertificateError::NotValidForName), "host name");
-        check(certificate(CertificateError::InvalidPurpose), "not one for coordinators");
+        check(certificate(CertificateError::InvalidPurpose), "not valid for a coordinator");
         let alert = rustls::AlertDescription::InternalError;
         check(rustls::Error::AlertReceived(alert), "TLS failed");
         let no_tls = rustls::InvalidMessage::InvalidContentType;

@@ -10,12 +10,12 @@ use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{JobKind, JobSpecification, Sampling};
 use osteon_common::moments::KolmogorovTest;
-use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, Solved};
+use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::report::ResultFile;
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, GroupResult, JobFailure,
-    JobResult, Moments, PointMeaning, Role, Status as JobEnd,
+    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupResult,
+    JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;
@@ -126,7 +126,7 @@ fn outcomes() -> Vec<Outcome> {
 }
 
 fn answers() -> Vec<Vec<u8>> {
-    let solve = |outcome: Outcome| Solved {
+    let solve = |outcome: Outcome| RealizationResult {
         outcome,
         estimated_error: if outcome.is_ok() { 2e-5 } else { 0.0 },
     };
@@ -141,7 +141,7 @@ fn check_answer(bytes: &[u8]) {
     if let Ok(solved) = bounded(bytes.len(), || batch::answer_from_message(&message)) {
         let written = batch::answer_to_message(message.batch, &solved, message.elapsed_s);
         assert_eq!(written.encode_to_vec(), message.encode_to_vec());
-        assert!(solved.iter().all(Solved::is_sound));
+        assert!(solved.iter().all(RealizationResult::is_sound));
     }
 }
 
@@ -194,7 +194,7 @@ fn history_of_two_starts() -> Vec<Evaluation> {
         }
         Evaluation {
             number,
-            role: Role { group: 0, start, varied },
+            role: EvaluationRole { group: 0, start, varied },
             point,
             moments: Some(moments(3950.0 - number as f64, 0.0103 + 1e-6 * number as f64)),
             cost: Some(1e-11),
@@ -227,7 +227,7 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         }),
         failure_bias: Some(moments(-1.0, 1e-3)),
         kolmogorov: Some(KolmogorovTest { distance: 0.1, p_value: 0.3 }),
-        failures: FailureCounts::of(&outcomes()),
+        failures: FailureCounts::from_outcomes(&outcomes()),
         estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
         outcomes: outcomes(),
     };
@@ -236,8 +236,8 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         failure: Some(JobFailure::Store),
         reason: Some("why".to_owned()),
         digest: "00".repeat(32),
-        data: job.data.as_ref().map(|data| DataSummary::of(data, 0)),
-        conclusions: Conclusions::of(&job, 0, Some(&best), &history),
+        data: job.data.as_ref().map(|data| DataSummary::from_data(data, 0)),
+        conclusions: Conclusions::new(&job, 0, Some(&best), &history),
         best: Some(best),
         groups: Vec::new(),
         objective: job.objective,
@@ -249,9 +249,9 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         scrambles: 2,
         control_variate: true,
         solver: job.setup.solver,
-        nominal: NominalSampling::of(&job.setup),
+        nominal: NominalSampling::from_setup(&job.setup),
         picking: job.setup.picking,
-        program: Program::this(Some("c0ffee")),
+        program: Program::current(Some("c0ffee")),
     };
     let Conclusions { inference, profiles, solutions } = &result.conclusions;
     assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));

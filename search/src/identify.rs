@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::{FailureKind, Outcome, Solved, decode, encode};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, decode, encode};
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::realization::Ensemble;
@@ -32,10 +32,10 @@ pub struct Realizations {
 
 /// Result and history of a job.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Identified {
+pub struct CompletedJob {
     /// Status, digest, best point (or the result of each group), and what the data determine.
     pub result: JobResult,
-    /// Returns the rows of all evaluations, in order.
+    /// Rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
 }
 
@@ -78,7 +78,7 @@ pub enum IdentifyError<E> {
         /// Index of the realization.
         index: usize,
         /// The outcome returned.
-        solved: Solved,
+        solved: RealizationResult,
     },
 }
 
@@ -95,7 +95,7 @@ pub enum IdentifyError<E> {
 ///
 /// use osteon_common::case::Setup;
 /// use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-/// use osteon_common::outcome::Solved;
+/// use osteon_common::outcome::RealizationResult;
 /// use osteon_common::results::Status;
 ///
 /// let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
@@ -116,7 +116,7 @@ pub enum IdentifyError<E> {
 ///         let bone = realizations.ensemble.bone(index).expect("this dispersion is small");
 ///         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
 ///     };
-///     let solved = |index| Solved { outcome: Ok(speed(index)), estimated_error: 0.0 };
+///     let solved = |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 0.0 };
 ///     Ok::<_, Infallible>((0..realizations.count).map(solved).collect())
 /// })?;
 /// assert_eq!(found.result.status, Status::Converged);
@@ -129,8 +129,8 @@ pub enum IdentifyError<E> {
 /// When the specification breaks rules, `evaluate` fails, or what it computed cannot be meant.
 pub fn identify<E>(
     specification: &JobSpecification,
-    mut evaluate: impl FnMut(&Realizations) -> Result<Vec<Solved>, E>,
-) -> Result<Identified, IdentifyError<E>> {
+    mut evaluate: impl FnMut(&Realizations) -> Result<Vec<RealizationResult>, E>,
+) -> Result<CompletedJob, IdentifyError<E>> {
     let violations = specification.check();
     if !violations.is_empty() {
         return Err(IdentifyError::Specification(violations));
@@ -159,11 +159,11 @@ fn solve<E>(
     specification: &JobSpecification,
     number: u64,
     point: Point,
-    evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<Solved>, E>,
-) -> Result<Vec<Solved>, IdentifyError<E>> {
+    evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<RealizationResult>, E>,
+) -> Result<Vec<RealizationResult>, IdentifyError<E>> {
     let count = specification.monte_carlo.realizations;
     let Ok(ensemble) = Ensemble::drawn(&point, specification.monte_carlo.germs()) else {
-        return Ok((0..count).map(|_| Solved::failed(FailureKind::NotFinite)).collect());
+        return Ok((0..count).map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect());
     };
     let solved = evaluate(&Realizations { point, ensemble, count })
         .map_err(|cause| IdentifyError::Evaluation { number, point: Box::new(point), cause })?;
@@ -176,7 +176,7 @@ fn solve<E>(
     }
 }
 
-fn is_sound(solved: &Solved) -> bool {
+fn is_sound(solved: &RealizationResult) -> bool {
     let (code, velocity) = encode(solved.outcome);
     decode(code, velocity).is_some() && solved.is_sound()
 }
@@ -205,8 +205,8 @@ fn identified(
     search: &Search,
     ending: &Ending,
     best: &BestOfGroups,
-) -> Identified {
-    let mut result = search.result(ending, &Program::this(None));
+) -> CompletedJob {
+    let mut result = search.result(ending, &Program::current(None));
     let summary = search.summary();
     let group = |set: usize| -> Option<GroupResult> {
         let found = summary.groups[set].best.zip(best.0.get(&set));
@@ -215,7 +215,7 @@ fn identified(
         summary.group(specification, set, best)
     };
     result.groups = (0..summary.groups.len()).filter_map(group).collect();
-    Identified { result, history: summary.history }
+    CompletedJob { result, history: summary.history }
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@
 //! worker, a clock or a file: a search is a function of its specification and of the outcomes
 //! passed to it.
 
-pub mod ask;
 mod identify;
 pub mod newton;
+pub mod proposal;
 mod search;
 pub mod search_box;
 pub mod simplex;
 
-pub use identify::{Identified, IdentifyError, Realizations, identify};
+pub use identify::{CompletedJob, IdentifyError, Realizations, identify};
 pub use search::{Ending, ReplayError, Search, Step, Summary, same_point};

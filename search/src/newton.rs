@@ -25,23 +25,23 @@
 //!
 //! # When it stops
 //!
-//! - The cost is at most `cost_tolerance`: [`Stop::CostReached`].
+//! - The cost is at most `cost_tolerance`: [`StopReason::CostReached`].
 //! - It stalls: a step of at most `size_tolerance` does not halve the cost, [`SLOW_MAX`]
 //!   evaluations do not, or the model's solution is the current point. At the first stall the
 //!   slopes of the correction are reset; at the second they are measured by finite differences, one
 //!   evaluation for each parameter; if the search stalls again without having halved the cost
-//!   since, it ends: [`Stop::Settled`]. This is also how a search ends, at the lowest cost, if no
+//!   since, it ends: [`StopReason::Converged`]. This is also how a search ends, at the lowest cost, if no
 //!   point in the box matches the data.
-//! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
+//! - `max_evaluations` points were evaluated: [`StopReason::EvaluationsUsedUp`].
 //! - The start and the points between it and the model's solution are infeasible:
-//!   [`Stop::Infeasible`].
+//!   [`StopReason::Infeasible`].
 
 mod model;
 mod nearest;
 
 use osteon_common::results::Moments;
 
-use crate::ask::{Ask, Stop};
+use crate::proposal::{Proposal, StopReason};
 use crate::search_box::SearchBox;
 
 use self::model::{Logarithms, Model, subtract};
@@ -93,7 +93,7 @@ struct Evaluated {
 
 /// The purpose of the pending point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Purpose {
+enum PointPurpose {
     /// The start, or a step towards the model's solution.
     Step,
     /// Measures the slopes along this axis.
@@ -103,8 +103,8 @@ enum Purpose {
 /// The last refresh of the slopes, if the cost has not been halved since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SlopeRefresh {
-    No,
-    Forgotten,
+    None,
+    Reset,
     Measured,
 }
 
@@ -121,17 +121,17 @@ pub struct Newton {
     /// The step of lowest cost so far, if one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
-    purpose: Purpose,
+    purpose: PointPurpose,
     /// Whether the pending step reaches the model's solution.
-    whole: bool,
+    full_step: bool,
     /// Current limit of the step length.
     radius: f64,
-    /// The cost to be halved, and the number of evaluations since it was.
-    mark: f64,
-    slow: u32,
-    renewed: SlopeRefresh,
+    /// The cost to be halved, and the number of evaluations since it was halved last.
+    reference_cost: f64,
+    slow_evaluations: u32,
+    slope_refresh: SlopeRefresh,
     cost_at_refresh: f64,
-    stop: Option<Stop>,
+    stop: Option<StopReason>,
     evaluations: u64,
 }
 
@@ -149,12 +149,12 @@ impl Newton {
             pending: start.clone(),
             centre: start,
             near: false,
-            purpose: Purpose::Step,
-            whole: false,
+            purpose: PointPurpose::Step,
+            full_step: false,
             radius: RADIUS_MAX,
-            mark: f64::INFINITY,
-            slow: 0,
-            renewed: SlopeRefresh::No,
+            reference_cost: f64::INFINITY,
+            slow_evaluations: 0,
+            slope_refresh: SlopeRefresh::None,
             cost_at_refresh: f64::INFINITY,
             stop: None,
             evaluations: 0,
@@ -164,10 +164,10 @@ impl Newton {
     }
 
     /// Returns the next point, or the reason why there is none. Does not change the state.
-    pub fn ask(&self) -> Ask<'_> {
+    pub fn ask(&self) -> Proposal<'_> {
         match self.stop {
-            Some(stop) => Ask::Stopped(stop),
-            None => Ask::At(&self.pending),
+            Some(stop) => Proposal::Stopped(stop),
+            None => Proposal::Evaluate(&self.pending),
         }
     }
 
@@ -201,56 +201,56 @@ impl Newton {
     /// Returns at most `most` points that the search may ask for after the pending one: the
     /// remaining points at which slopes are measured. A step cannot be predicted, as it depends on
     /// all earlier results.
-    pub fn likely(&self, most: usize) -> Vec<Vec<f64>> {
-        let Purpose::Difference { axis, .. } = self.purpose else {
+    pub fn candidates(&self, most: usize) -> Vec<Vec<f64>> {
+        let PointPurpose::Difference { axis, .. } = self.purpose else {
             return Vec::new();
         };
         let left = self.settings.max_evaluations.saturating_sub(self.evaluations + 1);
-        let axes = (axis + 1..self.anchor().len()).take(most);
+        let axes = (axis + 1..self.base_point().len()).take(most);
         let axes = axes.take(usize::try_from(left).unwrap_or(usize::MAX));
-        axes.map(|axis| self.beside(axis, self.difference(axis))).collect()
+        axes.map(|axis| self.displaced(axis, self.difference(axis))).collect()
     }
 
     fn stop_when_used_up(&mut self) {
         if self.stop.is_none() && self.evaluations >= self.settings.max_evaluations {
-            self.stop = Some(Stop::EvaluationsUsedUp);
+            self.stop = Some(StopReason::EvaluationsUsedUp);
         }
     }
 
     /// Takes the result at the pending point; `None` if it is infeasible.
     fn take(&mut self, trial: Option<Evaluated>) {
         if trial.as_ref().is_some_and(|trial| trial.cost <= self.settings.cost_tolerance) {
-            self.stop = Some(Stop::CostReached);
+            self.stop = Some(StopReason::CostReached);
             return;
         }
         match self.purpose {
-            Purpose::Step => self.stepped(trial),
-            Purpose::Difference { axis, step } => self.differed(axis, step, trial),
+            PointPurpose::Step => self.finish_step(trial),
+            PointPurpose::Difference { axis, step } => self.finish_difference(axis, step, trial),
         }
     }
 
-    fn stepped(&mut self, trial: Option<Evaluated>) {
-        let length = norm(&subtract(&self.pending, self.anchor()));
+    fn finish_step(&mut self, trial: Option<Evaluated>) {
+        let length = norm(&subtract(&self.pending, self.base_point()));
         let lowest = self.base.as_ref().map(|base| base.cost);
         let Some(trial) = trial else {
             // The start is not a step and has no length.
             self.radius = if length > 0.0 { 0.5 * length } else { self.radius };
-            self.go_on(false);
+            self.next_step(false);
             return;
         };
         if lowest.is_some() {
-            self.model.learn(&trial.at, trial.found);
+            self.model.update_slopes(&trial.at, trial.found);
         }
-        let halved = trial.cost < PROGRESS * self.mark;
+        let halved = trial.cost < PROGRESS * self.reference_cost;
         if halved {
-            self.mark = trial.cost;
-            self.slow = 0;
+            self.reference_cost = trial.cost;
+            self.slow_evaluations = 0;
         } else {
-            self.slow += 1;
+            self.slow_evaluations += 1;
         }
         if lowest.is_none_or(|lowest| trial.cost < lowest) {
-            self.model.settle_on(&trial.at, trial.found);
-            if self.whole && trial.cost < NEAR {
+            self.model.make_exact_at(&trial.at, trial.found);
+            if self.full_step && trial.cost < NEAR {
                 self.centre.clone_from(&trial.at);
                 self.near = true;
             }
@@ -259,32 +259,32 @@ impl Newton {
         } else {
             self.radius = 0.5 * length;
         }
-        self.go_on(!halved && length <= self.settings.size_tolerance);
+        self.next_step(!halved && length <= self.settings.size_tolerance);
     }
 
     /// Makes the next step pending, or refreshes the slopes if no step leads further. Ends, because
     /// each turn uses the next of the finitely many ways of refreshing.
-    fn go_on(&mut self, mut stalled: bool) {
+    fn next_step(&mut self, mut stalled: bool) {
         loop {
             let shortest = match self.base {
                 Some(_) => self.settings.size_tolerance.max(STEP_MIN),
                 None => RADIUS_BLIND,
             };
-            stalled |= self.slow >= SLOW_MAX || self.radius < shortest;
+            stalled |= self.slow_evaluations >= SLOW_MAX || self.radius < shortest;
             if stalled && !self.reset_slopes() {
                 return;
             }
-            let anchor = self.anchor();
-            let mut step = subtract(&self.believed_answer(), anchor);
+            let base = self.base_point();
+            let mut step = subtract(&self.model_solution(), base);
             let length = norm(&step);
             if length > self.radius {
                 step.iter_mut().for_each(|d| *d *= self.radius / length);
             }
             if length > STEP_MIN {
-                let moved = anchor.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0));
+                let moved = base.iter().zip(&step).map(|(u, d)| (u + d).clamp(0.0, 1.0));
                 self.pending = moved.collect();
-                self.purpose = Purpose::Step;
-                self.whole = length <= self.radius;
+                self.purpose = PointPurpose::Step;
+                self.full_step = length <= self.radius;
                 return;
             }
             stalled = true;
@@ -293,7 +293,7 @@ impl Newton {
 
     /// Returns the model's solution, to which the search would go if the step length were
     /// unlimited.
-    fn believed_answer(&self) -> Vec<f64> {
+    fn model_solution(&self) -> Vec<f64> {
         if self.near {
             self.model.nearest_from_here(&self.centre, self.target)
         } else {
@@ -306,60 +306,60 @@ impl Newton {
     /// cases returns false: there is no step to choose now.
     fn reset_slopes(&mut self) -> bool {
         let Some(base) = &self.base else {
-            self.stop = Some(Stop::Infeasible);
+            self.stop = Some(StopReason::Infeasible);
             return false;
         };
         if base.cost < PROGRESS * self.cost_at_refresh {
             self.cost_at_refresh = base.cost;
-            self.renewed = SlopeRefresh::No;
+            self.slope_refresh = SlopeRefresh::None;
         }
         self.radius = RADIUS_MAX;
-        self.slow = 0;
-        if self.renewed == SlopeRefresh::No && self.model.reset_slopes() {
-            self.renewed = SlopeRefresh::Forgotten;
+        self.slow_evaluations = 0;
+        if self.slope_refresh == SlopeRefresh::None && self.model.reset_slopes() {
+            self.slope_refresh = SlopeRefresh::Reset;
             return true;
         }
-        if self.renewed == SlopeRefresh::Measured {
-            self.stop = Some(Stop::Settled);
+        if self.slope_refresh == SlopeRefresh::Measured {
+            self.stop = Some(StopReason::Converged);
             return false;
         }
-        self.renewed = SlopeRefresh::Measured;
+        self.slope_refresh = SlopeRefresh::Measured;
         self.measure_from(0);
         false
     }
 
     /// Makes the difference along `axis` pending, or continues with a step after the last axis.
     fn measure_from(&mut self, axis: usize) {
-        if axis < self.anchor().len() {
+        if axis < self.base_point().len() {
             self.measure(axis, self.difference(axis));
         } else {
-            self.go_on(false);
+            self.next_step(false);
         }
     }
 
     /// Returns the step of the difference along `axis` that is tried first.
     fn difference(&self, axis: usize) -> f64 {
-        if self.anchor()[axis] + DIFFERENCE <= 1.0 { DIFFERENCE } else { -DIFFERENCE }
+        if self.base_point()[axis] + DIFFERENCE <= 1.0 { DIFFERENCE } else { -DIFFERENCE }
     }
 
     /// Returns the current base point, moved along `axis`.
-    fn beside(&self, axis: usize, step: f64) -> Vec<f64> {
-        let mut at = self.anchor().to_vec();
+    fn displaced(&self, axis: usize, step: f64) -> Vec<f64> {
+        let mut at = self.base_point().to_vec();
         at[axis] += step;
         at
     }
 
     fn measure(&mut self, axis: usize, step: f64) {
-        self.pending = self.beside(axis, step);
-        self.purpose = Purpose::Difference { axis, step };
+        self.pending = self.displaced(axis, step);
+        self.purpose = PointPurpose::Difference { axis, step };
     }
 
-    fn differed(&mut self, axis: usize, step: f64, trial: Option<Evaluated>) {
+    fn finish_difference(&mut self, axis: usize, step: f64, trial: Option<Evaluated>) {
         match trial {
-            Some(trial) => self.model.learn_along(axis, &trial.at, trial.found),
+            Some(trial) => self.model.correct_slope(axis, &trial.at, trial.found),
             // Try the other direction once. If both are infeasible, the slopes along this axis are
             // kept.
-            None if step > 0.0 && self.anchor()[axis] - step >= 0.0 => {
+            None if step > 0.0 && self.base_point()[axis] - step >= 0.0 => {
                 self.measure(axis, -step);
                 return;
             }
@@ -369,7 +369,7 @@ impl Newton {
     }
 
     /// Returns the point at which steps begin.
-    fn anchor(&self) -> &[f64] {
+    fn base_point(&self) -> &[f64] {
         self.base.as_ref().map_or(&self.centre, |base| &base.at)
     }
 }

@@ -13,20 +13,20 @@ use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::results::{
-    BestPoint, DataSummary, EstimatedError, Evaluation, GroupEnding, GroupResult, JobFailure,
-    JobResult, Role, Status,
+    BestPoint, DataSummary, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
+    JobFailure, JobResult, Status,
 };
 use osteon_common::sampling::NominalSampling;
-use osteon_common::statistics::{self, Verdict, likelihood_error};
+use osteon_common::statistics::{self, PointStatistics, likelihood_error};
 use osteon_common::version::Program;
 use thiserror::Error;
 
-use self::identification::Identification;
+use self::identification::IdentificationSearch;
 
-pub use self::ahead::same_point;
+pub use self::candidates::same_point;
 
 mod advice;
-mod ahead;
+mod candidates;
 mod dataset_search;
 mod identification;
 mod method;
@@ -56,7 +56,7 @@ pub struct Ending {
 
 impl Ending {
     /// Creates the ending of a search, which fails only if no point is feasible.
-    pub fn of_search(status: Status, reason: Option<String>) -> Self {
+    pub fn from_search(status: Status, reason: Option<String>) -> Self {
         let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
         Self { status, failure, reason }
     }
@@ -69,7 +69,7 @@ pub struct Summary {
     pub digest: String,
     /// Number of the best evaluation, if a point was feasible; `None` if the data are groups.
     pub best: Option<u64>,
-    /// Returns the rows of all evaluations, in order.
+    /// Rows of all evaluations, in order.
     pub history: Vec<Evaluation>,
     /// Endings of the searches for the groups of the data that have ended; empty if there are no
     /// groups.
@@ -92,30 +92,30 @@ pub struct ReplayError {
 }
 
 #[derive(Debug, Clone)]
-enum Plan {
-    Identification(Box<Identification>),
-    Propagation { told: Option<Verdict> },
+enum SearchPlan {
+    Identification(Box<IdentificationSearch>),
+    Propagation { statistics: Option<PointStatistics> },
 }
 
 /// The state of a job's search.
 #[derive(Debug, Clone)]
 pub struct Search {
     specification: Arc<JobSpecification>,
-    plan: Plan,
+    plan: SearchPlan,
     digest: PathDigest,
     history: Vec<Evaluation>,
     /// Outcomes of the evaluation that a propagation's result needs.
     outcomes: Option<Arc<[Outcome]>>,
     /// Assessment of the pending point, if it was made before its outcomes were passed to
     /// [`Search::tell`].
-    judged: Option<Assessment>,
+    assessment: Option<Assessment>,
 }
 
 /// Assessment of a point, computed from its outcomes.
 #[derive(Debug, Clone)]
 struct Assessment {
     outcomes: Arc<[Outcome]>,
-    verdict: Verdict,
+    statistics: PointStatistics,
     /// `None` for a propagation.
     cost: Option<f64>,
 }
@@ -125,10 +125,12 @@ impl Search {
     pub fn new(specification: Arc<JobSpecification>) -> Self {
         let plan = match (specification.kind, &specification.data) {
             (JobKind::Identification, Some(_)) => {
-                Plan::Identification(Box::new(Identification::new(&specification)))
+                SearchPlan::Identification(Box::new(IdentificationSearch::new(&specification)))
             }
             // An identification without data does not pass the check.
-            (JobKind::Propagation | JobKind::Identification, _) => Plan::Propagation { told: None },
+            (JobKind::Propagation | JobKind::Identification, _) => {
+                SearchPlan::Propagation { statistics: None }
+            }
         };
         Self {
             specification,
@@ -136,7 +138,7 @@ impl Search {
             digest: PathDigest::new(),
             history: Vec::new(),
             outcomes: None,
-            judged: None,
+            assessment: None,
         }
     }
 
@@ -179,12 +181,16 @@ impl Search {
     /// Returns the next point, or how the job ended. Does not change the state.
     pub fn ask(&self) -> Step {
         match &self.plan {
-            Plan::Identification(identification) => match identification.point() {
+            SearchPlan::Identification(identification) => match identification.point() {
                 Some(point) => Step::Evaluate(point),
                 None => Step::Done(identification.ending(&self.specification)),
             },
-            Plan::Propagation { told: None } => Step::Evaluate(self.specification.start()),
-            Plan::Propagation { told: Some(verdict) } => Step::Done(self.propagated(verdict)),
+            SearchPlan::Propagation { statistics: None } => {
+                Step::Evaluate(self.specification.start())
+            }
+            SearchPlan::Propagation { statistics: Some(statistics) } => {
+                Step::Done(self.propagated(statistics))
+            }
         }
     }
 
@@ -194,50 +200,51 @@ impl Search {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
-        let judged = match self.judged.take() {
-            Some(judged) if Arc::ptr_eq(&judged.outcomes, &outcomes) => judged,
-            _ => self.judge(&point, &outcomes),
+        let assessment = match self.assessment.take() {
+            Some(assessment) if Arc::ptr_eq(&assessment.outcomes, &outcomes) => assessment,
+            _ => self.assess(&point, &outcomes),
         };
-        let mut row = Evaluation { estimated_error, ..self.row(point, &judged) };
-        let Assessment { verdict, outcomes: told, .. } = judged;
+        let mut row = Evaluation { estimated_error, ..self.row(point, &assessment) };
+        let Assessment { statistics, outcomes: assessed, .. } = assessment;
         match &mut self.plan {
-            Plan::Identification(identification) => {
-                row = identification.tell(&self.specification, row, verdict, outcomes);
+            SearchPlan::Identification(identification) => {
+                row = identification.tell(&self.specification, row, statistics, outcomes);
             }
-            Plan::Propagation { told } => {
-                *told = Some(verdict);
+            SearchPlan::Propagation { statistics: known } => {
+                *known = Some(statistics);
                 self.outcomes = Some(outcomes);
             }
         }
         // Points that only measure a derivative are not part of the path.
         if row.role.varied.is_none() {
-            self.digest.add_evaluation(&point, &told);
+            self.digest.add_evaluation(&point, &assessed);
         }
         self.history.push(row);
     }
 
     /// Computes moments and cost of the pending point from its outcomes.
-    fn judge(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Assessment {
-        let verdict = Verdict::of(&self.specification.monte_carlo, point, outcomes);
+    fn assess(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Assessment {
+        let statistics =
+            PointStatistics::from_outcomes(&self.specification.monte_carlo, point, outcomes);
         let cost = match &self.plan {
-            Plan::Identification(identification) => {
-                Some(identification.cost(&self.specification, &verdict, point, outcomes))
+            SearchPlan::Identification(identification) => {
+                Some(identification.cost(&self.specification, &statistics, point, outcomes))
             }
-            Plan::Propagation { .. } => None,
+            SearchPlan::Propagation { .. } => None,
         };
-        Assessment { outcomes: Arc::clone(outcomes), verdict, cost }
+        Assessment { outcomes: Arc::clone(outcomes), statistics, cost }
     }
 
     /// Returns the history row of the pending point with everything but its role and estimated
     /// error.
-    fn row(&self, point: Point, judged: &Assessment) -> Evaluation {
+    fn row(&self, point: Point, assessment: &Assessment) -> Evaluation {
         Evaluation {
             number: self.evaluations(),
-            role: Role::default(),
+            role: EvaluationRole::default(),
             point,
-            moments: judged.verdict.moments,
-            cost: judged.cost,
-            failures: FailureCounts::of(&judged.outcomes),
+            moments: assessment.statistics.moments,
+            cost: assessment.cost,
+            failures: FailureCounts::from_outcomes(&assessment.outcomes),
             estimated_error: None,
         }
     }
@@ -256,8 +263,8 @@ impl Search {
     /// propagation, its only evaluation.
     pub fn best(&self) -> Option<&Evaluation> {
         match &self.plan {
-            Plan::Identification(identification) => identification.best(),
-            Plan::Propagation { .. } => self.history.first(),
+            SearchPlan::Identification(identification) => identification.best(),
+            SearchPlan::Propagation { .. } => self.history.first(),
         }
     }
 
@@ -265,15 +272,17 @@ impl Search {
     /// has reached that set and a point was feasible.
     pub fn best_of(&self, set: usize) -> Option<u64> {
         match &self.plan {
-            Plan::Identification(identification) => identification.best_of(set),
-            Plan::Propagation { .. } => None,
+            SearchPlan::Identification(identification) => identification.best_of(set),
+            SearchPlan::Propagation { .. } => None,
         }
     }
 
     /// Summarizes the path so far.
     pub fn summary(&self) -> Summary {
         let groups = match &self.plan {
-            Plan::Identification(identification) if self.is_grouped() => identification.endings(),
+            SearchPlan::Identification(identification) if self.is_grouped() => {
+                identification.endings()
+            }
             _ => Vec::new(),
         };
         let best = self.best().filter(|_| !self.is_grouped());
@@ -290,8 +299,8 @@ impl Search {
     pub fn result(&self, ending: &Ending, program: &Program) -> JobResult {
         let summary = self.summary();
         let outcomes = match &self.plan {
-            Plan::Identification(identification) => identification.best_outcomes(),
-            Plan::Propagation { .. } => self.outcomes.as_deref(),
+            SearchPlan::Identification(identification) => identification.best_outcomes(),
+            SearchPlan::Propagation { .. } => self.outcomes.as_deref(),
         };
         let best = summary.best.zip(outcomes).and_then(|(number, outcomes)| {
             summary.best_point(&self.specification, number, outcomes)
@@ -304,13 +313,13 @@ impl Search {
         matches!(self.specification.data, Some(Data::Groups(_)))
     }
 
-    fn propagated(&self, verdict: &Verdict) -> Ending {
-        if verdict.feasible {
-            return Ending::of_search(Status::Converged, None);
+    fn propagated(&self, statistics: &PointStatistics) -> Ending {
+        if statistics.feasible {
+            return Ending::from_search(Status::Converged, None);
         }
         let reason = self.history.first();
         let reason = reason.map(|row| reasons::failed(row, &self.specification));
-        Ending::of_search(Status::Failed, Some(reason.unwrap_or_default()))
+        Ending::from_search(Status::Failed, Some(reason.unwrap_or_default()))
     }
 }
 
@@ -371,7 +380,7 @@ impl Summary {
         let of_one_set = !matches!(specification.data, Some(Data::Groups(_)));
         let data = specification.data.as_ref().filter(|_| of_one_set);
         let conclusions =
-            data.map(|_| Conclusions::of(specification, 0, best.as_ref(), &self.history));
+            data.map(|_| Conclusions::new(specification, 0, best.as_ref(), &self.history));
         let searched = self.history.iter().filter(|row| row.role.varied.is_none());
         JobResult {
             status: ending.status,
@@ -379,7 +388,7 @@ impl Summary {
             reason: ending.reason.clone(),
             digest: self.digest.clone(),
             best,
-            data: data.map(|data| DataSummary::of(data, 0)),
+            data: data.map(|data| DataSummary::from_data(data, 0)),
             conclusions: conclusions.unwrap_or_default(),
             groups,
             objective: specification.objective,
@@ -391,7 +400,7 @@ impl Summary {
             scrambles: specification.monte_carlo.scrambles,
             control_variate: specification.monte_carlo.control_variate,
             solver: specification.setup.solver,
-            nominal: NominalSampling::of(&specification.setup),
+            nominal: NominalSampling::from_setup(&specification.setup),
             picking: specification.setup.picking,
             program: program.clone(),
         }
@@ -411,8 +420,8 @@ impl Summary {
             name: data.names().nth(set)?.to_owned(),
             status: ending.status,
             reason: ending.reason.clone(),
-            data: DataSummary::of(data, set),
-            conclusions: Conclusions::of(specification, set, best.as_ref(), &self.history),
+            data: DataSummary::from_data(data, set),
+            conclusions: Conclusions::new(specification, set, best.as_ref(), &self.history),
             best,
         })
     }

@@ -10,20 +10,20 @@
 //!
 //! # When it stops
 //!
-//! - The best cost is at most the tolerance, where there is one: [`Stop::CostReached`].
+//! - The best cost is at most the tolerance, where there is one: [`StopReason::CostReached`].
 //! - The simplex has collapsed. This is so when its largest extent is at most `size_tolerance` and
 //!   its costs differ by at most the tolerance plus a thousandth of the best cost (logarithms: by
 //!   at most the difference that counts as equal), or, whatever the costs, when the extent is at
 //!   most a thousandth of `size_tolerance`. A collapse does not prove a minimum: a simplex can
 //!   flatten against a bound. Therefore the search restarts at the best point with a fresh simplex,
 //!   and only a restart that lowers the best cost by less than a thousandth (logarithms: as above)
-//!   ends it: [`Stop::Settled`]. The number of restarts is limited: [`Stop::RestartsUsedUp`].
-//! - `max_evaluations` points were evaluated: [`Stop::EvaluationsUsedUp`].
-//! - No vertex of the first simplex is feasible: [`Stop::Infeasible`].
+//!   ends it: [`StopReason::Converged`]. The number of restarts is limited: [`StopReason::RestartsUsedUp`].
+//! - `max_evaluations` points were evaluated: [`StopReason::EvaluationsUsedUp`].
+//! - No vertex of the first simplex is feasible: [`StopReason::Infeasible`].
 
-use crate::ask::{Ask, Stop};
+use crate::proposal::{Proposal, StopReason};
 
-mod likely;
+mod candidates;
 #[cfg(test)]
 mod tests;
 
@@ -123,7 +123,7 @@ pub struct Simplex {
     vertices: Vec<Vertex>,
     pending: Vec<f64>,
     purpose: Move,
-    stop: Option<Stop>,
+    stop: Option<StopReason>,
     evaluations: u64,
     restarts: u32,
     /// Best cost when the current simplex was started.
@@ -151,10 +151,10 @@ impl Simplex {
     }
 
     /// Returns the next point, or the reason why there is none. Does not change the state.
-    pub fn ask(&self) -> Ask<'_> {
+    pub fn ask(&self) -> Proposal<'_> {
         match self.stop {
-            Some(stop) => Ask::Stopped(stop),
-            None => Ask::At(&self.pending),
+            Some(stop) => Proposal::Stopped(stop),
+            None => Proposal::Evaluate(&self.pending),
         }
     }
 
@@ -194,14 +194,14 @@ impl Simplex {
             self.take(f64::INFINITY);
         }
         if self.stop.is_none() && self.evaluations >= self.settings.max_evaluations {
-            self.stop = Some(Stop::EvaluationsUsedUp);
+            self.stop = Some(StopReason::EvaluationsUsedUp);
         }
     }
 
     /// Takes the cost of the pending point.
     fn take(&mut self, cost: f64) {
         if self.settings.costs.reached(cost) {
-            self.stop = Some(Stop::CostReached);
+            self.stop = Some(StopReason::CostReached);
         } else {
             self.step(cost);
         }
@@ -246,9 +246,9 @@ impl Simplex {
             return;
         }
         if self.vertices.iter().all(|vertex| vertex.cost == f64::INFINITY) {
-            self.stop = Some(Stop::Infeasible);
+            self.stop = Some(StopReason::Infeasible);
         } else if self.origin.is_empty() {
-            self.stop = Some(Stop::Settled);
+            self.stop = Some(StopReason::Converged);
         } else {
             self.iterate();
         }
@@ -350,9 +350,9 @@ impl Simplex {
         let before = self.cost_at_restart;
         let progress = best.cost < before - self.settings.costs.progress(before);
         if self.cost_at_restart.is_finite() && !progress {
-            self.stop = Some(Stop::Settled);
+            self.stop = Some(StopReason::Converged);
         } else if self.restarts == RESTARTS_MAX {
-            self.stop = Some(Stop::RestartsUsedUp);
+            self.stop = Some(StopReason::RestartsUsedUp);
         } else {
             self.restarts += 1;
             self.cost_at_restart = best.cost;

@@ -11,14 +11,14 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use osteon_common::case::Bone;
 use osteon_common::settings::Method;
-use osteon_solver::stages::{Memory, Stages};
+use osteon_solver::stages::{StageWorkspace, Stages};
 use osteon_solver::{Isa, Solver, Workspace};
 
 mod measure;
 
 use measure::draws::{bones, ensemble, setup};
 
-/// Bones that are computed in turn, so that a mean holds second looks in their share.
+/// Bones that are computed in turn, so that a mean includes second passes in their share.
 const BONES: u64 = 200;
 
 fn one_after_another(criterion: &mut Criterion, method: Method, isa: Isa, bones: &[Bone]) {
@@ -51,7 +51,7 @@ fn methods(criterion: &mut Criterion) {
 
 fn stages(criterion: &mut Criterion) {
     let stages = Stages::new(&setup(Method::Exact, 1.0), Isa::fastest());
-    let mut memory = Memory::default();
+    let mut memory = StageWorkspace::default();
     let ensemble = ensemble();
     let bone = ensemble.bone(0).expect("a bone");
     let mut group = criterion.benchmark_group("stages");

@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use osteon_common::case::Bone;
 use osteon_common::settings::Method;
-use osteon_solver::stages::{Memory, Stages};
+use osteon_solver::stages::{StageWorkspace, Stages};
 use osteon_solver::{Isa, Solver, Workspace};
 
 mod measure;
@@ -127,7 +127,7 @@ impl Row {
 /// One turn of the stages on the widest registers: smallest times, s, of each bone; returns the
 /// number of (frequency, wavenumber) pairs of the last one.
 fn measure_stages(stages: &Stages, times: &mut [[f64; STAGES.len()]]) -> usize {
-    let mut memory = Memory::default();
+    let mut memory = StageWorkspace::default();
     let ensemble = ensemble();
     let mut pairs = 0;
     for (index, times) in times.iter_mut().enumerate() {
@@ -189,7 +189,7 @@ fn print_rows(rows: &[Row], peak: f64) {
 }
 
 fn print_stages(times: &[[f64; STAGES.len()]], pairs: usize, peak: f64) {
-    println!("| stage of a first look, {} | mean | share | Mflop |", Isa::fastest().name());
+    println!("| stage of a first pass, {} | mean | share | Mflop |", Isa::fastest().name());
     println!("|:--|--:|--:|--:|");
     let means: [f64; STAGES.len()] =
         std::array::from_fn(|stage| mean(times.iter().map(|times| times[stage])));

@@ -15,7 +15,7 @@ const REFERENCE: f64 = 5.0;
 
 /// One solution of the case.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub struct MethodSolution {
     /// The setup, with the settings used.
     pub setup: Setup,
     /// The picked arrival, or the failure.
@@ -28,16 +28,16 @@ pub struct Solution {
 #[derive(Debug, Clone)]
 pub struct Check {
     /// The exact method at the case's refinement.
-    pub exact: Solution,
+    pub exact: MethodSolution,
     /// The hybrid method with the case's discretisation.
-    pub hybrid: Solution,
+    pub hybrid: MethodSolution,
     /// The exact method at five times the case's refinement, at most 16.
-    pub refined: Solution,
+    pub refined: MethodSolution,
 }
 
 impl Check {
     /// Solves `case` three times, on `isa`.
-    pub fn of(case: &Case, isa: Isa) -> Self {
+    pub fn run(case: &Case, isa: Isa) -> Self {
         let mut workspace = Workspace::default();
         let mut solve = |solver| {
             let setup = Setup { solver, ..case.setup };
@@ -48,13 +48,13 @@ impl Check {
         let reference = refined.1.clone();
         let solution = |(setup, arrival): (Setup, _)| {
             let difference = difference(&setup, &arrival, &reference);
-            Solution { setup, arrival, difference }
+            MethodSolution { setup, arrival, difference }
         };
         Self { exact: solution(exact), hybrid: solution(hybrid), refined: solution(refined) }
     }
 
     /// Returns all solutions, the reference last.
-    pub fn solutions(&self) -> [&Solution; 3] {
+    pub fn solutions(&self) -> [&MethodSolution; 3] {
         [&self.exact, &self.hybrid, &self.refined]
     }
 
@@ -65,7 +65,7 @@ impl Check {
 
     /// Returns whether all picked the same extremum, and both velocities are within the limit.
     pub fn passed(&self) -> bool {
-        self.same_picks() && self.off().next().is_none()
+        self.same_picks() && self.outside_limit().next().is_none()
     }
 
     /// Returns whether all picked the same extremum.
@@ -74,8 +74,8 @@ impl Check {
     }
 
     /// Returns the solutions whose velocity is outside the limit.
-    pub fn off(&self) -> impl Iterator<Item = &Solution> {
-        let off = |one: &&Solution| {
+    pub fn outside_limit(&self) -> impl Iterator<Item = &MethodSolution> {
+        let off = |one: &&MethodSolution| {
             one.difference.velocity().is_some_and(|error| error > self.error_max())
         };
         [&self.exact, &self.hybrid].into_iter().filter(off)
@@ -122,7 +122,7 @@ mod tests {
         let mut case =
             Case { setup: Setup::default(), bone: Bone { density: OPTIMUM.density(), elasticity } };
         case.setup.layers.bone_thickness = thickness;
-        Check::of(&case, Isa::fastest())
+        Check::run(&case, Isa::fastest())
     }
 
     #[test]

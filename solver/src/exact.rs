@@ -1,18 +1,19 @@
 //! Exact layers in the (frequency, wavenumber) domain.
 //!
-//! A bone is computed in several passes, called looks. The first look is quick and sufficient for
-//! most bones. If its estimated error is large, the band is widened. If the first arrival is small
-//! compared to later waves, the same is done without thinning. If a doubt remains (a late or weak
-//! pick, picks off their line, no pick at all), the bone is computed again with a thorough
+//! A bone is computed in one or several passes. The first pass is quick and sufficient for most
+//! bones. If its estimated error is large, the band is widened. If the first arrival is small
+//! compared to later waves, the same is done without thinning. If the pick is unreliable (late,
+//! weak, off the line of the others, or missing), the bone is computed again with a thorough
 //! sampling, and if even that finds nothing or its estimated error is large, with a refined one.
-//! The doubt is a number from 0 to 1, with which the results of two looks are blended; those of
-//! neighbouring rungs of the speed ladder (a geometric grid of speeds) are blended, too. So the
-//! velocity remains a continuous function of the bone. All of this depends on the bone alone.
+//! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
+//! (the second replaces it). The tables are made for a geometric grid of speeds, whose intervals
+//! are called speed bins; near the edge of a bin the results of both neighbours are blended, too.
+//! So the velocity remains a continuous function of the bone. All of this depends on the bone
+//! alone.
 
 pub(crate) mod direct;
 pub(crate) mod growth;
-pub(crate) mod ladder;
-pub(crate) mod look;
+pub(crate) mod pass;
 pub(crate) mod plate;
 #[cfg(feature = "measure")]
 pub(crate) mod quantities;
@@ -21,6 +22,7 @@ pub(crate) mod series;
 pub(crate) mod signal;
 #[cfg(feature = "measure")]
 pub mod stages;
+pub(crate) mod table_cache;
 pub(crate) mod tables;
 pub(crate) mod traces;
 
@@ -29,35 +31,37 @@ use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{self, Grade};
 
-use crate::exact::ladder::{Held, KeptBytes, Ladder, PAIRS_MARGIN};
-use crate::exact::look::{Estimated, ExactWorkspace, Look, Rung};
+use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace};
 use crate::exact::plate::Plate;
+use crate::exact::table_cache::{CacheBytes, PAIRS_MARGIN, TableCache, TablesRef};
 use crate::isa::{Isa, Kernel};
 use crate::medium::Medium;
 use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::Vector;
 
-/// Estimated errors, at refinement 1, between which the doubt whether the band is wide enough rises
-/// from 0 to 1.
+/// Estimated errors, at refinement 1, between which the weight of the pass with the
+/// wider band rises from 0 to 1.
 const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
-/// The same for every other doubt.
+/// The same for every other pass.
 const LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
-/// Refinement of the last look.
+/// Refinement of the last pass.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
-/// between which the doubt rises: a quick period has little room for a late packet.
+/// between which the weight of the next pass rises: a quick period has little room for a late
+/// packet.
 const LATE: (f64, f64) = (0.62, 0.72);
-/// Times from a pick to the direct wave, in periods, between which the doubt falls.
+/// Times from a pick to the direct wave, in periods, between which the weight of the next pass
+/// falls.
 const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
-/// Ratios to the threshold between which the doubt falls.
+/// Ratios to the threshold between which the weight of the next pass falls.
 const WEAK: (f64, f64) = (1.2, 1.6);
-/// Distances from the line, in periods, between which the doubt rises.
+/// Distances from the line, in periods, between which the weight of the next pass rises.
 const OFF_LINE: (f64, f64) = (0.02, 0.03);
-/// Ratios of a pick to the largest wave in its window between which the doubt falls: the errors of
-/// thinning and of leaving out slow waves reach some 1e-5 of that wave.
+/// Ratios of a pick to the largest wave in its window between which the weight of the next pass
+/// falls: the errors of thinning and of leaving out slow waves reach some 1e-5 of that wave.
 const SMALL: (f64, f64) = (0.02, 0.03);
-/// Picks of two looks that differ by more than this, in periods, belong to different extrema.
+/// Picks of two passes that differ by more than this, in periods, belong to different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
 /// The exact method for one setup, with the tables that all its realizations share.
@@ -66,11 +70,11 @@ pub(crate) struct Exact {
     setup: Setup,
     distances: Vec<f64>,
     isa: Isa,
-    quick: Ladder,
-    plain: Ladder,
-    thorough: Ladder,
-    refined: Ladder,
-    kept: KeptBytes,
+    quick: TableCache,
+    plain: TableCache,
+    thorough: TableCache,
+    refined: TableCache,
+    cache_bytes: CacheBytes,
 }
 
 impl Exact {
@@ -81,11 +85,11 @@ impl Exact {
             setup: *setup,
             distances: sampling::distances(setup).collect(),
             isa,
-            quick: Ladder::new(setup, Grade::Quick),
-            plain: Ladder::new(setup, Grade::Plain),
-            thorough: Ladder::new(setup, Grade::Thorough),
-            refined: Ladder::new(&refined, Grade::Thorough),
-            kept: KeptBytes::default(),
+            quick: TableCache::new(setup, Grade::Quick),
+            plain: TableCache::new(setup, Grade::Plain),
+            thorough: TableCache::new(setup, Grade::Thorough),
+            refined: TableCache::new(&refined, Grade::Thorough),
+            cache_bytes: CacheBytes::default(),
         }
     }
 
@@ -95,16 +99,16 @@ impl Exact {
         workspace: &mut ExactWorkspace,
     ) -> Result<Arrival, Failure> {
         let (medium, speed) = self.solid(bone)?;
-        let rung = sampling::rung(&self.setup, speed).ok_or_else(|| too_large(speed))?;
-        let mut sight =
-            Sight { exact: self, medium: &medium, speed, rung, workspace, count: 0, pairs: 0 };
-        let mut found = sight.looks();
-        let next = sampling::nearness_to_next(&self.setup, rung, speed);
+        let bin = sampling::speed_bin(&self.setup, speed).ok_or_else(|| too_large(speed))?;
+        let mut passes =
+            BonePasses { exact: self, medium: &medium, speed, bin, workspace, count: 0, pairs: 0 };
+        let mut found = passes.run();
+        let next = sampling::next_bin_weight(&self.setup, bin, speed);
         if next > 0.0 {
-            sight.rung += 1;
-            found = self.merged_if_possible(found, sight.looks(), next);
+            passes.bin += 1;
+            found = self.merged_if_possible(found, passes.run(), next);
         }
-        let Sight { count, pairs, .. } = sight;
+        let BonePasses { count, pairs, .. } = passes;
         found.map(|found| found.arrival(count, pairs))
     }
 
@@ -125,9 +129,14 @@ impl Exact {
         self.isa.run(FillPlate { medium, thickness, plate });
     }
 
-    /// Returns the rung of a ladder that a bone with waves of up to `speed` (m/s) needs.
-    fn rung<'a>(&self, ladder: &'a Ladder, index: usize, speed: f64) -> Result<Held<'a>, Failure> {
-        ladder.rung(index, &self.kept).ok_or_else(|| too_large(speed))
+    /// Returns a cache's tables of a speed bin; `speed` (m/s) is named if they are too large.
+    fn bin_tables<'a>(
+        &self,
+        cache: &'a TableCache,
+        index: usize,
+        speed: f64,
+    ) -> Result<TablesRef<'a>, Failure> {
+        cache.tables(index, &self.cache_bytes).ok_or_else(|| too_large(speed))
     }
 
     /// Returns an estimated error as it compares with the constants above, which are meant for
@@ -137,8 +146,9 @@ impl Exact {
         error * refinement * refinement * refinement
     }
 
-    /// Returns the doubt in a pick, from 0 to 1, as a continuous function.
-    fn doubt(&self, found: &Estimated, speed: f64) -> f64 {
+    /// Returns the weight of the thorough pass, a continuous function of how unreliable a pick is:
+    /// 0 keeps the pick, and 1 replaces it.
+    fn fallback_weight(&self, found: &Estimated, speed: f64) -> f64 {
         let fc = self.setup.probe.center_frequency;
         let (mut delay, mut margin) = (0.0_f64, f64::INFINITY);
         for (&x, t) in self.distances.iter().zip(&found.pick.times) {
@@ -153,33 +163,32 @@ impl Exact {
             .max(1.0 - rise(ratio, WEAK))
     }
 
-    /// Blends the results of two looks at one bone, where the second has the doubt in the first as
-    /// its weight.
+    /// Blends the results of two passes for one bone; `weight` is that of the second.
     fn merged(
         &self,
         first: Result<Estimated, Failure>,
         second: Result<Estimated, Failure>,
-        doubt: f64,
+        weight: f64,
     ) -> Result<Estimated, Failure> {
         match (first, second) {
-            (Ok(first), Ok(second)) if doubt < 1.0 && self.same_extremum(&first, &second) => {
-                self.blended(&first, &second, doubt)
+            (Ok(first), Ok(second)) if weight < 1.0 && self.same_extremum(&first, &second) => {
+                self.blended(&first, &second, weight)
             }
             (_, second) => second,
         }
     }
 
-    /// Same as [`merged`], unless the second look exceeds the limit of the computation: then the
+    /// Same as [`merged`], unless the second pass exceeds the limit of the computation: then the
     /// first result is kept, with its error.
     fn merged_if_possible(
         &self,
         first: Result<Estimated, Failure>,
         second: Result<Estimated, Failure>,
-        doubt: f64,
+        weight: f64,
     ) -> Result<Estimated, Failure> {
         match second {
             Err(Failure { kind: FailureKind::NoConvergence, .. }) => first,
-            second => self.merged(first, second, doubt),
+            second => self.merged(first, second, weight),
         }
     }
 
@@ -223,102 +232,102 @@ fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// State of the computation of one bone.
-struct Sight<'a> {
+/// State of the passes for one bone.
+struct BonePasses<'a> {
     exact: &'a Exact,
     medium: &'a Medium,
     /// Upper bound of every wave's speed, m/s.
     speed: f64,
-    /// The rung that is used of every ladder.
-    rung: usize,
+    /// Index of the speed bin.
+    bin: usize,
     workspace: &'a mut ExactWorkspace,
-    /// Number of looks so far.
+    /// Number of passes so far.
     count: u32,
     /// Number of (frequency, wavenumber) pairs computed so far.
     pairs: u64,
 }
 
-impl Sight<'_> {
-    /// Makes as many looks as the bone needs.
-    fn looks(&mut self) -> Result<Estimated, Failure> {
+impl BonePasses<'_> {
+    /// Computes as many passes as the bone needs.
+    fn run(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         if sampling::first_grade(&exact.setup) == Grade::Thorough {
             return self.thorough(&exact.thorough);
         }
         let mut found = self.quick(&exact.quick);
-        let doubt = found.as_ref().map_or(0.0, |found| 1.0 - rise(found.pick.prominence, SMALL));
-        if doubt > 0.0 {
+        let weight = found.as_ref().map_or(0.0, |found| 1.0 - rise(found.pick.prominence, SMALL));
+        if weight > 0.0 {
             let plain = self.quick(&exact.plain);
-            found = exact.merged(found, plain, doubt);
+            found = exact.merged(found, plain, weight);
         }
-        let doubt = found.as_ref().map_or(1.0, |found| exact.doubt(found, self.speed));
-        if doubt > 0.0 {
-            let last = self.careful();
-            found = exact.merged(found, last, doubt);
+        let weight = found.as_ref().map_or(1.0, |found| exact.fallback_weight(found, self.speed));
+        if weight > 0.0 {
+            let last = self.thorough_or_refined();
+            found = exact.merged(found, last, weight);
         }
         found
     }
 
-    /// Makes a look in the first band, and one in the whole band if that is needed.
-    fn quick(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
+    /// Makes a pass in the first band, and one in the whole band if that is needed.
+    fn quick(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
         let exact = self.exact;
-        let rung = &*exact.rung(ladder, self.rung, self.speed)?;
+        let bin = &*exact.bin_tables(cache, self.bin, self.speed)?;
         exact.fill_plate(self.medium, &mut self.workspace.fast);
-        self.workspace.spectra.clear(&rung.tables);
-        self.fill(rung, 0, rung.first.lines);
-        let mut found = self.look(rung, &rung.first);
-        let doubt =
+        self.workspace.spectra.clear(&bin.tables);
+        self.fill(bin, 0, bin.first.lines);
+        let mut found = self.pass(bin, &bin.first);
+        let weight =
             found.as_ref().map_or(1.0, |found| rise(exact.counted(found.error), NARROW_BAND));
-        if doubt > 0.0 {
-            self.fill(rung, rung.first.lines, rung.whole.lines);
-            let wider = self.look(rung, &rung.whole);
-            found = exact.merged(found, wider, doubt);
+        if weight > 0.0 {
+            self.fill(bin, bin.first.lines, bin.whole.lines);
+            let wider = self.pass(bin, &bin.whole);
+            found = exact.merged(found, wider, weight);
         }
         found
     }
 
-    /// Makes a thorough look, and a refined one if that is needed.
-    fn careful(&mut self) -> Result<Estimated, Failure> {
+    /// Makes a thorough pass, and a refined one if that is needed.
+    fn thorough_or_refined(&mut self) -> Result<Estimated, Failure> {
         let exact = self.exact;
         let thorough = self.thorough(&exact.thorough);
-        let doubt = match &thorough {
+        let weight = match &thorough {
             Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
-            // Whether there is an arrival is decided by the best look.
+            // Whether there is an arrival is decided by the best pass.
             Err(Failure {
                 kind: FailureKind::NoArrival | FailureKind::InconsistentArrival,
                 ..
             }) => 1.0,
             Err(_) => 0.0,
         };
-        if doubt == 0.0 {
+        if weight == 0.0 {
             return thorough;
         }
         let refined = self.thorough(&exact.refined);
-        exact.merged_if_possible(thorough, refined, doubt)
+        exact.merged_if_possible(thorough, refined, weight)
     }
 
-    /// Makes one thorough look.
-    fn thorough(&mut self, ladder: &Ladder) -> Result<Estimated, Failure> {
-        let rung = &*self.exact.rung(ladder, self.rung, self.speed)?;
+    /// Makes one thorough pass.
+    fn thorough(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
         let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
         self.exact.fill_plate(self.medium, accurate);
-        spectra.clear(&rung.tables);
-        spectra.fill(self.exact.isa, &rung.tables, self.medium, accurate, 0..rung.whole.lines);
-        self.pairs += rung.whole.sampled.pairs;
-        self.look(rung, &rung.whole)
+        spectra.clear(&bin.tables);
+        spectra.fill(self.exact.isa, &bin.tables, self.medium, accurate, 0..bin.whole.lines);
+        self.pairs += bin.whole.sampled.pairs;
+        self.pass(bin, &bin.whole)
     }
 
     /// Computes lines `from` … `to` - 1 of a quick sampling's spectra.
-    fn fill(&mut self, rung: &Rung, from: usize, to: usize) {
+    fn fill(&mut self, bin: &BinTables, from: usize, to: usize) {
         let ExactWorkspace { fast, spectra, .. } = &mut *self.workspace;
-        spectra.fill(self.exact.isa, &rung.tables, self.medium, fast, from..to);
-        self.pairs += rung.tables.pairs(from..to);
+        spectra.fill(self.exact.isa, &bin.tables, self.medium, fast, from..to);
+        self.pairs += bin.tables.pairs(from..to);
     }
 
-    fn look(&mut self, rung: &Rung, look: &Look) -> Result<Estimated, Failure> {
+    fn pass(&mut self, bin: &BinTables, band: &Band) -> Result<Estimated, Failure> {
         self.count += 1;
-        self.exact.observe(self.speed, rung, look, self.workspace)?;
-        self.exact.picked(rung, look, self.workspace)
+        self.exact.observe(self.speed, bin, band, self.workspace)?;
+        self.exact.picked(bin, band, self.workspace)
     }
 }
 

@@ -49,9 +49,9 @@ use osteon_common::sampling;
 
 #[cfg(feature = "measure")]
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
-use self::march::Memory;
+use self::march::MarchWorkspace;
 use self::passes::Passes;
-use self::plan::Budget;
+use self::plan::WorkBudget;
 use self::scope::Scope;
 use crate::isa::Isa;
 use crate::medium::Medium;
@@ -70,7 +70,7 @@ pub struct Hybrid {
 /// Scratch memory of one thread; its contents never reach a result.
 #[derive(Debug, Default)]
 pub struct HybridWorkspace {
-    memory: Memory,
+    memory: MarchWorkspace,
     windows: Vec<Window>,
 }
 
@@ -111,11 +111,11 @@ impl Hybrid {
             distances: &self.distances,
             isa: self.isa,
             bone,
-            whole: Scope::whole(&self.setup, speed),
+            whole: Scope::until_direct_wave(&self.setup, speed),
             memory,
             windows,
             share: None,
-            budget: Budget::default(),
+            budget: WorkBudget::default(),
         }
         .arrival()
     }

@@ -34,4 +34,4 @@ pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::{Isa, UnknownIsa};
-pub use solver::{Arrival, Failure, Looks, Sampled, Solver, Workspace};
+pub use solver::{Arrival, Failure, PassSummary, Sampled, Solver, Workspace};

@@ -15,7 +15,7 @@ const RESIDUAL_PERIODS_MAX: f64 = 0.05;
 
 /// A local extremum of the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extremum {
+pub(crate) struct PressureExtremum {
     /// Time, s.
     pub(crate) time: f64,
     /// Pressure, Pa.
@@ -26,7 +26,7 @@ pub(crate) struct Extremum {
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     /// Local extrema in order of time.
-    pub(crate) extrema: Vec<Extremum>,
+    pub(crate) extrema: Vec<PressureExtremum>,
     /// |p| at the end of the window, Pa.
     pub(crate) last: f64,
 }
@@ -234,7 +234,7 @@ mod tests {
             .map(|r| Window {
                 extrema: extrema
                     .iter()
-                    .map(|&(time, pressure)| Extremum {
+                    .map(|&(time, pressure)| PressureExtremum {
                         time: (time + 0.25 * r as f64) * 1e-6,
                         pressure,
                     })

@@ -1,13 +1,13 @@
 //! Computes the velocity of one realization by the method that the setup requests.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::outcome::{FailureKind, Outcome, Solved};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::sampling;
 use osteon_common::settings::Method;
 
 use crate::exact::Exact;
-use crate::exact::look::ExactWorkspace;
+use crate::exact::pass::ExactWorkspace;
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 
@@ -38,21 +38,21 @@ pub struct Arrival {
     pub estimated_error: f64,
     /// Sampling of the exact method; `None` for the hybrid method, whose discretisation is in the
     /// setup.
-    pub looks: Option<Looks>,
+    pub passes: Option<PassSummary>,
 }
 
 /// Sampling of the exact method for one bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Looks {
-    /// Number of looks (refinement passes) at the bone.
+pub struct PassSummary {
+    /// Number of passes.
     pub count: u32,
     /// Total number of (frequency, wavenumber) pairs computed.
     pub pairs_computed: u64,
-    /// Sampling of the last look that contributed.
+    /// Sampling of the last pass that contributed.
     pub last: Sampled,
 }
 
-/// Sampling of one look.
+/// Sampling of one pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled {
     /// Highest frequency, Hz.
@@ -122,15 +122,15 @@ impl Solver {
         ensemble: &Ensemble,
         index: u64,
         workspace: &mut Workspace,
-    ) -> Solved {
+    ) -> RealizationResult {
         let Ok(bone) = ensemble.bone(index) else {
-            return Solved::failed(FailureKind::NotFinite);
+            return RealizationResult::failed(FailureKind::NotFinite);
         };
         match self.arrival(&bone, workspace) {
             Ok(Arrival { velocity, estimated_error, .. }) => {
-                Solved { outcome: Ok(velocity), estimated_error }
+                RealizationResult { outcome: Ok(velocity), estimated_error }
             }
-            Err(failure) => Solved::failed(failure.kind),
+            Err(failure) => RealizationResult::failed(failure.kind),
         }
     }
 }

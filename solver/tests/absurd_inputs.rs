@@ -9,7 +9,7 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::realization::Ensemble;
-use osteon_common::sampling::{Sampling, pair_count};
+use osteon_common::sampling::{WaveSampling, pair_count};
 use osteon_common::violations::Violations;
 use osteon_fuzz::properties;
 use osteon_solver::{Isa, Solver, Workspace};
@@ -121,7 +121,7 @@ fn is_admissible(setup: &Setup) -> bool {
 fn check_traces(solver: &Solver, bone: &Bone) {
     let duration = 2.0 / solver.setup().probe.center_frequency;
     let sampling =
-        Sampling::for_traces(solver.setup(), speed_bound(solver.setup(), bone), duration);
+        WaveSampling::for_traces(solver.setup(), speed_bound(solver.setup(), bone), duration);
     if sampling.pairs(sampling.band) > PAIRS_MAX {
         return;
     }

@@ -1,5 +1,5 @@
 //! First arrivals that are small against the waves behind them: nothing that is left out of a quick
-//! look may move them.
+//! pass may move them.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -29,7 +29,7 @@ fn check(name: &str, constants: [f64; 6], bound: f64) {
 
 #[test]
 fn a_weak_first_arrival_is_right() {
-    // Without a look at nothing thinned out these are off by 5.8e-4 and 3.2e-4.
+    // Without the pass in which nothing is thinned out, these are off by 5.8e-4 and 3.2e-4.
     check("stiff across", [1579.81, 17.9107e9, 0.11726, 4.09166e9, 13.1159e9, 0.27735], 1e-4);
     check("in a search's bounds", [1750.0, 20e9, 0.22, 5e9, 10e9, 0.25], 1e-4);
 }
@@ -44,18 +44,18 @@ fn a_bone_whose_waves_hardly_couple_has_a_velocity() {
 /// What is computed for neighbouring ranges of speed differs a little; at the edge both count.
 #[test]
 fn no_velocity_jumps_where_the_sampling_changes() {
-    for rung in 17..21 {
+    for bin in 17..21 {
         let setup = Setup::default();
         let elasticity =
             Point([1700.0, 17e9, 0.37, 4.8e9, 10e9, 0.44, 0.1]).constants().elasticity();
         let bone = Bone { density: 1700.0, elasticity: elasticity.unwrap() };
-        let edge = osteon_common::sampling::rung_speed(&setup, rung);
+        let edge = osteon_common::sampling::speed_bin_edge(&setup, bin);
         let ratio = osteon_solver::fastest_wave(&bone) / edge;
         let solver = Solver::new(&setup);
         let [below, above] = [1.0 + 1e-9, 1.0 - 1e-9].map(|factor| {
             let bone = Bone { density: bone.density * ratio * ratio * factor, ..bone };
             solver.arrival(&bone, &mut Workspace::default()).unwrap().velocity
         });
-        assert!((above / below - 1.0).abs() < 1e-8, "rung {rung}: {below} and {above}");
+        assert!((above / below - 1.0).abs() < 1e-8, "bin {bin}: {below} and {above}");
     }
 }

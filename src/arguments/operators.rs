@@ -23,7 +23,7 @@ pub(crate) struct WorkersArguments {
 /// What can be done with workers.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WorkersCommand {
-    /// Send a worker away: it gets nothing new, answers what it holds, and ends
+    /// Drain a worker: it gets no new batches, answers those it holds, and ends
     Drain(DrainArguments),
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct HealthArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Longest wait for the answer, s, 0.1 to 60
+    /// Maximum time to wait for the answer, s, 0.1 to 60
     #[arg(long, value_name = "S", default_value = "5", value_parser = probe_seconds)]
     pub(crate) timeout: f64,
     /// Print JSON
@@ -58,7 +58,7 @@ pub(crate) struct HealthArguments {
 /// Of `backup`.
 #[derive(Debug, Args)]
 pub(crate) struct BackupArguments {
-    /// Directory for the copy, which is named osteon.sqlite; none may be there already
+    /// Directory for the copy, osteon.sqlite, which must not exist there yet
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// The coordinator.

@@ -45,7 +45,7 @@ fn what_cannot_be_meant_is_refused() {
     {
         check(
             &format!("osteon jobs prune --older-than={age}{unit}"),
-            "it must be a number with a unit",
+            "it must be a number with the unit",
         );
     }
     for fraction in ["-0.1", "1.1", "nan", "half"] {

@@ -67,7 +67,8 @@ pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, Cli
         let credentials = loaded(&files, endpoint).await?;
         Ok(endpoint::connect_with(endpoint, &credentials, limit).await?)
     };
-    let connection = connected.await.map_err(|error: ClientError| error.without(unused))?;
+    let connection =
+        connected.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
     let left = limit.saturating_sub(begun.elapsed());

@@ -12,27 +12,27 @@ use super::Fetched;
 
 /// The parts received so far.
 #[derive(Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct FetchedParts {
     specification: Option<v1::JobSpecification>,
     result: Option<v1::JobResult>,
     history: Vec<Evaluation>,
     /// The outcomes at the best point of the job.
-    realizations: Realizations,
-    groups: Vec<(v1::GroupResult, Realizations)>,
+    realizations: PointOutcomes,
+    groups: Vec<(v1::GroupResult, PointOutcomes)>,
     /// Number of outcomes of groups that were kept.
     kept: u64,
 }
 
 /// The outcomes of one point.
 #[derive(Debug, Default)]
-struct Realizations {
+struct PointOutcomes {
     /// Number of outcomes received.
     count: u64,
     /// All outcomes received, or none if there are too many.
     outcomes: Vec<Outcome>,
 }
 
-impl Parts {
+impl FetchedParts {
     /// Adds the next part.
     pub(super) fn add(&mut self, part: Part) -> Result<(), Malformed> {
         match part {
@@ -49,7 +49,7 @@ impl Parts {
                     let allowed = "groups must follow each other, at most 1000";
                     return Err(out_of_range("group", group.group.into(), allowed));
                 }
-                self.groups.push((group, Realizations::default()));
+                self.groups.push((group, PointOutcomes::default()));
             }
             Part::Realizations(block) => self.add_realizations(&block)?,
         }
@@ -84,16 +84,16 @@ impl Parts {
     }
 
     /// Assembles the parts once all have arrived.
-    pub(super) fn whole(self) -> Result<Fetched, Malformed> {
+    pub(super) fn assemble(self) -> Result<Fetched, Malformed> {
         let specification =
             self.specification.ok_or(Malformed::Missing { field: "specification" })?;
         let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
         let all = result.realizations;
         let groups = self.groups.into_iter().map(|(group, of_group)| {
-            results::group_from_message(&group, of_group.whole(group.best.is_some(), all)?)
+            results::group_from_message(&group, of_group.assemble(group.best.is_some(), all)?)
         });
         let groups = groups.collect::<Result<_, _>>()?;
-        let outcomes = self.realizations.whole(result.best.is_some(), all)?;
+        let outcomes = self.realizations.assemble(result.best.is_some(), all)?;
         Ok(Fetched {
             specification: specification::from_message(&specification)
                 .map_err(Malformed::InvalidSpecification)?,
@@ -103,9 +103,9 @@ impl Parts {
     }
 }
 
-impl Realizations {
+impl PointOutcomes {
     /// Returns the outcomes, whose number must be `all` if there is a best point, and 0 otherwise.
-    fn whole(self, has_best: bool, all: u64) -> Result<Vec<Outcome>, Malformed> {
+    fn assemble(self, has_best: bool, all: u64) -> Result<Vec<Outcome>, Malformed> {
         let expected = if has_best { all } else { 0 };
         if self.count == expected {
             return Ok(self.outcomes);

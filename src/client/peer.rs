@@ -94,7 +94,7 @@ impl Peer {
         let endpoint = self.endpoint.clone();
         if let Some(failure) = TlsFailure::of(status) {
             let error = ClientError::from(ConnectError::Tls { endpoint, failure });
-            return error.without(&self.unused);
+            return error.with_unused_variables(&self.unused);
         }
         let reason = status.message().to_owned();
         // Statuses sent by the coordinator have no source; only errors of the transport have one.
@@ -108,7 +108,7 @@ impl Peer {
             Code::Internal if !answered => ClientError::Lost { endpoint, reason },
             code => {
                 let refused = ClientError::Refused { endpoint, code, reason, hint: hint(status) };
-                refused.without(&self.unused)
+                refused.with_unused_variables(&self.unused)
             }
         }
     }

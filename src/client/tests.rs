@@ -97,7 +97,7 @@ async fn a_submission_whose_answer_is_lost_makes_one_job() {
     let proxy = tokio::spawn(loses_the_first_answer(listener, there.clone(), Arc::clone(&cut)));
     let mut client = Client::connect(&remote(&between)).await.unwrap();
     let mut witness = Client::connect(&remote(&there)).await.unwrap();
-    let (specification, request) = (example(), Request::new().unwrap());
+    let (specification, request) = (example(), RequestId::new().unwrap());
     let accepted = async {
         while witness.list().await.unwrap().is_empty() {
             sleep(Duration::from_millis(5)).await;
@@ -124,7 +124,7 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
         }
     });
     let mut client = Client::connect(&remote(&socket)).await.unwrap();
-    let (begun, request) = (Instant::now(), Request::new().unwrap());
+    let (begun, request) = (Instant::now(), RequestId::new().unwrap());
     let error = client.submit(&example(), &request, SubmitOptions::default()).await.unwrap_err();
     assert!(matches!(error, ClientError::Uncertain { .. }), "{error:?}");
     let told = format!("--request-id {} ", request.id);
@@ -170,7 +170,7 @@ async fn tls_is_thought_of_only_where_no_answer_ever_came() {
     assert!(!error.to_string().contains("https://"), "{error}");
     let mut never = Client::connect(&remote).await.unwrap();
     let error = never.list().await.unwrap_err().to_string();
-    assert!(error.contains("if the coordinator speaks TLS, write https://"), "{error}");
+    assert!(error.contains("if the coordinator uses TLS, write https://"), "{error}");
     proxy.abort();
     coordinator.shutdown().await;
 }

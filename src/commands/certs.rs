@@ -9,21 +9,21 @@ use osteon_proto::endpoint;
 use time::OffsetDateTime;
 
 use crate::arguments::CertsArguments;
-use crate::certificates::{Authority, Bearer, Made};
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::certificates::{Authority, CertificateHolder, PemPair};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 
 /// Base name of the authority's files.
 const AUTHORITY: &str = "ca";
 
 /// Writes `NAME.pem` and `NAME-key.pem` for the authority, the coordinator (`server`), workers
 /// (`worker`) and clients (`client`); prints their names.
-pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
+pub(super) fn make(arguments: &CertsArguments) -> Result<ExitStatus, CommandFailure> {
     let CertsArguments { directory, host, days, ca } = arguments;
     if let Some(wrong) = host.iter().find(|host| !endpoint::is_host(host)) {
-        return Err(Failure::bad_input(anyhow!(
+        return Err(CommandFailure::bad_input(anyhow!(
             "--host `{wrong}` is neither a host name nor an IP address"
         )));
     }
@@ -36,9 +36,9 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
         }
     };
     let bearers = [
-        ("server", Bearer::Coordinator(host)),
-        ("worker", Bearer::Worker),
-        ("client", Bearer::Client),
+        ("server", CertificateHolder::Coordinator(host)),
+        ("worker", CertificateHolder::Worker),
+        ("client", CertificateHolder::Client),
     ];
     for (name, bearer) in bearers {
         let made = authority.sign(bearer, now, *days).map_err(unmade)?;
@@ -48,24 +48,24 @@ pub(super) fn make(arguments: &CertsArguments) -> Result<Ending, Failure> {
     new_files::create(&files)?;
     let names: String =
         files.iter().map(|file| format!("{}\n", visible::path(&file.path))).collect();
-    output::stdout(Format::Text).verbatim(&names).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    output::stdout(OutputFormat::Text).verbatim(&names).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// Returns the authority in `ca`, and a copy of its certificate to be written to `directory`.
-fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Failure> {
+fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), CommandFailure> {
     let (certificate, key) = (ca.join("ca.pem"), ca.join("ca-key.pem"));
-    credential_file::identity(&certificate, &key).map_err(Failure::bad_input)?;
-    let text = credential_file::trusted_text(&certificate).map_err(Failure::bad_input)?;
-    let secret = credential_file::secret_text(&key).map_err(Failure::bad_input)?;
+    credential_file::identity(&certificate, &key).map_err(CommandFailure::bad_input)?;
+    let text = credential_file::trusted_text(&certificate).map_err(CommandFailure::bad_input)?;
+    let secret = credential_file::secret_text(&key).map_err(CommandFailure::bad_input)?;
     let authority = Authority::from_pem(&text, &secret)
         .with_context(|| format!("{} is not an authority that can sign", certificate.display()))
-        .map_err(Failure::BadInput)?;
+        .map_err(CommandFailure::BadInput)?;
     let copy = NewFile { path: directory.join("ca.pem"), text, secret: false };
     Ok((authority, vec![copy]))
 }
 
-fn pair(directory: &Path, name: &str, made: Made) -> Vec<NewFile> {
+fn pair(directory: &Path, name: &str, made: PemPair) -> Vec<NewFile> {
     let file = |suffix: &str, text, secret| NewFile {
         path: directory.join(format!("{name}{suffix}")),
         text,
@@ -74,6 +74,6 @@ fn pair(directory: &Path, name: &str, made: Made) -> Vec<NewFile> {
     vec![file(".pem", made.certificate, false), file("-key.pem", made.key, true)]
 }
 
-fn unmade(error: rcgen::Error) -> Failure {
-    Failure::Failed(anyhow::Error::new(error).context("cannot make a certificate"))
+fn unmade(error: rcgen::Error) -> CommandFailure {
+    CommandFailure::Failed(anyhow::Error::new(error).context("cannot make a certificate"))
 }

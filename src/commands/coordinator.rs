@@ -9,11 +9,11 @@ use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, open_files};
 
 use crate::arguments::CoordinatorArguments;
-use crate::door::Door;
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
+use crate::listener_security::ListenerSecurity;
 use crate::output;
 use crate::program;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 use crate::result_files;
 use crate::signals;
 
@@ -22,14 +22,14 @@ const HEARTBEATS_PER_LEASE: u32 = 5;
 
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
 /// printed, and stands in DIR/address.
-pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Failure> {
-    let address: ListenAddress = arguments.listen.parse().map_err(Failure::bad_input)?;
+pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus, CommandFailure> {
+    let address: ListenAddress = arguments.listen.parse().map_err(CommandFailure::bad_input)?;
     // Read before anything is bound or created.
-    let door = Door::open(&arguments, &address)?;
+    let security = ListenerSecurity::from_arguments(&arguments, &address)?;
     let mut interruption = pin!(signals::interruption()?);
-    let mut reload = match &door {
+    let mut reload = match &security {
         // SIGHUP keeps its default effect if there is nothing to reload.
-        Door::Open => None,
+        ListenerSecurity::None => None,
         _ => Some(signals::hangups()?),
     };
     let directory = arguments.store.clone();
@@ -37,12 +37,12 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
         // The socket may be located in the directory of the store.
         SqliteStore::make_directory(&directory)
             .with_context(|| format!("cannot create the directory {}", directory.display()))
-            .map_err(Failure::Failed)?;
+            .map_err(CommandFailure::Failed)?;
     }
     open_files::raise_limit();
-    let listener = door.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
+    let listener = security.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
     let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
-    let store = SqliteStore::open_with(&directory, lost).map_err(Failure::failed)?;
+    let store = SqliteStore::open_with(&directory, lost).map_err(CommandFailure::failed)?;
     let config = Config {
         audit_fraction: arguments.audit_fraction,
         speculation: !arguments.no_speculation,
@@ -54,16 +54,16 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<Ending, Fai
     };
     let coordinator = osteon_coordinator::start(listener, Box::new(store), config)
         .await
-        .map_err(Failure::failed)?;
+        .map_err(CommandFailure::failed)?;
     let address_file = directory.join("address");
     result_files::write(&address_file, &format!("{}\n", coordinator.url()))
-        .map_err(Failure::Failed)?;
-    let printed = output::stdout(Format::Text).verbatim(&format!("{}\n", coordinator.url()));
+        .map_err(CommandFailure::Failed)?;
+    let printed = output::stdout(OutputFormat::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {
         Ok(()) => loop {
             tokio::select! {
-                _ = interruption.as_mut() => break Ok(Ending::Done),
-                failed = coordinator.failed() => break Err(Failure::failed(failed)),
+                _ = interruption.as_mut() => break Ok(ExitStatus::Done),
+                failed = coordinator.failed() => break Err(CommandFailure::failed(failed)),
                 () = signals::next(&mut reload) => reload_credentials(&coordinator, &arguments, &address),
             }
         },
@@ -82,9 +82,9 @@ fn reload_credentials(
     arguments: &CoordinatorArguments,
     address: &ListenAddress,
 ) {
-    let kept = "tokens and certificates stay as they were";
+    let kept = "the previous tokens and certificates stay in use";
     // A pipe need not be written a second time, and everything else would have to wait for it.
-    if let Some(pipe) = Door::pipe(arguments) {
+    if let Some(pipe) = ListenerSecurity::first_pipe(arguments) {
         let reason = format!(
             "{} is a pipe, which cannot be read again; name a regular file at the next start",
             visible::path(pipe)
@@ -92,10 +92,10 @@ fn reload_credentials(
         tracing::error!(reason, "{kept}");
         return;
     }
-    let tokens = match Door::open(arguments, address) {
-        Ok(Door::Open) => return,
-        Ok(Door::Tokens(tokens)) => tokens,
-        Ok(Door::Tls(tls, tokens)) => {
+    let tokens = match ListenerSecurity::from_arguments(arguments, address) {
+        Ok(ListenerSecurity::None) => return,
+        Ok(ListenerSecurity::Tokens(tokens)) => tokens,
+        Ok(ListenerSecurity::Tls(tls, tokens)) => {
             coordinator.replace_tls(tls);
             tokens
         }
@@ -110,9 +110,9 @@ fn reload_credentials(
     tracing::info!(tokens = count, "tokens and certificates are read again");
 }
 
-fn bind_failure(error: BindError) -> Failure {
+fn bind_failure(error: BindError) -> CommandFailure {
     match error {
-        BindError::NotLoopback { .. } => Failure::bad_input(error),
-        _ => Failure::failed(error),
+        BindError::NotLoopback { .. } => CommandFailure::bad_input(error),
+        _ => CommandFailure::failed(error),
     }
 }

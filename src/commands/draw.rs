@@ -10,18 +10,18 @@ use osteon_common::realization::Ensemble;
 use osteon_common::{case_file, job_file, report};
 
 use crate::arguments::DrawArguments;
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 use crate::results_directory;
 
 /// Prints the case file.
-pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
+pub(super) fn draw(arguments: &DrawArguments) -> Result<ExitStatus, CommandFailure> {
     let specification =
-        job_file::read(&arguments.job, JobKind::Propagation).map_err(Failure::bad_input)?;
+        job_file::read(&arguments.job, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
     let (index, count) = (arguments.index, specification.monte_carlo.realizations);
     if index >= count {
-        return Err(Failure::bad_input(anyhow!(
+        return Err(CommandFailure::bad_input(anyhow!(
             "--index {index} is beyond the job's {count} realizations; it must be 0 to {}",
             count - 1
         )));
@@ -29,22 +29,23 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<Ending, Failure> {
     let point = match &arguments.at {
         Some(directory) => {
             let group = arguments.group.as_deref();
-            let point = best_point(directory, group).map_err(Failure::BadInput)?;
-            same_job(directory, &arguments.job, &specification).map_err(Failure::BadInput)?;
+            let point = best_point(directory, group).map_err(CommandFailure::BadInput)?;
+            same_job(directory, &arguments.job, &specification)
+                .map_err(CommandFailure::BadInput)?;
             point
         }
         None => specification.start(),
     };
-    let ensemble =
-        Ensemble::drawn(&point, specification.monte_carlo.germs()).map_err(Failure::bad_input)?;
+    let ensemble = Ensemble::drawn(&point, specification.monte_carlo.germs())
+        .map_err(CommandFailure::bad_input)?;
     let bone = ensemble.bone(index).map_err(|error| {
-        Failure::failed(anyhow::Error::new(error).context(format!(
-            "realization {index} is not an elasticity in floating point (failure not_finite)"
+        CommandFailure::failed(anyhow::Error::new(error).context(format!(
+            "realization {index} has no finite elasticity matrix (failure not_finite)"
         )))
     })?;
     let text = case_file::to_toml(&Case { setup: specification.setup, bone });
-    output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// Refuses a directory whose results are not those of the job, since the realizations at its best
@@ -57,7 +58,10 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
         Some(both) => both,
         None => {
             let there = there(JobKind::Propagation).with_context(|| {
-                format!("cannot tell whose results {} holds", directory.display())
+                format!(
+                    "cannot determine which job the results in {} belong to",
+                    directory.display()
+                )
             })?;
             (specification.clone(), there)
         }
@@ -82,7 +86,7 @@ fn best_point(directory: &Path, group: Option<&str>) -> anyhow::Result<Point> {
     if group.is_none() && !groups.is_empty() {
         let names: Vec<String> = groups.iter().map(|group| group.name.clone()).collect();
         return Err(anyhow!(
-            "{}: the result is one of groups; name one of them by --group: {}",
+            "{}: the result is for groups; choose one with --group: {}",
             results_directory::result_path(directory),
             report::listed(&names)
         ));

@@ -12,12 +12,12 @@ use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 
 use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
-use crate::request::Request;
-use crate::resolved::Format;
+use crate::request_id::RequestId;
+use crate::resolved::OutputFormat;
 use crate::results_directory::ResultsDirectory;
-use crate::{unsearched_groups, verdict, warnings};
+use crate::{result_status, unsearched_groups, warnings};
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -29,7 +29,7 @@ pub(super) struct Submission<'a> {
     /// Kind of the job.
     pub(super) kind: JobKind,
     /// The request, which makes the submission idempotent.
-    pub(super) request: &'a Request,
+    pub(super) request: &'a RequestId,
     /// Further properties of the job.
     pub(super) options: SubmitOptions,
 }
@@ -38,25 +38,28 @@ pub(super) struct Submission<'a> {
 pub(super) async fn submit(
     submission: Submission<'_>,
     coordinator: &Remote,
-    format: Format,
-) -> Result<Ending, Failure> {
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let Submission { job, kind, request, options } = submission;
-    let noted = job_file::read_with_warnings(job, kind).map_err(Failure::bad_input)?;
+    let noted = job_file::read_with_warnings(job, kind).map_err(CommandFailure::bad_input)?;
     unsearched_groups::warn(job, &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
     let mut client = Client::connect(coordinator).await?;
     let id = client.submit(&noted.specification, request, options).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
-/// `jobs`: prints all jobs, and the workers that are expelled.
-pub(super) async fn list(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
+/// `jobs`: prints all jobs, and the workers that are banned.
+pub(super) async fn list(
+    coordinator: &Remote,
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let mut client = Client::connect(coordinator).await?;
     let jobs = client.list().await?;
-    let expelled = client.expelled().await?;
-    output::stdout(format).jobs(&jobs, &expelled).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    let banned = client.banned().await?;
+    output::stdout(format).jobs(&jobs, &banned).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// `jobs prune`: prints the ids of the deleted jobs.
@@ -64,18 +67,18 @@ pub(super) async fn prune(
     older_than: Option<Duration>,
     keep_last: Option<u64>,
     coordinator: &Remote,
-    format: Format,
-) -> Result<Ending, Failure> {
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let jobs = Client::connect(coordinator).await?.prune(older_than, keep_last).await?;
     output::stdout(format).pruned(&jobs).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
-pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
-    coordinator.tell();
+pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
+    coordinator.announce();
     let mut client = Client::connect(coordinator).await?;
-    let mut output = output::stdout(Format::Text);
+    let mut output = output::stdout(OutputFormat::Text);
     let mut last_line: Option<Instant> = None;
     let show = |snapshot: &JobSnapshot| {
         let due = last_line.is_none_or(|last| last.elapsed() >= LINE_INTERVAL);
@@ -86,27 +89,31 @@ pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<Ending, Fai
         output.snapshot(snapshot).map_err(stdout_failure)
     };
     let last = client.watch(job, show).await?;
-    Ok(ending(&last))
+    Ok(exit_status(&last))
 }
 
 /// `cancel`: prints the job's state afterwards.
-pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<Ending, Failure> {
+pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
     let snapshot = Client::connect(coordinator).await?.cancel(job).await?;
-    output::stdout(Format::Text).snapshot(&snapshot).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    output::stdout(OutputFormat::Text).snapshot(&snapshot).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// `fetch`: writes the results of an ended job. Nothing is written while it has not ended.
-pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<Ending, Failure> {
+pub(super) async fn fetch(
+    job: &str,
+    coordinator: &Remote,
+    out: &Path,
+) -> Result<ExitStatus, CommandFailure> {
     let fetched =
         Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
-                Failure::failed(anyhow!("{reason}; wait for it with `osteon watch {job}`"))
+                CommandFailure::failed(anyhow!("{reason}; wait for it with `osteon watch {job}`"))
             }
-            _ => Failure::from(error),
+            _ => CommandFailure::from(error),
         })?;
-    if let Some(missing) = verdict::missing_result(&fetched) {
-        return Err(Failure::failed(anyhow!("job {job}: {missing}")));
+    if let Some(missing) = result_status::missing_result(&fetched) {
+        return Err(CommandFailure::failed(anyhow!("job {job}: {missing}")));
     }
     let specification = &fetched.specification;
     // Checked before anything is created there, and again when the directory is locked.
@@ -121,28 +128,28 @@ pub(super) async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result
         directory.write_results(specification.kind, &fetched)?;
     }
     let line = format!("{}\n", visible::path(out));
-    output::stdout(Format::Text).verbatim(&line).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// Returns whether the fetched result replaces the one stored in `out`. It does not if both are the
 /// same, and a completed run is never replaced.
-fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, Failure> {
+fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, CommandFailure> {
     let specification = &fetched.specification;
     let new = ResultFile::from_job(specification.kind, &fetched.result);
     // The digest covers everything that was computed; the program's version may differ.
     if (stored.status(), stored.digest()) == (new.status(), new.digest()) {
         return Ok(false);
     }
-    let failed = verdict::ending(specification, stored) == Ending::RunFailed;
-    if failed && !verdict::is_cancelled(&new) || verdict::is_cancelled(stored) {
+    let failed = result_status::exit_status(specification, stored) == ExitStatus::RunFailed;
+    if failed && !result_status::is_cancelled(&new) || result_status::is_cancelled(stored) {
         return Ok(true);
     }
     let shown = |result: &ResultFile| {
         let status = result.status().map_or("", Status::name);
         format!("{status} digest {}", result.digest()).trim_start().to_owned()
     };
-    Err(Failure::bad_input(anyhow!(
+    Err(CommandFailure::bad_input(anyhow!(
         "{} holds another result of this job ({} there, {} fetched); choose another --out directory",
         out.display(),
         shown(stored),
@@ -150,9 +157,9 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
     )))
 }
 
-fn ending(snapshot: &JobSnapshot) -> Ending {
+fn exit_status(snapshot: &JobSnapshot) -> ExitStatus {
     match client::job_status(snapshot) {
-        Some(Status::Converged | Status::MaxEvaluations) => Ending::Done,
-        _ => Ending::RunFailed,
+        Some(Status::Converged | Status::MaxEvaluations) => ExitStatus::Done,
+        _ => ExitStatus::RunFailed,
     }
 }

@@ -12,55 +12,59 @@ use osteon_proto::v1::BackupEnd;
 use tempfile::NamedTempFile;
 
 use crate::client::{Client, Remote, operators};
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 
 /// Name of a store's file in its directory, and of the files that SQLite keeps beside it.
 const STORE: &str = "osteon.sqlite";
 const BESIDE_STORE: [&str; 3] =
     ["osteon.sqlite-wal", "osteon.sqlite-journal", "osteon.acknowledged"];
 
-/// `workers`: prints the attached workers, those that left last, and those that are expelled.
-pub(super) async fn workers(coordinator: &Remote, format: Format) -> Result<Ending, Failure> {
+/// `workers`: prints the attached workers, those that left last, and those that are banned.
+pub(super) async fn workers(
+    coordinator: &Remote,
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let mut client = Client::connect(coordinator).await?;
     let workers = client.workers().await?;
-    let expelled = client.expelled().await?;
-    output::stdout(format).workers(&workers, &expelled).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    let banned = client.banned().await?;
+    output::stdout(format).workers(&workers, &banned).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// `workers drain`: prints the worker's state afterwards.
 pub(super) async fn drain(
     worker: u64,
     coordinator: &Remote,
-    format: Format,
-) -> Result<Ending, Failure> {
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let worker = Client::connect(coordinator).await?.drain(worker).await?;
     output::stdout(format).worker(&worker).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
-/// `health`: prints whether a coordinator serves; the exit code says the same.
+/// `health`: prints whether a coordinator is serving; the exit code is 0 if it is.
 pub(super) async fn health(
     coordinator: &Remote,
     limit: Duration,
-    format: Format,
-) -> Result<Ending, Failure> {
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     let reason = match operators::health(coordinator, limit).await {
         Ok(true) => None,
-        Ok(false) => {
-            Some(anyhow!("the coordinator at {} says that it does not serve", coordinator.endpoint))
-        }
+        Ok(false) => Some(anyhow!(
+            "the coordinator at {} reports that it is not serving",
+            coordinator.endpoint
+        )),
         Err(error) if error.is_bad_input() => return Err(error.into()),
         Err(error) => Some(anyhow::Error::new(error)),
     };
     match (reason, format) {
-        (Some(reason), Format::Text) => Err(Failure::Failed(reason)),
+        (Some(reason), OutputFormat::Text) => Err(CommandFailure::Failed(reason)),
         (reason, _) => {
             let reason = reason.map(|reason| reason.to_string());
             output::stdout(format).health(reason.as_deref()).map_err(stdout_failure)?;
-            Ok(if reason.is_none() { Ending::Done } else { Ending::RunFailed })
+            Ok(if reason.is_none() { ExitStatus::Done } else { ExitStatus::RunFailed })
         }
     }
 }
@@ -69,40 +73,41 @@ pub(super) async fn health(
 pub(super) async fn backup(
     directory: &Path,
     coordinator: &Remote,
-    format: Format,
-) -> Result<Ending, Failure> {
-    let target = vacant(directory)?;
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
+    let target = unused_copy_path(directory)?;
     let mut client = Client::connect(coordinator).await?;
     let shown = visible::path(directory);
     SqliteStore::make_directory(directory).map_err(|error| {
-        Failure::unusable_path(error, format!("cannot create the directory {shown}"))
+        CommandFailure::unusable_path(error, format!("cannot create the directory {shown}"))
     })?;
     // Removed when it is dropped; others cannot read it.
     let file = tempfile::Builder::new().prefix(".osteon-backup-").tempfile_in(directory);
-    let mut file = file
-        .map_err(|error| Failure::unusable_path(error, format!("cannot make a file in {shown}")))?;
+    let mut file = file.map_err(|error| {
+        CommandFailure::unusable_path(error, format!("cannot make a file in {shown}"))
+    })?;
     let end = receive(&mut client, &mut file).await?;
     let unsynced = || format!("cannot write the copy in {shown} to the disk");
-    file.as_file().sync_all().with_context(unsynced).map_err(Failure::Failed)?;
+    file.as_file().sync_all().with_context(unsynced).map_err(CommandFailure::Failed)?;
     file.persist_noclobber(&target)
         .map_err(|error| error.error)
         .with_context(|| format!("cannot make {}", visible::path(&target)))
-        .map_err(Failure::Failed)?;
+        .map_err(CommandFailure::Failed)?;
     // Syncs the directory, so that the file's name survives a power failure, too.
     let directory = File::open(directory).and_then(|directory| directory.sync_all());
-    directory.with_context(unsynced).map_err(Failure::Failed)?;
+    directory.with_context(unsynced).map_err(CommandFailure::Failed)?;
     output::stdout(format).backup(&target, &end).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// Returns the path of the copy, after checking that neither it nor a file that SQLite would take
 /// for a part of it exists.
-fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
+fn unused_copy_path(directory: &Path) -> Result<PathBuf, CommandFailure> {
     for name in [STORE].iter().chain(&BESIDE_STORE) {
         let path = directory.join(name);
         if path.symlink_metadata().is_ok() {
-            return Err(Failure::bad_input(anyhow!(
-                "{} is there already and is left as it is; choose another directory",
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{} already exists and is not overwritten; choose another directory",
                 visible::path(&path)
             )));
         }
@@ -111,7 +116,10 @@ fn vacant(directory: &Path) -> Result<PathBuf, Failure> {
 }
 
 /// Writes the copy to `file`; returns its size and digest once they have been verified.
-async fn receive(client: &mut Client, file: &mut NamedTempFile) -> Result<BackupEnd, Failure> {
+async fn receive(
+    client: &mut Client,
+    file: &mut NamedTempFile,
+) -> Result<BackupEnd, CommandFailure> {
     let (mut length, mut digest) = (0, blake3::Hasher::new());
     let place = file.path().to_owned();
     let received = client.backup(|data| {
@@ -119,13 +127,14 @@ async fn receive(client: &mut Client, file: &mut NamedTempFile) -> Result<Backup
         digest.update(data);
         file.write_all(data)
             .with_context(|| format!("cannot write {}", visible::path(&place)))
-            .map_err(Failure::Failed)
+            .map_err(CommandFailure::Failed)
     });
     let end = received.await??;
     let found = digest.finalize().to_hex().to_string();
     if (length, &found) != (end.length, &end.digest) {
-        return Err(Failure::failed(anyhow!(
-            "the copy is damaged: {length} bytes with digest {found} came, the coordinator sent {} \
+        return Err(CommandFailure::failed(anyhow!(
+            "the copy is damaged: {length} bytes with digest {found} were received, the \
+             coordinator sent {} \
              bytes with digest {}; nothing was kept, try again",
             end.length,
             end.digest

@@ -14,19 +14,20 @@ use osteon_proto::v1::JobSnapshot;
 
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StoreLocation};
-use crate::ending::{Ending, Failure, Interruption, stdout_failure};
 use crate::environment::Unused;
+use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, ShownResult};
 use crate::progress::{Progress, say};
-use crate::request::Request;
-use crate::resolved::{Place, Run};
+use crate::request_id::RequestId;
+use crate::resolved::{Run, RunLocation};
 use crate::results_directory::ResultsDirectory;
 use crate::signals;
-use crate::{unsearched_groups, verdict, warnings};
+use crate::{result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
-pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
-    let noted = job_file::read_with_warnings(&run.job, run.kind).map_err(Failure::bad_input)?;
+pub(super) async fn run(run: Run) -> Result<ExitStatus, CommandFailure> {
+    let noted =
+        job_file::read_with_warnings(&run.job, run.kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
@@ -34,18 +35,18 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     if let Some(reason) = failed_before(&run, specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
-    if let Place::There(remote) = &run.place {
-        remote.tell();
+    if let RunLocation::Coordinator(remote) = &run.location {
+        remote.announce();
     }
     unsearched_groups::warn(&run.job, &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
     let mut interruption = pin!(signals::interruption()?);
     // Connected first, so that an address that does not answer leaves no directory behind.
-    let computers = tokio::select! {
+    let location = tokio::select! {
         biased;
-        found = Computers::find(&run.place) => found?,
+        found = ConnectedLocation::connect(&run.location) => found?,
         interruption = interruption.as_mut() => {
-            return Err(Failure::Interrupted(interruption, "no job was submitted"));
+            return Err(CommandFailure::Interrupted(interruption, "no job was submitted"));
         }
     };
     let directory = run.out.as_deref().map(ResultsDirectory::open).transpose()?;
@@ -53,14 +54,14 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
     }
-    let fetched = match computers {
-        Computers::Here { workers, threads } => {
-            let job = Named { specification, name: &run.name };
-            here(workers, threads, job, directory.as_ref(), interruption).await?
+    let fetched = match location {
+        ConnectedLocation::Local { workers, threads } => {
+            let job = NamedJob { specification, name: &run.name };
+            run_locally(workers, threads, job, directory.as_ref(), interruption).await?
         }
-        Computers::There(client) => {
-            let job = Named { specification, name: &run.name };
-            there(*client, job, directory.as_ref(), interruption).await?
+        ConnectedLocation::Coordinator(client) => {
+            let job = NamedJob { specification, name: &run.name };
+            run_on_coordinator(*client, job, directory.as_ref(), interruption).await?
         }
     };
     let result = keep(run.kind, &fetched, directory.as_ref())?;
@@ -69,30 +70,35 @@ pub(super) async fn run(run: Run) -> Result<Ending, Failure> {
 
 /// A job and its name for display.
 #[derive(Clone, Copy)]
-struct Named<'a> {
+struct NamedJob<'a> {
     specification: &'a JobSpecification,
     name: &'a str,
 }
 
-/// The computers of a run, started or connected.
-enum Computers {
-    Here { workers: u32, threads: u32 },
-    There(Box<Client>),
+/// Where a job is computed; a coordinator is already connected.
+enum ConnectedLocation {
+    Local { workers: u32, threads: u32 },
+    Coordinator(Box<Client>),
 }
 
-impl Computers {
-    async fn find(place: &Place) -> Result<Self, Failure> {
-        Ok(match place {
-            Place::Here { workers, threads } => Self::Here { workers: *workers, threads: *threads },
-            Place::There(remote) => {
+impl ConnectedLocation {
+    async fn connect(location: &RunLocation) -> Result<Self, CommandFailure> {
+        Ok(match location {
+            RunLocation::Local { workers, threads } => {
+                Self::Local { workers: *workers, threads: *threads }
+            }
+            RunLocation::Coordinator(remote) => {
                 let client = Client::connect(remote).await?;
-                Self::There(Box::new(client))
+                Self::Coordinator(Box::new(client))
             }
         })
     }
 }
 
-fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<ResultFile>, Failure> {
+fn finished(
+    run: &Run,
+    specification: &JobSpecification,
+) -> Result<Option<ResultFile>, CommandFailure> {
     match &run.out {
         Some(path) => ResultsDirectory::finished(path, specification),
         None => Ok(None),
@@ -100,12 +106,15 @@ fn finished(run: &Run, specification: &JobSpecification) -> Result<Option<Result
 }
 
 /// Returns the reason why the last run in the same directory failed, if another run may succeed.
-fn failed_before(run: &Run, specification: &JobSpecification) -> Result<Option<String>, Failure> {
+fn failed_before(
+    run: &Run,
+    specification: &JobSpecification,
+) -> Result<Option<String>, CommandFailure> {
     let stored = match &run.out {
         Some(path) => ResultsDirectory::stored(path, specification)?,
         None => None,
     };
-    Ok(stored.as_ref().and_then(verdict::machine_failure).map(str::to_owned))
+    Ok(stored.as_ref().and_then(result_status::machine_failure).map(str::to_owned))
 }
 
 /// Writes the results of an ended job, if there is a directory for them, and returns the result.
@@ -113,8 +122,8 @@ fn keep(
     kind: JobKind,
     fetched: &Fetched,
     directory: Option<&ResultsDirectory>,
-) -> Result<ResultFile, Failure> {
-    let missing = verdict::missing_result(fetched);
+) -> Result<ResultFile, CommandFailure> {
+    let missing = result_status::missing_result(fetched);
     if let Some(directory) = directory
         && (missing.is_some() || fetched.result.status == Status::Cancelled)
     {
@@ -122,7 +131,7 @@ fn keep(
         directory.forget_request();
     }
     if let Some(missing) = missing {
-        return Err(Failure::failed(anyhow!(missing)));
+        return Err(CommandFailure::failed(anyhow!(missing)));
     }
     match directory {
         Some(directory) => directory.write_results(kind, fetched),
@@ -134,20 +143,20 @@ fn show(
     run: &Run,
     specification: &JobSpecification,
     result: &ResultFile,
-) -> Result<Ending, Failure> {
+) -> Result<ExitStatus, CommandFailure> {
     let shown = ShownResult { specification, result, directory: run.out.as_deref() };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
-    Ok(verdict::ending(specification, result))
+    Ok(result_status::exit_status(specification, result))
 }
 
 /// Runs the job on worker processes of this process.
-async fn here(
+async fn run_locally(
     workers: u32,
     threads: u32,
-    job: Named<'_>,
+    job: NamedJob<'_>,
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
-) -> Result<Fetched, Failure> {
+) -> Result<Fetched, CommandFailure> {
     let store = directory
         .map_or(StoreLocation::Memory, |directory| StoreLocation::Directory(directory.store()));
     let progress = Arc::new(AtomicU64::new(0));
@@ -166,7 +175,7 @@ async fn here(
     let result = tokio::select! {
         driven = driven => driven,
         failure = embedded.failed() => Err(failure),
-        interruption = interruption => Err(Failure::Interrupted(interruption, match directory {
+        interruption = interruption => Err(CommandFailure::Interrupted(interruption, match directory {
             Some(_) => "run the same command again to resume",
             None => "no results were saved (with --out DIR a run can be resumed)",
         })),
@@ -176,17 +185,17 @@ async fn here(
 }
 
 /// Runs the job on a running coordinator.
-async fn there(
+async fn run_on_coordinator(
     client: Client,
-    job: Named<'_>,
+    job: NamedJob<'_>,
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
-) -> Result<Fetched, Failure> {
+) -> Result<Fetched, CommandFailure> {
     tokio::select! {
         driven = drive(client, job, directory, |_| {}) => driven,
-        interruption = interruption => Err(Failure::Interrupted(
+        interruption = interruption => Err(CommandFailure::Interrupted(
             interruption,
-            "a job that was accepted goes on (see `osteon jobs`, `osteon cancel`)",
+            "a job that was accepted continues (see `osteon jobs`, `osteon cancel`)",
         )),
     }
 }
@@ -194,13 +203,13 @@ async fn there(
 /// Submits the job, follows it and fetches its results.
 async fn drive(
     mut client: Client,
-    Named { specification, name }: Named<'_>,
+    NamedJob { specification, name }: NamedJob<'_>,
     directory: Option<&ResultsDirectory>,
     note: impl Fn(&JobSnapshot),
-) -> Result<Fetched, Failure> {
+) -> Result<Fetched, CommandFailure> {
     let request = match directory {
         Some(directory) => directory.request()?,
-        None => Request::new().map_err(Failure::failed)?,
+        None => RequestId::new().map_err(CommandFailure::failed)?,
     };
     let options = SubmitOptions { name: name.to_owned(), ..SubmitOptions::default() };
     let job = client.submit(specification, &request, options).await?;
@@ -212,7 +221,7 @@ async fn drive(
         .watch(&job, |snapshot| {
             note(snapshot);
             progress.show(snapshot);
-            Ok::<(), Failure>(())
+            Ok::<(), CommandFailure>(())
         })
         .await?;
     progress.finish();

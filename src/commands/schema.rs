@@ -3,16 +3,16 @@
 use osteon_common::{job_file, report};
 
 use crate::arguments::{SchemaArguments, SchemaFile};
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 
 /// Prints the schema.
-pub(super) fn print(arguments: &SchemaArguments) -> Result<Ending, Failure> {
+pub(super) fn print(arguments: &SchemaArguments) -> Result<ExitStatus, CommandFailure> {
     let text = match arguments.file {
         SchemaFile::Job => job_file::schema(),
         SchemaFile::Result => report::schema(),
     };
-    output::stdout(Format::Text).verbatim(&text).map_err(stdout_failure)?;
-    Ok(Ending::Done)
+    output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }

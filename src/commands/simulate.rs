@@ -9,21 +9,24 @@ use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
 
 use crate::arguments::SimulateArguments;
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownSimulation};
 use crate::resolved;
-use crate::simulation_directory::{Simulated, TRACES};
+use crate::simulation_directory::{SimulationKey, TRACES};
 use crate::warnings;
 
 /// Solves the case, writes its files if requested, and prints the result.
-pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<Ending, Failure> {
+pub(super) async fn simulate(
+    arguments: SimulateArguments,
+    isa: Isa,
+) -> Result<ExitStatus, CommandFailure> {
     let format = resolved::format(arguments.json);
-    let case = case_file::read(&arguments.case).map_err(Failure::bad_input)?;
+    let case = case_file::read(&arguments.case).map_err(CommandFailure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
     let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
     let setup = case.setup;
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
-    let solved = solved.await.map_err(Failure::failed)??;
+    let solved = solved.await.map_err(CommandFailure::failed)??;
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &solved.arrival,
@@ -32,18 +35,22 @@ pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Result<E
     };
     output::stdout(format).simulation(&shown).map_err(stdout_failure)?;
     let passed = solved.check.as_ref().is_none_or(Check::passed);
-    Ok(if passed && solved.arrival.is_ok() { Ending::Done } else { Ending::RunFailed })
+    Ok(if passed && solved.arrival.is_ok() { ExitStatus::Done } else { ExitStatus::RunFailed })
 }
 
-struct Solved {
+struct SolvedCase {
     arrival: Result<Arrival, osteon_solver::Failure>,
     check: Option<Check>,
 }
 
-fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved, Failure> {
+fn solve(
+    case: &Case,
+    arguments: &SimulateArguments,
+    isa: Isa,
+) -> Result<SolvedCase, CommandFailure> {
     let solver = Solver::with_isa(&case.setup, isa);
     let SimulateArguments { duration, time_step, .. } = *arguments;
-    let simulated = Simulated { case, duration, time_step };
+    let simulated = SimulationKey { case, duration, time_step };
     let traces = match &arguments.out {
         Some(directory) => {
             simulated.refuse_other(directory)?;
@@ -61,16 +68,16 @@ fn solve(case: &Case, arguments: &SimulateArguments, isa: Isa) -> Result<Solved,
         let print = |file: &mut dyn Write| csv(&traces, positions, file);
         simulated.write(directory, &output::json::simulation(&shown), print)?;
     }
-    let check = arguments.check.then(|| Check::of(case, isa));
-    Ok(Solved { arrival, check })
+    let check = arguments.check.then(|| Check::run(case, isa));
+    Ok(SolvedCase { arrival, check })
 }
 
-fn trace_failure(error: TraceError) -> Failure {
+fn trace_failure(error: TraceError) -> CommandFailure {
     match error {
         TraceError::Times { .. } | TraceError::TooMany { .. } | TraceError::TooLong { .. } => {
-            Failure::bad_input(error)
+            CommandFailure::bad_input(error)
         }
-        TraceError::NotFinite => Failure::failed(error),
+        TraceError::NotFinite => CommandFailure::failed(error),
     }
 }
 

@@ -5,24 +5,26 @@ use osteon_coordinator::tokens::{self, Role};
 use osteon_proto::token::Token;
 
 use crate::arguments::TokenArguments;
-use crate::ending::{Ending, Failure, stdout_failure};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
-use crate::resolved::Format;
+use crate::resolved::OutputFormat;
 
 /// Writes the token to its file, and its line to the coordinator's list or to stdout.
-pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
+pub(super) fn make(arguments: &TokenArguments) -> Result<ExitStatus, CommandFailure> {
     let TokenArguments { name, role, out, tokens: list } = arguments;
     let role = Role::named(role).ok_or_else(|| {
-        Failure::bad_input(anyhow!("`{role}` is not a role; allowed are read, submit, admin"))
+        CommandFailure::bad_input(anyhow!(
+            "`{role}` is not a role; allowed are read, submit, admin"
+        ))
     })?;
     if !tokens::is_name(name) {
-        return Err(Failure::bad_input(anyhow!(
+        return Err(CommandFailure::bad_input(anyhow!(
             "`{name}` cannot be a token's name; allowed are 1 to 256 letters, digits and . _ - @, \
              without osteon_ and without 32 hexadecimal digits in a row"
         )));
     }
-    let token = Token::generate().map_err(Failure::failed)?;
+    let token = Token::generate().map_err(CommandFailure::failed)?;
     let text = format!("{}\n", token.reveal());
     new_files::create(&[NewFile { path: out.clone(), text, secret: true }])?;
     let line = tokens::line(name, role, &token.hash());
@@ -34,9 +36,9 @@ pub(super) fn make(arguments: &TokenArguments) -> Result<Ending, Failure> {
                 return Err(failure);
             }
         }
-        None => {
-            output::stdout(Format::Text).verbatim(&format!("{line}\n")).map_err(stdout_failure)?
-        }
+        None => output::stdout(OutputFormat::Text)
+            .verbatim(&format!("{line}\n"))
+            .map_err(stdout_failure)?,
     }
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }

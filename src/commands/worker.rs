@@ -5,8 +5,8 @@ use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_worker::{WorkerConfig, WorkerError};
 use tonic::Code;
 
-use crate::ending::{Ending, Failure};
 use crate::environment::Unused;
+use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::signals;
 
 /// Serves until a signal, the time limit, or an error.
@@ -14,10 +14,10 @@ pub(super) async fn serve(
     config: WorkerConfig,
     files: &CredentialFiles,
     unused: &Unused,
-) -> Result<Ending, Failure> {
+) -> Result<ExitStatus, CommandFailure> {
     let credentials = Credentials::load(files, &config.endpoint).map_err(|error| {
         let of_trust = matches!(error, CredentialsError::NoAuthority { .. });
-        Failure::BadInput(noted(error.into(), of_trust, unused))
+        CommandFailure::BadInput(noted(error.into(), of_trust, unused))
     })?;
     let config = WorkerConfig { credentials, ..config };
     let interruption = signals::interruption()?;
@@ -29,9 +29,9 @@ pub(super) async fn serve(
             error,
             WorkerError::Distrust { .. } | WorkerError::Refused { code: Code::Unauthenticated, .. }
         );
-        Failure::Failed(noted(error.into(), of_trust, unused))
+        CommandFailure::Failed(noted(error.into(), of_trust, unused))
     })?;
-    Ok(Ending::Done)
+    Ok(ExitStatus::Done)
 }
 
 /// Returns the error, with the unused environment variables if they may be its reason.

@@ -16,8 +16,8 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
-use crate::ending::Failure;
 use crate::environment;
+use crate::exit_status::CommandFailure;
 use crate::progress::say;
 
 /// Time after which a worker ends by itself if it has lost this process, s.
@@ -42,7 +42,7 @@ pub(crate) struct Workers {
 }
 
 /// Data shared by the supervisors of all workers.
-struct Shared {
+struct SupervisorState {
     executable: PathBuf,
     endpoint: Endpoint,
     threads: u32,
@@ -75,7 +75,7 @@ impl Workers {
         progress: Arc<AtomicU64>,
     ) -> Self {
         let endpoint = endpoint.clone();
-        let shared = Arc::new(Shared { executable, endpoint, threads, progress });
+        let shared = Arc::new(SupervisorState { executable, endpoint, threads, progress });
         let (stop, stopped) = watch::channel(false);
         let (failure_sender, failures) = mpsc::channel(1);
         let mut tasks = JoinSet::new();
@@ -86,10 +86,10 @@ impl Workers {
     }
 
     /// Completes when a worker has failed for good.
-    pub(crate) async fn failed(&mut self) -> Failure {
+    pub(crate) async fn failed(&mut self) -> CommandFailure {
         match self.failures.recv().await {
-            Some(error) => Failure::Failed(error),
-            None => Failure::failed(anyhow!("all workers have ended")),
+            Some(error) => CommandFailure::Failed(error),
+            None => CommandFailure::failed(anyhow!("all workers have ended")),
         }
     }
 
@@ -104,7 +104,7 @@ impl Workers {
 /// Keeps one worker running until it is told to stop, or the worker has failed for good.
 async fn keep(
     number: u32,
-    shared: Arc<Shared>,
+    shared: Arc<SupervisorState>,
     mut stopped: watch::Receiver<bool>,
     failures: mpsc::Sender<anyhow::Error>,
 ) {

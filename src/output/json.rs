@@ -7,13 +7,13 @@ use osteon_common::report::{CheckedSolution, Receiver, Simulation};
 use osteon_common::version::Program;
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
-    BackupEnd, DepartedWorker, ExpelledWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+    BackupEnd, BannedWorker, DepartedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
-use osteon_solver::check::{Difference, Solution};
+use osteon_solver::check::{Difference, MethodSolution};
 use serde_json::{Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_of};
-use crate::output::text::operators::standing_name;
+use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
 use crate::program;
@@ -47,19 +47,19 @@ impl Output for JsonOutput<'_> {
         self.value(&json!({ "job": job }))
     }
 
-    fn jobs(&mut self, jobs: &[JobSnapshot], _: &[ExpelledWorker]) -> io::Result<()> {
+    fn jobs(&mut self, jobs: &[JobSnapshot], _: &[BannedWorker]) -> io::Result<()> {
         self.value(&jobs.iter().map(snapshot_value).collect())
     }
 
     fn workers(
         &mut self,
         workers: &ListWorkersResponse,
-        expelled: &[ExpelledWorker],
+        banned: &[BannedWorker],
     ) -> io::Result<()> {
         self.value(&json!({
             "workers": workers.workers.iter().map(worker_value).collect::<Vec<_>>(),
             "departed": workers.departed.iter().map(departed_value).collect::<Vec<_>>(),
-            "expelled": expelled.iter().map(expelled_value).collect::<Vec<_>>(),
+            "banned": banned.iter().map(ban_value).collect::<Vec<_>>(),
         }))
     }
 
@@ -96,7 +96,7 @@ impl Output for JsonOutput<'_> {
 /// Returns the JSON object of a simulation as text, with a final newline.
 pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
     let ShownSimulation { setup, arrival, check, .. } = *simulation;
-    let Program { version, numerics, commit } = program::this();
+    let Program { version, numerics, commit } = program::current();
     let (found, failed) = (arrival.as_ref().ok(), arrival.as_ref().err());
     let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
         let time = found.and_then(|arrival| arrival.times.get(j).copied());
@@ -118,7 +118,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
 }
 
 /// Converts one solution, with its outcome and its difference from the refined one.
-fn checked(solution: &Solution) -> CheckedSolution {
+fn checked(solution: &MethodSolution) -> CheckedSolution {
     let arrival = solution.arrival.as_ref();
     CheckedSolution {
         solver: solver_of(&solution.setup, arrival.ok()),
@@ -130,7 +130,7 @@ fn checked(solution: &Solution) -> CheckedSolution {
     }
 }
 
-fn expelled_value(worker: &ExpelledWorker) -> Value {
+fn ban_value(worker: &BannedWorker) -> Value {
     json!({
         "host": worker.host,
         "process": worker.process,
@@ -153,7 +153,7 @@ fn worker_value(worker: &WorkerSnapshot) -> Value {
         "realizations_per_second": worker.realizations_per_second,
         "batches": worker.batches,
         "oldest_batch_s": worker.oldest_batch_s,
-        "standing": standing_name(worker),
+        "state": worker_state_name(worker),
     })
 }
 

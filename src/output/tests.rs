@@ -5,15 +5,15 @@ use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::settings::Method;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
-use osteon_solver::check::{Difference, Solution};
-use osteon_solver::{Looks, Sampled};
+use osteon_solver::check::{Difference, MethodSolution};
+use osteon_solver::{Failure, PassSummary, Sampled};
 
 use super::*;
 use crate::sample_result::{identification, propagation};
 
-fn printed(format: Format, print: impl FnOnce(&mut dyn Output)) -> String {
+fn printed(format: OutputFormat, print: impl FnOnce(&mut dyn Output)) -> String {
     let mut bytes = Vec::new();
-    print(on(format, Box::new(&mut bytes)).as_mut());
+    print(to_writer(format, Box::new(&mut bytes)).as_mut());
     String::from_utf8(bytes).unwrap()
 }
 
@@ -72,7 +72,7 @@ fn shown(kind: JobKind, free: &[&str], json: &str) -> String {
         JobKind::Propagation => propagation(json),
     };
     let shown = ShownResult { specification: &specification, result: &result, directory };
-    printed(Format::Text, |output| output.result(&shown).unwrap())
+    printed(OutputFormat::Text, |output| output.result(&shown).unwrap())
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_search_for_the_nearest_point_says_so() {
     let shown = |json: &str| {
         let result = &identification(json);
         let shown = ShownResult { specification: &specification, result, directory: None };
-        printed(Format::Text, |output| output.result(&shown).unwrap())
+        printed(OutputFormat::Text, |output| output.result(&shown).unwrap())
     };
     let nearest = "this is the one nearest to the start";
     let text = unwrapped(&shown(RESULT));
@@ -131,7 +131,7 @@ fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     specification.objective = Objective::Likelihood;
     let result = &identification(&detailed());
     let shown = ShownResult { specification: &specification, result, directory: None };
-    insta::assert_snapshot!(printed(Format::Text, |output| output.result(&shown).unwrap()));
+    insta::assert_snapshot!(printed(OutputFormat::Text, |output| output.result(&shown).unwrap()));
 }
 
 /// `RESULT` with a likelihood, intervals of the data, a test, and the possible effect of failures.
@@ -303,7 +303,7 @@ fn a_model_that_misses_the_data_says_by_how_much_and_where() {
 fn every_text_fits_a_terminal_of_80_columns() {
     let long = RESULT.replace(
         "\"status\": \"converged\"",
-        "\"status\": \"converged\", \"reason\": \"settled at a cost of 7.644e-1, above cost_tolerance \
+        "\"status\": \"converged\", \"reason\": \"converged at a cost of 7.644e-1, above cost_tolerance \
          1e-12: no nearby point fits better (density on its lower bound, dispersion on its upper \
          bound); widen the bounds, or free more parameters\"",
     );
@@ -313,7 +313,7 @@ fn every_text_fits_a_terminal_of_80_columns() {
             fits(&shown(kind, &all, json));
         }
     }
-    let shown_jobs = printed(Format::Text, |output| {
+    let shown_jobs = printed(OutputFormat::Text, |output| {
         let mut failed = jobs();
         failed[1].reason = "the searches for 3 of 9 groups failed; ".repeat(5);
         output.jobs(&failed, &[]).unwrap();
@@ -347,7 +347,7 @@ fn json_is_what_stands_in_the_file() {
     let file = include_str!("../../fuzz/corpus/results/identification.json");
     let result = &identification(file);
     let shown = ShownResult { specification: &specification, result, directory: None };
-    assert_eq!(printed(Format::Json, |output| output.result(&shown).unwrap()), file);
+    assert_eq!(printed(OutputFormat::Json, |output| output.result(&shown).unwrap()), file);
 }
 
 fn arrival() -> Arrival {
@@ -355,7 +355,7 @@ fn arrival() -> Arrival {
         velocity: 3908.75,
         times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
         estimated_error: 2e-5,
-        looks: None,
+        passes: None,
     }
 }
 
@@ -368,7 +368,11 @@ fn setup(method: Method) -> Setup {
     setup
 }
 
-fn simulation(format: Format, arrival: &Result<Arrival, Failure>, check: Option<&Check>) -> String {
+fn simulation(
+    format: OutputFormat,
+    arrival: &Result<Arrival, Failure>,
+    check: Option<&Check>,
+) -> String {
     let setup = setup(Method::Hybrid);
     let shown =
         ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
@@ -380,8 +384,8 @@ fn simulation(format: Format, arrival: &Result<Arrival, Failure>, check: Option<
 
 #[test]
 fn a_simulation_shows_times_and_velocity() {
-    insta::assert_snapshot!(simulation(Format::Text, &Ok(arrival()), None));
-    insta::assert_snapshot!(simulation(Format::Json, &Ok(arrival()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Text, &Ok(arrival()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Json, &Ok(arrival()), None));
 }
 
 #[test]
@@ -390,22 +394,22 @@ fn a_simulation_without_velocity_says_why() {
         kind: FailureKind::NoArrival,
         detail: "receiver 3 has no extremum".to_owned(),
     };
-    insta::assert_snapshot!(simulation(Format::Text, &Err(failure()), None));
-    insta::assert_snapshot!(simulation(Format::Json, &Err(failure()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Text, &Err(failure()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Json, &Err(failure()), None));
 }
 
 #[test]
 fn the_sampling_that_decided_is_shown() {
     let last = Sampled { band: 12.5e6, period: 1.1e-5, pairs: 9000 };
-    let looks = Some(Looks { count: 3, pairs_computed: 17_000, last });
-    let arrival = Ok(Arrival { looks, ..arrival() });
+    let passes = Some(PassSummary { count: 3, pairs_computed: 17_000, last });
+    let arrival = Ok(Arrival { passes, ..arrival() });
     let setup = setup(Method::Exact);
     let shown = ShownSimulation { setup: &setup, arrival: &arrival, traces: None, check: None };
     let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
     let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
-    assert!(unwrapped(&text(Format::Text)).contains(line), "{}", text(Format::Text));
-    let value: serde_json::Value = serde_json::from_str(&text(Format::Json)).unwrap();
-    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("looks", 3)];
+    assert!(unwrapped(&text(OutputFormat::Text)).contains(line), "{}", text(OutputFormat::Text));
+    let value: serde_json::Value = serde_json::from_str(&text(OutputFormat::Json)).unwrap();
+    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("passes", 3)];
     for (key, number) in expected {
         assert_eq!(value["solver"][key], number, "{value:#}");
     }
@@ -413,7 +417,7 @@ fn the_sampling_that_decided_is_shown() {
 
 /// A check in which the hybrid method differs by this.
 fn checked(hybrid: Difference) -> Check {
-    let solution = |method, velocity, difference| Solution {
+    let solution = |method, velocity, difference| MethodSolution {
         setup: setup(method),
         arrival: Ok(Arrival { velocity, ..arrival() }),
         difference,
@@ -424,13 +428,16 @@ fn checked(hybrid: Difference) -> Check {
     Check {
         exact: solution(Method::Exact, 3908.85, numbers(2.5e-5, 1.2e-10)),
         hybrid: solution(Method::Hybrid, 3908.9, hybrid),
-        refined: Solution { setup: refined, ..solution(Method::Exact, 3908.75, numbers(0.0, 0.0)) },
+        refined: MethodSolution {
+            setup: refined,
+            ..solution(Method::Exact, 3908.75, numbers(0.0, 0.0))
+        },
     }
 }
 
 #[test]
 fn a_check_shows_every_solution_and_whether_it_passed() {
-    let text = |check: &Check| simulation(Format::Text, &Ok(arrival()), Some(check));
+    let text = |check: &Check| simulation(OutputFormat::Text, &Ok(arrival()), Some(check));
     let same = checked(Difference::Numbers { velocity: 3.8e-5, time: 4e-10 });
     insta::assert_snapshot!(text(&same));
     assert!(text(&checked(Difference::Picks)).contains("THE PICKS DIFFER\n"));
@@ -439,7 +446,7 @@ fn a_check_shows_every_solution_and_whether_it_passed() {
     assert!(text(&off).contains("OFF by more than 1e-4: EXACT\n"), "{}", text(&off));
     off.hybrid.difference = Difference::Numbers { velocity: 2.7e-4, time: 1e-9 };
     assert!(text(&off).contains("OFF by more than 1e-4: EXACT AND HYBRID\n"), "{}", text(&off));
-    let json = simulation(Format::Json, &Ok(arrival()), Some(&same));
+    let json = simulation(OutputFormat::Json, &Ok(arrival()), Some(&same));
     let check = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["check"];
     assert_eq!(check.as_array().unwrap().len(), 3);
     assert_eq!(check[0]["velocity"], 3908.85);
@@ -482,16 +489,18 @@ fn jobs() -> Vec<JobSnapshot> {
 
 #[test]
 fn jobs_are_a_table_or_a_list() {
-    insta::assert_snapshot!(printed(Format::Text, |output| output.jobs(&jobs(), &[]).unwrap()));
-    insta::assert_snapshot!(printed(Format::Json, |output| output.jobs(&jobs(), &[]).unwrap()));
-    assert_eq!(printed(Format::Text, |output| output.jobs(&[], &[]).unwrap()), "no jobs\n");
-    let none = printed(Format::Json, |output| output.jobs(&[], &[]).unwrap());
+    let shown = printed(OutputFormat::Text, |output| output.jobs(&jobs(), &[]).unwrap());
+    insta::assert_snapshot!(shown);
+    let shown = printed(OutputFormat::Json, |output| output.jobs(&jobs(), &[]).unwrap());
+    insta::assert_snapshot!(shown);
+    assert_eq!(printed(OutputFormat::Text, |output| output.jobs(&[], &[]).unwrap()), "no jobs\n");
+    let none = printed(OutputFormat::Json, |output| output.jobs(&[], &[]).unwrap());
     assert_eq!(none, "[]\n");
 }
 
 #[test]
 fn a_snapshot_is_one_line() {
-    let lines = printed(Format::Text, |output| {
+    let lines = printed(OutputFormat::Text, |output| {
         for job in jobs() {
             output.snapshot(&job).unwrap();
         }
@@ -504,38 +513,38 @@ fn a_snapshot_is_one_line() {
         best_cost: None,
         ..ended
     };
-    let line = printed(Format::Text, |output| output.snapshot(&cancelled).unwrap());
+    let line = printed(OutputFormat::Text, |output| output.snapshot(&cancelled).unwrap());
     assert_eq!(line, "  0.4 s  cancelled\n");
 }
 
 #[test]
 fn an_id_is_printed_alone() {
-    assert_eq!(printed(Format::Text, |output| output.submitted("7").unwrap()), "7\n");
-    let json = printed(Format::Json, |output| output.submitted("7").unwrap());
+    assert_eq!(printed(OutputFormat::Text, |output| output.submitted("7").unwrap()), "7\n");
+    let json = printed(OutputFormat::Json, |output| output.submitted("7").unwrap());
     assert_eq!(json, "{\n  \"job\": \"7\"\n}\n");
 }
 
 #[test]
-fn expelled_workers_are_shown_and_forgotten_jobs_listed() {
-    let expelled = osteon_proto::v1::ExpelledWorker {
+fn banned_workers_are_shown_and_forgotten_jobs_listed() {
+    let banned = osteon_proto::v1::BannedWorker {
         host: "node3".to_owned(),
         process: 42,
         job: "7".to_owned(),
         reason: "answered realization 5 of job 7 wrongly".to_owned(),
         elapsed_s: 90.0,
     };
-    let expelled = [expelled];
-    let shown = printed(Format::Text, |output| output.jobs(&[], &expelled).unwrap());
+    let banned = [banned];
+    let shown = printed(OutputFormat::Text, |output| output.jobs(&[], &banned).unwrap());
     let line = "node3 (process 42) answered realization 5 of job 7 wrongly\n";
-    assert!(shown.starts_with("no jobs\nexpelled ") && shown.ends_with(line), "{shown}");
+    assert!(shown.starts_with("no jobs\nbanned ") && shown.ends_with(line), "{shown}");
     let workers = osteon_proto::v1::ListWorkersResponse::default();
-    let listed = printed(Format::Json, |output| output.workers(&workers, &expelled).unwrap());
+    let listed = printed(OutputFormat::Json, |output| output.workers(&workers, &banned).unwrap());
     let listed: serde_json::Value = serde_json::from_str(&listed).unwrap();
-    assert_eq!(listed["expelled"][0]["host"], "node3");
-    assert_eq!(listed["expelled"][0]["job"], "7");
+    assert_eq!(listed["banned"][0]["host"], "node3");
+    assert_eq!(listed["banned"][0]["job"], "7");
     let pruned = ["3".to_owned(), "5".to_owned()];
-    assert_eq!(printed(Format::Text, |output| output.pruned(&pruned).unwrap()), "3\n5\n");
-    let json = printed(Format::Json, |output| output.pruned(&pruned).unwrap());
+    assert_eq!(printed(OutputFormat::Text, |output| output.pruned(&pruned).unwrap()), "3\n5\n");
+    let json = printed(OutputFormat::Json, |output| output.pruned(&pruned).unwrap());
     let value: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(value, serde_json::json!({ "pruned": ["3", "5"] }));
 }
@@ -546,7 +555,7 @@ fn expelled_workers_are_shown_and_forgotten_jobs_listed() {
 fn what_others_say_is_shown_without_hidden_characters() {
     use osteon_common::visible::is_hidden;
     let hostile = "x\u{1b}[2J\u{202e}y";
-    let expelled = [osteon_proto::v1::ExpelledWorker {
+    let banned = [osteon_proto::v1::BannedWorker {
         host: format!("{hostile}\n"),
         process: 42,
         job: "7".to_owned(),
@@ -572,19 +581,19 @@ fn what_others_say_is_shown_without_hidden_characters() {
         result: &identification(&json),
         directory: Some(directory),
     };
-    let print = |format: Format| {
+    let print = |format: OutputFormat| {
         printed(format, |output| {
-            output.jobs(&jobs, &expelled).unwrap();
+            output.jobs(&jobs, &banned).unwrap();
             output.snapshot(&jobs[0]).unwrap();
             output.pruned(&[hostile.to_owned()]).unwrap();
             output.submitted(hostile).unwrap();
             output.result(&result).unwrap();
         })
     };
-    let shown = print(Format::Text);
+    let shown = print(OutputFormat::Text);
     assert!(!shown.contains(|c| c != '\n' && is_hidden(c)), "{shown:?}");
     assert_eq!(shown.matches(r"x\u{1b}[2J\u{202e}y").count(), 11, "{shown}");
     assert!(shown.contains(r"y\n (process 42)"), "{shown}");
-    let told = print(Format::Json);
+    let told = print(OutputFormat::Json);
     assert!(told.contains("\\u001b[2J\u{202e}y"), "{told}");
 }

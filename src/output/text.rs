@@ -15,14 +15,14 @@ use std::path::Path;
 
 use osteon_common::visible;
 use osteon_proto::v1::{
-    BackupEnd, ExpelledWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
+    BackupEnd, BannedWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
 };
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
 use self::number::{VELOCITY_DIGITS, digits, significant};
 use super::{Output, ShownResult, ShownSimulation, solver_of};
 use crate::client;
-use crate::progress::{Observed, line, span};
+use crate::progress::{JobProgress, line, span};
 
 /// Width of the time before a line of `watch`, in columns.
 const TIME_WIDTH: usize = 9;
@@ -51,22 +51,22 @@ impl Output for TextOutput<'_> {
         self.verbatim(&format!("{}\n", visible::line(job)))
     }
 
-    fn jobs(&mut self, jobs: &[JobSnapshot], expelled: &[ExpelledWorker]) -> io::Result<()> {
+    fn jobs(&mut self, jobs: &[JobSnapshot], banned: &[BannedWorker]) -> io::Result<()> {
         if jobs.is_empty() {
             self.verbatim("no jobs\n")?;
-            return self.verbatim(&expelled_lines(expelled));
+            return self.verbatim(&ban_lines(banned));
         }
         self.verbatim(&operators::jobs(jobs))?;
-        self.verbatim(&expelled_lines(expelled))
+        self.verbatim(&ban_lines(banned))
     }
 
     fn workers(
         &mut self,
         workers: &ListWorkersResponse,
-        expelled: &[ExpelledWorker],
+        banned: &[BannedWorker],
     ) -> io::Result<()> {
         self.verbatim(&operators::workers(workers))?;
-        self.verbatim(&expelled_lines(expelled))
+        self.verbatim(&ban_lines(banned))
     }
 
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
@@ -106,15 +106,15 @@ impl Output for TextOutput<'_> {
     }
 }
 
-/// Returns a line for each worker that was expelled because it computed wrongly.
-fn expelled_lines(expelled: &[ExpelledWorker]) -> String {
-    let line = |worker: &ExpelledWorker| {
-        let ExpelledWorker { host, process, reason, elapsed_s, .. } = worker;
+/// Returns a line for each worker that was banned because it computed wrongly.
+fn ban_lines(banned: &[BannedWorker]) -> String {
+    let line = |worker: &BannedWorker| {
+        let BannedWorker { host, process, reason, elapsed_s, .. } = worker;
         let (host, reason) = (visible::line(host), visible::line(reason));
         let ago = span(*elapsed_s);
-        wrapped(&format!("expelled {ago} ago: {host} (process {process}) {reason}"))
+        wrapped(&format!("banned {ago} ago: {host} (process {process}) {reason}"))
     };
-    expelled.iter().map(line).collect()
+    banned.iter().map(line).collect()
 }
 
 /// Returns `identification` or `propagation`.
@@ -146,7 +146,7 @@ pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
 fn progress(snapshot: &JobSnapshot, width: usize) -> String {
     // A case file may follow the first line of a reason.
     let reason = snapshot.reason.lines().next().unwrap_or_default();
-    let parts = [line(snapshot, &Observed::default(), width), reason.to_owned()];
+    let parts = [line(snapshot, &JobProgress::default(), width), reason.to_owned()];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
@@ -174,7 +174,7 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         }
     }
     let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
-    text.push_str(&format!("\n{}", wrapped(&solver::line_of_one(&solver))));
+    text.push_str(&format!("\n{}", wrapped(&solver::single_velocity_line(&solver))));
     if let Some(check) = simulation.check {
         text.push_str(&format!("\n{}", check::table(check)));
     }

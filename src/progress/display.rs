@@ -6,7 +6,7 @@ use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
 /// Data that a single snapshot does not contain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Observed {
+pub(crate) struct JobProgress {
     /// Number of evaluations, within the maximum, that would measure derivatives, as far as known.
     pub(crate) derivatives: u64,
     /// Outcomes of the current evaluation, if it takes so long that a bar is useful.
@@ -29,7 +29,7 @@ const BAR_WIDTH_MAX: usize = 16;
 
 /// Returns the lines of a job for a terminal of this width: its progress, the best point so far,
 /// what it waits for, and a bar if the current evaluation takes long.
-pub(crate) fn lines(snapshot: &JobSnapshot, observed: &Observed, width: usize) -> Vec<String> {
+pub(crate) fn lines(snapshot: &JobSnapshot, observed: &JobProgress, width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     if snapshot.kind() == JobKind::Identification {
         lines.push(fitted(course(snapshot, observed), width));
@@ -46,7 +46,7 @@ pub(crate) fn lines(snapshot: &JobSnapshot, observed: &Observed, width: usize) -
 }
 
 /// Returns the same in one line.
-pub(crate) fn line(snapshot: &JobSnapshot, observed: &Observed, width: usize) -> String {
+pub(crate) fn line(snapshot: &JobSnapshot, observed: &JobProgress, width: usize) -> String {
     let mut parts = course(snapshot, observed);
     parts.extend(waiting(snapshot));
     parts.extend(best(snapshot));
@@ -61,7 +61,7 @@ pub(crate) fn line(snapshot: &JobSnapshot, observed: &Observed, width: usize) ->
 }
 
 /// Progress and speed of the job.
-fn course(snapshot: &JobSnapshot, observed: &Observed) -> Vec<Part> {
+fn course(snapshot: &JobSnapshot, observed: &JobProgress) -> Vec<Part> {
     let part = |rank, joint, text: String| Part { rank, joint, text };
     let running = snapshot.state() == JobState::Running;
     let mut parts = Vec::new();
@@ -123,7 +123,7 @@ fn outcomes(snapshot: &JobSnapshot, done: u64) -> String {
 }
 
 /// Time left. For a search only an upper limit is known, since it may find its point at any time.
-fn time_left(snapshot: &JobSnapshot, observed: &Observed) -> Vec<Part> {
+fn time_left(snapshot: &JobSnapshot, observed: &JobProgress) -> Vec<Part> {
     let (done, all) = (snapshot.realizations_done as f64, snapshot.realizations.max(1) as f64);
     let by_rate = all / snapshot.realizations_per_second;
     let evaluation_s = observed.evaluation_s.unwrap_or(by_rate);
@@ -158,7 +158,7 @@ fn bar(snapshot: &JobSnapshot, done: u64, width: usize) -> String {
     }
     parts.push(part(8, ", ", outcomes(snapshot, done)));
     if !search {
-        let observed = Observed::default();
+        let observed = JobProgress::default();
         let others = course(snapshot, &observed).into_iter().filter(|part| part.rank > 0);
         parts.extend(others);
     }

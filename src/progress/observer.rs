@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use osteon_proto::v1::{JobKind, JobSnapshot, JobState};
 
-use super::display::Observed;
+use super::display::JobProgress;
 
 /// An evaluation that takes this long gets a bar; for a shorter one it would only flicker.
 const LONG: Duration = Duration::from_secs(3);
@@ -15,14 +15,14 @@ pub(super) struct Observer {
     derivatives: u64,
     /// Time of the first observed progress, and the progress at that time in evaluations.
     begun: Option<(Duration, f64)>,
-    present: Option<Present>,
+    present: Option<CurrentEvaluation>,
     /// Duration of the last complete evaluation.
     last_took: Duration,
 }
 
 /// The current evaluation.
 #[derive(Debug, Clone, Copy)]
-struct Present {
+struct CurrentEvaluation {
     evaluations: u64,
     since: Duration,
     /// Largest number of outcomes seen so far; the number falls if some are computed again.
@@ -36,7 +36,7 @@ impl Observer {
     }
 
     /// Returns the data known with this snapshot, which arrived at `now`.
-    pub(super) fn observe(&mut self, snapshot: &JobSnapshot, now: Duration) -> Observed {
+    pub(super) fn observe(&mut self, snapshot: &JobSnapshot, now: Duration) -> JobProgress {
         let evaluation_s = self.pace(snapshot, now);
         let mut present = match self.present {
             Some(present) if present.evaluations == snapshot.evaluations => present,
@@ -46,7 +46,7 @@ impl Observer {
                     now.saturating_sub(before.since).div_f64(count as f64)
                 });
                 self.last_took = ended.unwrap_or_default();
-                Present { evaluations: snapshot.evaluations, since: now, furthest: 0 }
+                CurrentEvaluation { evaluations: snapshot.evaluations, since: now, furthest: 0 }
             }
         };
         present.furthest = present.furthest.max(snapshot.realizations_done);
@@ -55,7 +55,7 @@ impl Observer {
         let only_one = snapshot.kind() == JobKind::Propagation;
         let shown = snapshot.state() == JobState::Running && (only_one || is_long);
         let bar = shown.then_some(present.furthest);
-        Observed { derivatives: self.derivatives, bar, evaluation_s }
+        JobProgress { derivatives: self.derivatives, bar, evaluation_s }
     }
 
     /// Returns the mean duration of an evaluation so far, s. It is steadier than the rate of the

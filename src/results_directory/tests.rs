@@ -44,7 +44,7 @@ fn fetched(status: Status) -> Fetched {
         solver: SolverSettings::default(),
         nominal: None,
         picking: Picking::default(),
-        program: Program::this(None),
+        program: Program::current(None),
     };
     Fetched { specification: specification(), result, history: Vec::new() }
 }
@@ -183,6 +183,6 @@ fn a_directory_is_the_same_request_on_every_host() {
     let request = directory.request().unwrap();
     assert_eq!(directory.request().unwrap(), request);
     fs::write(&path, "an id\nann@node-7\n").unwrap();
-    let elsewhere = Request { id: "an id".to_owned(), client: "ann@node-7".to_owned() };
+    let elsewhere = RequestId { id: "an id".to_owned(), client: "ann@node-7".to_owned() };
     assert_eq!(directory.request().unwrap(), elsewhere);
 }

@@ -7,9 +7,9 @@ use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, Isa, Solver, Workspace};
 
 use crate::draws::{Cell, Draws, arrival, cells};
-use crate::spread::Spread;
-use crate::table::{Table, millimetres, percent, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, millimetres, percent, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -35,8 +35,8 @@ pub(crate) const REFERENCE: f64 = 5.0;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[&["plate (mm)", "dispersion"][..], &SUMMARY].concat());
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[&["plate (mm)", "dispersion"][..], &SUMMARY].concat());
     for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
         table.push(row(&cell));
         progress(&table.last_row());
@@ -46,7 +46,8 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
 
 fn row(cell: &Cell) -> Vec<String> {
     let both = Both::new(&cell.setup(SolverSettings::default()), cell.isa());
-    let measured: Vec<Measured> = cell.each(|_, bone, workspace| both.measured(bone, workspace));
+    let measured: Vec<MeasuredDraw> =
+        cell.each(|_, bone, workspace| both.measured(bone, workspace));
     let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
     row.extend(summary(&measured));
     row
@@ -72,10 +73,10 @@ impl Both {
         &self,
         bone: &Result<Bone, Failure>,
         workspace: &mut Workspace,
-    ) -> Measured {
+    ) -> MeasuredDraw {
         let found = arrival(&self.default, bone, workspace);
         let reference = arrival(&self.reference, bone, workspace);
-        Measured {
+        MeasuredDraw {
             difference: difference(&self.setup, &found, &reference),
             estimated_error: found.map_or(0.0, |found| found.estimated_error),
         }
@@ -83,16 +84,16 @@ impl Both {
 }
 
 /// One draw.
-pub(crate) struct Measured {
+pub(crate) struct MeasuredDraw {
     difference: Difference,
     estimated_error: f64,
 }
 
 /// Returns median, 99 % and largest error, fraction of different picks (%), and three quantiles of
 /// the ratio of the estimated to the true error, in the columns of [`SUMMARY`].
-pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
+pub(crate) fn summary(measured: &[MeasuredDraw]) -> Vec<String> {
     let differences: Vec<_> = measured.iter().map(|draw| draw.difference).collect();
-    let spread = Spread::of(&differences);
+    let spread = DifferenceSummary::new(&differences);
     let mut cells: Vec<_> = [0.5, 0.99, 1.0].map(|p| two_digits(spread.velocity(p))).into();
     cells.push(percent(spread.different_picks as u64, measured.len() as u64));
     let ratios = ratios(measured);
@@ -102,7 +103,7 @@ pub(crate) fn summary(measured: &[Measured]) -> Vec<String> {
 
 /// Returns the ratios of the estimated to the true error, ascending, of the draws with the same
 /// pick and a nonzero error.
-fn ratios(measured: &[Measured]) -> Vec<f64> {
+fn ratios(measured: &[MeasuredDraw]) -> Vec<f64> {
     let mut ratios: Vec<f64> = measured
         .iter()
         .filter_map(|draw| {
@@ -120,7 +121,7 @@ mod tests {
 
     #[test]
     fn estimates_are_compared_where_there_is_an_error() {
-        let same = |velocity, estimated_error| Measured {
+        let same = |velocity, estimated_error| MeasuredDraw {
             difference: Difference::Numbers { velocity, time: 0.0 },
             estimated_error,
         };
@@ -128,7 +129,7 @@ mod tests {
             same(1e-5, 4e-5),
             same(2e-5, 2e-5),
             same(0.0, 1e-5),
-            Measured { difference: Difference::Picks, estimated_error: 1e-5 },
+            MeasuredDraw { difference: Difference::Picks, estimated_error: 1e-5 },
         ];
         assert_eq!(ratios(&measured), [1.0, 4.0]);
         let cells = summary(&measured);

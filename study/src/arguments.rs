@@ -1,53 +1,54 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand};
-
-/// Measures the solvers, the samplings and the searches of osteon against each other; prints a table
-/// in Markdown
+/// Compares the solvers, samplings and searches of osteon, and prints a table in Markdown
 #[derive(Debug, Parser)]
 #[command(name = "osteon-study", version, max_term_width = 80)]
 pub(crate) struct Arguments {
-    /// What to measure.
+    /// The study to run.
     #[command(subcommand)]
     pub(crate) study: Study,
 }
 
-/// What to measure.
+/// The study to run.
 #[derive(Debug, Clone, Copy, Subcommand)]
 pub(crate) enum Study {
-    /// How often a realization has no velocity, by kind of failure, dispersion and plate
+    /// Measure how often a realization has no velocity, by kind of failure, dispersion and plate
     Failures(DrawsArguments),
-    /// Errors of the exact method against refinement 5, and its own estimates of them
+    /// Compare the exact method with itself at refinement 5, and its estimated errors with the
+    /// actual ones
     Accuracy(DrawsArguments),
-    /// Both methods against the exact one at refinement 5
+    /// Compare both methods with the exact method at refinement 5
     Methods(DrawsArguments),
-    /// How the exact method's error falls with refinement
+    /// Measure how the error of the exact method falls with refinement
     Refinement(DrawsArguments),
-    /// Errors of the exact method with random mean models of bone
+    /// Measure the errors of the exact method for random mean models of bone
     Models(DrawsArguments),
-    /// Errors of the exact method with random layers, probes and bones
+    /// Measure the errors of the exact method for random layers, probes and bones
     Setups(DrawsArguments),
-    /// Jumps of the velocity between bones whose elasticity differs by 1e-9
+    /// Measure jumps of the velocity between bones whose elasticity differs by 1e-9
     Continuity(DrawsArguments),
-    /// Evaluations that the methods of search need from ten starts, all seven parameters free
+    /// Count the evaluations that each search method needs from ten starts with all seven
+    /// parameters free
     Searches(DrawsArguments),
-    /// Digest of a batch on every instruction set of this machine
+    /// Print the digest of a batch for every instruction set of this machine
     Digest(DrawsArguments),
-    /// How far moments scatter from seed to seed, by sampling and control variate, and how right
+    /// Measure how moments scatter between seeds, by sampling and control variate, and how accurate
     /// their standard errors are
     Variance(RepetitionsArguments),
-    /// Whether an identification finds again what made its data, over known parameter sets
+    /// Check whether identifications recover the known parameter sets from which their data were
+    /// made
     Twins(TwinsArguments),
-    /// How many intervals hold the truth, over data sets of a hundred velocities
+    /// Count how many confidence intervals contain the true value, over data sets of 100 velocities
     Coverage(TwinsArguments),
-    /// How the hybrid method's error falls with element size, order and time step
+    /// Measure how the error of the hybrid method falls with element size, order and time step
     Convergence,
 }
 
 /// The arguments of every study over draws.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct DrawsArguments {
-    /// Realizations of each row [default: the study's own]
+    /// Realizations of each row [default: depends on the study]
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=osteon_common::limits::REALIZATIONS_MAX))]
     pub(crate) realizations: Option<u64>,
@@ -60,11 +61,11 @@ pub(crate) struct DrawsArguments {
 /// The arguments of a study over seeds.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct RepetitionsArguments {
-    /// How many seeds
+    /// Number of seeds
     #[arg(long, value_name = "N", default_value_t = osteon_study::variance::SEEDS,
           value_parser = clap::value_parser!(u64).range(2..=REPETITIONS_MAX))]
     pub(crate) seeds: u64,
-    /// The first; the others follow it
+    /// First seed; the others follow it
     #[arg(long, value_name = "S", default_value_t = 1,
           value_parser = clap::value_parser!(u64)
               .range(0..=osteon_common::limits::SEED_MAX - REPETITIONS_MAX))]
@@ -74,7 +75,7 @@ pub(crate) struct RepetitionsArguments {
 /// The arguments of a study of data that are made.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct TwinsArguments {
-    /// Parameter sets, or data sets [default: the study's own]
+    /// Number of parameter sets or data sets [default: depends on the study]
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=REPETITIONS_MAX))]
     pub(crate) repetitions: Option<u64>,

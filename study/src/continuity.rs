@@ -9,9 +9,9 @@ use osteon_solver::{Failure, fastest_wave};
 
 use crate::draws::{Draws, arrival, cells, not_elastic};
 use crate::generator::Generator;
-use crate::spread::Spread;
-use crate::table::{Table, millimetres, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, millimetres, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -28,13 +28,13 @@ const JUMP_MAX: f64 = 1e-5;
 /// of a velocity whose extremum stays the same, how many such jumps are above 1e-5, and how many
 /// pairs change their extremum or the kind of their failure.
 ///
-/// Every second pair lies on an edge of the speed ladder (the grid of speeds for which samplings
-/// are made), where the method itself might jump.
+/// Every second pair lies on the edge of a speed bin (the grid of speeds for which samplings are
+/// made), where the method itself might jump.
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "plate (mm)",
         "dispersion",
         "pairs",
@@ -63,7 +63,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
 }
 
 fn summary(differences: &[Difference]) -> Vec<String> {
-    let spread = Spread::of(differences);
+    let spread = DifferenceSummary::new(differences);
     let jumps = differences.iter().filter_map(|difference| difference.velocity());
     vec![
         differences.len().to_string(),
@@ -74,13 +74,13 @@ fn summary(differences: &[Difference]) -> Vec<String> {
 }
 
 /// Returns the density, kg/m³, with which the bone's fastest wave has exactly the maximum speed of
-/// its rung.
+/// its bin.
 fn density_on_edge(bone: &Bone, setup: &Setup) -> f64 {
     let speed = fastest_wave(bone);
-    let Some(rung) = sampling::rung(setup, speed) else {
+    let Some(bin) = sampling::speed_bin(setup, speed) else {
         return bone.density;
     };
-    let ratio = speed / sampling::rung_speed(setup, rung);
+    let ratio = speed / sampling::speed_bin_edge(setup, bin);
     bone.density * ratio * ratio
 }
 
@@ -121,16 +121,16 @@ mod tests {
     }
 
     #[test]
-    fn a_bone_is_put_on_the_edge_of_its_rung() {
+    fn a_bone_is_put_on_the_edge_of_its_speed_bin() {
         let setup = Setup::default();
         let elasticity = OPTIMUM.constants().elasticity().unwrap();
         let mut bone = Bone { density: OPTIMUM.density(), elasticity };
         bone.density = density_on_edge(&bone, &setup);
-        let rung = |factor: f64| {
+        let bin = |factor: f64| {
             let bone = Bone { density: bone.density * factor, ..bone };
-            sampling::rung(&setup, fastest_wave(&bone)).unwrap()
+            sampling::speed_bin(&setup, fastest_wave(&bone)).unwrap()
         };
-        assert_eq!(rung(1.0 - 1e-9), rung(1.0 + 1e-9) + 1);
+        assert_eq!(bin(1.0 - 1e-9), bin(1.0 + 1e-9) + 1);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use osteon_solver::hybrid::{ConvergenceRow, element_convergence, time_step_conve
 use rayon::prelude::*;
 
 use crate::draws::{Cell, Draws};
-use crate::table::{Table, millimetres, two_digits};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, millimetres, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// The bone: the first draw of this seed and dispersion, triclinic, in the paper's 4 mm plate.
 const SEED: u64 = 1;
@@ -26,7 +26,7 @@ const SIZES: [(u32, [f64; 4]); 4] = [
 const HALVINGS: u32 = 3;
 
 /// Rows of one study, in which one quantity decreases.
-struct Series {
+struct RefinementSeries {
     rows: Result<Vec<ConvergenceRow>, Failure>,
     varied: fn(&ConvergenceRow) -> f64,
 }
@@ -37,11 +37,11 @@ struct Series {
 ///
 /// # Errors
 /// If the bone cannot be drawn.
-pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, StudyError> {
+pub fn table(isa: Isa, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let cell = Cell::new(THICKNESS, DISPERSION, &Draws { realizations: 1, seed: SEED, isa })?;
     let setup = cell.setup(SolverSettings { method: Method::Hybrid, ..SolverSettings::default() });
     let columns = ["elements of order", "size (mm)", "time step (ns)", "error", "falls with order"];
-    let mut table = Table::new(&columns);
+    let mut table = MarkdownTable::new(&columns);
     match cell.bone(0) {
         Ok(bone) => {
             for series in all_series(&setup, &bone) {
@@ -55,20 +55,20 @@ pub fn table(isa: Isa, progress: Progress<'_>) -> Result<Table, StudyError> {
 }
 
 /// Returns the series of all orders, then that of the time step.
-fn all_series(setup: &Setup, bone: &Bone) -> Vec<Series> {
-    let of_sizes = SIZES.par_iter().map(|(order, sizes)| Series {
+fn all_series(setup: &Setup, bone: &Bone) -> Vec<RefinementSeries> {
+    let of_sizes = SIZES.par_iter().map(|(order, sizes)| RefinementSeries {
         rows: element_convergence(setup, bone, *order, sizes),
         varied: |row| row.element_size,
     });
-    let mut series: Vec<Series> = of_sizes.collect();
-    series.push(Series {
+    let mut series: Vec<RefinementSeries> = of_sizes.collect();
+    series.push(RefinementSeries {
         rows: time_step_convergence(setup, bone, HALVINGS),
         varied: |row| row.time_step,
     });
     series
 }
 
-fn add(table: &mut Table, series: &Series) {
+fn add(table: &mut MarkdownTable, series: &RefinementSeries) {
     let rows = match &series.rows {
         Ok(rows) => rows,
         Err(failure) => return table.push(failed(failure)),
@@ -116,11 +116,11 @@ mod tests {
             time_step: 2e-9,
             error,
         };
-        let mut table = Table::new(&["order", "size", "step", "error", "falls"]);
+        let mut table = MarkdownTable::new(&["order", "size", "step", "error", "falls"]);
         let rows = Ok(vec![row(1e-3, 3.2e-3), row(0.5e-3, 1e-4)]);
-        add(&mut table, &Series { rows, varied: |row| row.element_size });
+        add(&mut table, &RefinementSeries { rows, varied: |row| row.element_size });
         let failure = Failure { kind: FailureKind::NotFinite, detail: String::new() };
-        add(&mut table, &Series { rows: Err(failure), varied: |row| row.time_step });
+        add(&mut table, &RefinementSeries { rows: Err(failure), varied: |row| row.time_step });
         assert_eq!(table.rows()[0], ["4", "1", "2.0", "3.2e-3", "–"]);
         assert_eq!(table.rows()[1], ["4", "0.5", "2.0", "1.0e-4", "5.0"]);
         assert_eq!(table.rows()[2], ["not_finite", "", "", "", ""]);

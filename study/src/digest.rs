@@ -7,8 +7,8 @@ use osteon_common::settings::SolverSettings;
 use osteon_solver::Isa;
 
 use crate::draws::{Cell, Draws, OPTIMUM, arrival};
-use crate::table::{Table, millimetres};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, millimetres};
+use crate::{RowCallback, StudyError};
 
 /// Thickness of the plate, m, and dispersion: those of the paper, and a more difficult case.
 const BATCHES: [(f64, f64); 2] = [(4e-3, 0.1029), (2e-3, 0.45)];
@@ -20,8 +20,8 @@ pub const REALIZATIONS: u64 = 2000;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&["plate (mm)", "dispersion", "instruction set", "digest"]);
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&["plate (mm)", "dispersion", "instruction set", "digest"]);
     for (thickness, dispersion) in BATCHES {
         for isa in Isa::available() {
             let cell = Cell::new(thickness, dispersion, &Draws { isa, ..*draws })?;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::NotElastic;
-use osteon_common::outcome::{FailureKind, Solved};
+use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_common::settings::SolverSettings;
@@ -102,7 +102,7 @@ pub(crate) fn arrival(
 }
 
 /// Computes the first `count` realizations of an ensemble, in index order.
-pub(crate) fn solved(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<Solved> {
+pub(crate) fn solved(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<RealizationResult> {
     let realization =
         |workspace: &mut Workspace, index| solver.realization(ensemble, index, workspace);
     (0..count).into_par_iter().map_init(Workspace::default, realization).collect()

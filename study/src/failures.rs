@@ -4,8 +4,8 @@ use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::settings::SolverSettings;
 
 use crate::draws::{Draws, arrival, cells};
-use crate::table::{Table, millimetres, percent};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, millimetres, percent};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -18,10 +18,10 @@ pub const REALIZATIONS: u64 = 100_000;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut columns = vec!["plate (mm)", "dispersion", "failed (%)"];
     columns.extend(FailureKind::ALL.map(FailureKind::name));
-    let mut table = Table::new(&columns);
+    let mut table = MarkdownTable::new(&columns);
     for cell in cells(&THICKNESSES, &DISPERSIONS, draws)? {
         let solver = cell.solver(SolverSettings::default());
         let outcomes: Vec<Outcome> = cell.each(|_, bone, workspace| {
@@ -38,7 +38,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
 
 /// Returns the fraction of all failures, then of each kind.
 fn rates(outcomes: &[Outcome]) -> Vec<String> {
-    let counts = FailureCounts::of(outcomes);
+    let counts = FailureCounts::from_outcomes(outcomes);
     let all = outcomes.len() as u64;
     let kinds = FailureKind::ALL.map(|kind| counts.get(kind));
     [counts.total()].into_iter().chain(kinds).map(|count| percent(count, all)).collect()

@@ -16,7 +16,7 @@ impl Generator {
     }
 
     /// Creates the generator of one index of a study with this seed.
-    pub(crate) fn of_index(seed: u64, index: u64) -> Self {
+    pub(crate) fn for_index(seed: u64, index: u64) -> Self {
         Self::new(seed ^ index.wrapping_mul(INDEX_STEP))
     }
 

@@ -5,17 +5,17 @@ use std::convert::Infallible;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{JobSpecification, MonteCarlo};
-use osteon_common::outcome::{Outcome, Solved};
+use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_common::realization::{Ensemble, PointError};
-use osteon_search::{Identified, IdentifyError};
+use osteon_search::{CompletedJob, IdentifyError};
 use osteon_solver::{Isa, Solver};
 
 use crate::draws::solved;
 
 /// Cache of the realizations at the points at which several identifications begin, by the bits of
 /// the point.
-pub(crate) type Known = BTreeMap<[u64; 7], Vec<Solved>>;
+pub(crate) type RealizationCache = BTreeMap<[u64; 7], Vec<RealizationResult>>;
 
 /// Computes the outcomes of every realization at a point of the paper's geometry, in index order.
 ///
@@ -39,9 +39,9 @@ pub(crate) fn outcomes(
 /// If the specification violates rules.
 pub(crate) fn identify(
     specification: &JobSpecification,
-    known: &mut Known,
+    known: &mut RealizationCache,
     isa: Isa,
-) -> Result<Identified, IdentifyError<Infallible>> {
+) -> Result<CompletedJob, IdentifyError<Infallible>> {
     let solver = Solver::with_isa(&specification.setup, isa);
     let mut begun = false;
     osteon_search::identify(specification, |realizations| {

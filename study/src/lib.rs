@@ -1,5 +1,5 @@
 //! Studies that compare the solvers, the sampling methods ([`variance`]) and the search methods
-//! ([`searches`]); each returns a [`Table`]. The program `osteon-study` prints them.
+//! ([`searches`]); each returns a [`MarkdownTable`]. The program `osteon-study` prints them.
 //!
 //! A study is a function of its draws alone: realizations are computed on all cores and processed
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
@@ -25,7 +25,7 @@ pub mod variance;
 
 pub use draws::{Draws, OPTIMUM};
 pub use error::StudyError;
-pub use table::Table;
+pub use table::MarkdownTable;
 
 /// Callback that receives every completed row of a table.
-pub type Progress<'a> = &'a dyn Fn(&str);
+pub type RowCallback<'a> = &'a dyn Fn(&str);

@@ -14,8 +14,8 @@ use osteon_solver::Isa;
 use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
-    Draws, Progress, StudyError, Table, accuracy, continuity, convergence, digest, failures,
-    methods, models, refinement, searches, setups, variance,
+    Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
+    failures, methods, models, refinement, searches, setups, variance,
 };
 
 use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
@@ -24,7 +24,7 @@ use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, T
 struct OverDraws {
     name: &'static str,
     realizations: u64,
-    table: fn(&Draws, Progress<'_>) -> Result<Table, StudyError>,
+    table: fn(&Draws, RowCallback<'_>) -> Result<MarkdownTable, StudyError>,
 }
 
 const FAILURES: OverDraws =
@@ -122,7 +122,7 @@ fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, Study
 fn over_twins(
     name: &str,
     repetitions: u64,
-    table: fn(&Twins, Progress<'_>) -> Result<Table, StudyError>,
+    table: fn(&Twins, RowCallback<'_>) -> Result<MarkdownTable, StudyError>,
     arguments: TwinsArguments,
     isa: Isa,
 ) -> Result<String, StudyError> {
@@ -133,6 +133,6 @@ fn over_twins(
 }
 
 /// Returns a table below the command that reproduces it.
-fn titled(arguments: &str, table: &Table) -> String {
+fn titled(arguments: &str, table: &MarkdownTable) -> String {
     format!("`osteon-study {arguments}` ({})\n\n{table}", version::fingerprint())
 }

@@ -5,9 +5,9 @@ use osteon_solver::check::{Difference, difference};
 
 use crate::accuracy::REFERENCE;
 use crate::draws::{Cell, Draws, arrival, cells};
-use crate::spread::Spread;
-use crate::table::{Table, millimetres, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, millimetres, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
@@ -21,8 +21,8 @@ pub const REALIZATIONS: u64 = 50;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "plate (mm)",
         "dispersion",
         "method",
@@ -60,7 +60,7 @@ fn differences(cell: &Cell) -> [Vec<Difference>; 2] {
 }
 
 fn summary(differences: &[Difference]) -> Vec<String> {
-    let spread = Spread::of(differences);
+    let spread = DifferenceSummary::new(differences);
     vec![
         two_digits(spread.velocity(0.5)),
         two_digits(spread.velocity(1.0)),

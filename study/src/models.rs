@@ -7,11 +7,11 @@ use osteon_common::realization::{Ensemble, PointError};
 use osteon_solver::Workspace;
 use rayon::prelude::*;
 
-use crate::accuracy::{Both, Measured, SUMMARY, summary};
+use crate::accuracy::{Both, MeasuredDraw, SUMMARY, summary};
 use crate::draws::{Draws, not_elastic};
 use crate::generator::Generator;
-use crate::table::{Table, millimetres};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, millimetres};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 4] = [1e-3, 2e-3, 4e-3, 6e-3];
@@ -35,8 +35,8 @@ const TRIES_MAX: usize = 1000;
 ///
 /// # Errors
 /// If a mean model or dispersion has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[&["plate (mm)"][..], &SUMMARY].concat());
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[&["plate (mm)"][..], &SUMMARY].concat());
     for thickness in THICKNESSES {
         let mut row = vec![millimetres(thickness)];
         row.extend(summary(&measured(thickness, draws)?));
@@ -46,7 +46,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-fn measured(thickness: f64, draws: &Draws) -> Result<Vec<Measured>, PointError> {
+fn measured(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointError> {
     let mut setup = Setup::default();
     setup.layers.bone_thickness = thickness;
     let both = Both::new(&setup, draws.isa);
@@ -62,7 +62,7 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<Measured>, PointError> 
 /// Draws mean model and dispersion of one bone: uniform within the bounds, the first that is
 /// admissible.
 pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
-    let mut generator = Generator::of_index(seed, index);
+    let mut generator = Generator::for_index(seed, index);
     let mut drawn = || Point(BOUNDS.map(|(from, to)| generator.between(from, to)));
     for _ in 1..TRIES_MAX {
         let point = drawn();

@@ -5,9 +5,9 @@ use osteon_common::settings::SolverSettings;
 use osteon_solver::check::{Difference, difference};
 
 use crate::draws::{Cell, Draws, arrival, cells};
-use crate::spread::Spread;
-use crate::table::{Table, millimetres, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, millimetres, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Thicknesses of the plates, m.
 const THICKNESSES: [f64; 3] = [1e-3, 2e-3, 4e-3];
@@ -23,8 +23,8 @@ pub const REALIZATIONS: u64 = 100;
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "plate (mm)",
         "dispersion",
         "refinement",
@@ -64,7 +64,7 @@ fn differences(cell: &Cell) -> [Vec<Difference>; REFINEMENTS.len()] {
 }
 
 fn summary(differences: &[Difference]) -> Vec<String> {
-    let spread = Spread::of(differences);
+    let spread = DifferenceSummary::new(differences);
     let mut cells: Vec<_> = [0.5, 0.9, 1.0].map(|p| two_digits(spread.velocity(p))).into();
     cells.push(spread.different_picks.to_string());
     cells
@@ -80,7 +80,8 @@ mod tests {
     fn errors_fall_with_refinement() {
         let draws = Draws { realizations: 3, seed: 2, isa: Isa::fastest() };
         let cell = Cell::new(4e-3, 0.1029, &draws).unwrap();
-        let largest = differences(&cell).map(|at| Spread::of(&at).velocity(1.0).unwrap());
+        let largest =
+            differences(&cell).map(|at| DifferenceSummary::new(&at).velocity(1.0).unwrap());
         // From the quick sampling to those whose band grows, every error is far below the first.
         assert!(largest[0] < 1e-3, "{largest:?}");
         assert!(largest[2] < 0.2 * largest[0], "{largest:?}");

@@ -10,13 +10,13 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
-use osteon_search::{Identified, IdentifyError, newton};
+use osteon_search::{CompletedJob, IdentifyError, newton};
 
 use crate::draws::{Draws, OPTIMUM};
-use crate::identify::{Known, identify, outcomes};
+use crate::identify::{RealizationCache, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
-use crate::table::{Table, two_digits};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Default number of realizations of each evaluation.
 pub const REALIZATIONS: u64 = 500;
@@ -39,8 +39,8 @@ const COSTS: [f64; 3] = [1e-4, 1e-6, 1e-10];
 ///
 /// # Errors
 /// If the optimum has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "start",
         "method",
         "status",
@@ -87,7 +87,7 @@ fn monte_carlo(draws: &Draws) -> MonteCarlo {
 }
 
 /// A completed search.
-struct Found {
+struct CompletedSearch {
     specification: JobSpecification,
     status: Status,
     /// Cost of each evaluation.
@@ -95,7 +95,7 @@ struct Found {
     best: Option<Point>,
 }
 
-impl Found {
+impl CompletedSearch {
     fn lowest(&self) -> f64 {
         self.costs.iter().copied().fold(f64::INFINITY, f64::min)
     }
@@ -111,7 +111,7 @@ fn found(
     method: SearchMethod,
     data: Moments,
     draws: &Draws,
-) -> Result<Found, IdentifyError<Infallible>> {
+) -> Result<CompletedSearch, IdentifyError<Infallible>> {
     let mut search =
         Search { max_evaluations: EVALUATIONS_MAX, sensitivities: false, ..Search::by(method) };
     if method == SearchMethod::Simplex {
@@ -130,9 +130,10 @@ fn found(
         objective: Objective::default(),
         search,
     };
-    let Identified { result, history } = identify(&specification, &mut Known::new(), draws.isa)?;
+    let CompletedJob { result, history } =
+        identify(&specification, &mut RealizationCache::new(), draws.isa)?;
     let costs = history.iter().map(|row| row.cost.unwrap_or(f64::INFINITY));
-    Ok(Found {
+    Ok(CompletedSearch {
         status: result.status,
         costs: costs.collect(),
         best: result.best.map(|best| best.point),
@@ -140,7 +141,7 @@ fn found(
     })
 }
 
-fn cells(found: &Found, data: Moments, draws: &Draws) -> Result<Vec<String>, PointError> {
+fn cells(found: &CompletedSearch, data: Moments, draws: &Draws) -> Result<Vec<String>, PointError> {
     let mut cells = vec![
         found.status.name().to_owned(),
         found.costs.len().to_string(),

@@ -18,9 +18,9 @@ use rayon::prelude::*;
 use crate::accuracy::REFERENCE;
 use crate::draws::{Draws, OPTIMUM};
 use crate::generator::Generator;
-use crate::spread::Spread;
-use crate::table::{Table, percent, two_digits};
-use crate::{Progress, StudyError};
+use crate::spread::DifferenceSummary;
+use crate::table::{MarkdownTable, percent, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Default number of cases of the study.
 pub const REALIZATIONS: u64 = 1000;
@@ -43,7 +43,7 @@ struct Drawn {
 
 /// Results of one case.
 #[derive(Debug)]
-struct Measured {
+struct MeasuredSetup {
     index: u64,
     drawn: Drawn,
     found: Result<Arrival, Failure>,
@@ -58,12 +58,12 @@ struct Measured {
 ///
 /// # Errors
 /// If a mean model or dispersion has no ensemble.
-pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError> {
+pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let measured = measured(draws)?;
     for one in measured.iter().filter(|one| one.is_remarkable()) {
         progress(&one.described());
     }
-    let mut table = Table::new(&[
+    let mut table = MarkdownTable::new(&[
         "thickness × frequency (mm MHz)",
         "cases",
         "with a velocity",
@@ -76,7 +76,7 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     ]);
     let mut from = 0.0;
     for (to, name) in CLASSES {
-        let class: Vec<&Measured> =
+        let class: Vec<&MeasuredSetup> =
             measured.iter().filter(|one| (from..to).contains(&one.product())).collect();
         let mut row = vec![name.to_owned()];
         row.extend(summary(&class));
@@ -86,20 +86,20 @@ pub fn table(draws: &Draws, progress: Progress<'_>) -> Result<Table, StudyError>
     Ok(table)
 }
 
-fn measured(draws: &Draws) -> Result<Vec<Measured>, PointError> {
+fn measured(draws: &Draws) -> Result<Vec<MeasuredSetup>, PointError> {
     (0..draws.realizations)
         .into_par_iter()
         .map_init(Workspace::default, |workspace, index| {
             let drawn = drawn(draws.seed, index)?;
-            Ok(drawn.map(|drawn| Measured::of(index, drawn, draws.isa, workspace)))
+            Ok(drawn.map(|drawn| MeasuredSetup::new(index, drawn, draws.isa, workspace)))
         })
         .filter_map(Result::transpose)
         .collect()
 }
 
-fn summary(class: &[&Measured]) -> Vec<String> {
+fn summary(class: &[&MeasuredSetup]) -> Vec<String> {
     let differences: Vec<_> = class.iter().map(|one| one.difference).collect();
-    let spread = Spread::of(&differences);
+    let spread = DifferenceSummary::new(&differences);
     let velocities = class.iter().filter(|one| one.found.is_ok()).count();
     let mut cells = vec![class.len().to_string(), velocities.to_string()];
     cells.extend([0.5, 0.99, 1.0].map(|p| two_digits(spread.velocity(p))));
@@ -110,8 +110,8 @@ fn summary(class: &[&Measured]) -> Vec<String> {
     cells
 }
 
-impl Measured {
-    fn of(index: u64, drawn: Drawn, isa: Isa, workspace: &mut Workspace) -> Self {
+impl MeasuredSetup {
+    fn new(index: u64, drawn: Drawn, isa: Isa, workspace: &mut Workspace) -> Self {
         let [found, reference] = [1.0, REFERENCE].map(|refinement| {
             let solver = SolverSettings { refinement, ..drawn.setup.solver };
             let setup = Setup { solver, ..drawn.setup };
@@ -190,7 +190,7 @@ pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
 
 /// Returns the first case of `index` that passes validation and is within the limit of time.
 fn drawn(seed: u64, index: u64) -> Result<Option<Drawn>, PointError> {
-    let mut generator = Generator::of_index(seed, index);
+    let mut generator = Generator::for_index(seed, index);
     for _ in 0..TRIES_MAX {
         let (setup, point) = (setup(&mut generator), point(&mut generator));
         if !is_suitable(&setup) {
@@ -276,11 +276,11 @@ fn point(generator: &mut Generator) -> Point {
 mod tests {
     use super::*;
 
-    fn outcome(index: u64, difference: Difference) -> Measured {
+    fn outcome(index: u64, difference: Difference) -> MeasuredSetup {
         let drawn = drawn(1, index).unwrap().unwrap();
         let failure = osteon_common::outcome::FailureKind::NoArrival;
         let arrival = Err(Failure { kind: failure, detail: String::new() });
-        Measured { index, drawn, found: arrival.clone(), reference: arrival, difference }
+        MeasuredSetup { index, drawn, found: arrival.clone(), reference: arrival, difference }
     }
 
     #[test]
@@ -313,12 +313,12 @@ mod tests {
     }
 
     /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin
-    /// plate needs the refined look. Without these measures each had an error of 3e-4 to 2e-3.
+    /// plate needs the refined pass. Without these measures each had an error of 3e-4 to 2e-3.
     #[test]
     fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
         for index in [53, 101, 111, 149, 173, 177, 381] {
             let drawn = drawn(1, index).unwrap().unwrap();
-            let one = Measured::of(index, drawn, Isa::fastest(), &mut Workspace::default());
+            let one = MeasuredSetup::new(index, drawn, Isa::fastest(), &mut Workspace::default());
             let error = one.difference.velocity();
             // The error cannot be smaller than that of the reference itself.
             let bound = one.reference.as_ref().map_or(0.0, |found| found.estimated_error).max(2e-4);

@@ -5,7 +5,7 @@ use osteon_solver::check::Difference;
 
 /// Summary statistics of many differences.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Spread {
+pub(crate) struct DifferenceSummary {
     /// Relative differences of velocities, ascending.
     velocities: Vec<f64>,
     /// Largest difference of picked times, s.
@@ -14,8 +14,8 @@ pub(crate) struct Spread {
     pub(crate) different_picks: usize,
 }
 
-impl Spread {
-    pub(crate) fn of(differences: &[Difference]) -> Self {
+impl DifferenceSummary {
+    pub(crate) fn new(differences: &[Difference]) -> Self {
         let mut velocities: Vec<f64> =
             differences.iter().filter_map(|difference| difference.velocity()).collect();
         velocities.sort_unstable_by(f64::total_cmp);
@@ -40,7 +40,7 @@ mod tests {
     #[test]
     fn a_spread_counts_picks_apart() {
         let numbers = |velocity, time| Difference::Numbers { velocity, time };
-        let spread = Spread::of(&[
+        let spread = DifferenceSummary::new(&[
             numbers(3e-5, 1e-10),
             Difference::Picks,
             numbers(1e-5, 4e-10),
@@ -49,6 +49,6 @@ mod tests {
         assert_eq!(spread.velocity(1.0), Some(3e-5));
         assert_eq!(spread.velocity(0.0), Some(1e-5));
         assert_eq!((spread.largest_time, spread.different_picks), (Some(4e-10), 1));
-        assert_eq!(Spread::of(&[Difference::Picks]).velocity(0.5), None);
+        assert_eq!(DifferenceSummary::new(&[Difference::Picks]).velocity(0.5), None);
     }
 }

@@ -4,12 +4,12 @@ use std::fmt;
 
 /// A table; every row has a cell for each column.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Table {
+pub struct MarkdownTable {
     columns: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl MarkdownTable {
     /// Creates a table without rows.
     pub(crate) fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&name| name.to_owned()).collect(), rows: Vec::new() }
@@ -34,7 +34,7 @@ impl Table {
     }
 }
 
-impl fmt::Display for Table {
+impl fmt::Display for MarkdownTable {
     /// Formats Markdown with columns padded to one width and cells aligned to the right.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = |column: usize| {
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_table_is_markdown() {
-        let mut table = Table::new(&["plate (mm)", "δ"]);
+        let mut table = MarkdownTable::new(&["plate (mm)", "δ"]);
         table.push(vec![millimetres(1e-3), "0.1".to_owned()]);
         table.push(vec!["1.25".to_owned()]);
         assert_eq!(

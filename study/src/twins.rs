@@ -4,7 +4,7 @@
 use std::convert::Infallible;
 
 use osteon_common::case::Setup;
-use osteon_common::inference::{Inference, Known as HowWell, Quantity};
+use osteon_common::inference::{DerivedQuantity, Inference, Uncertainty};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
@@ -15,10 +15,10 @@ use osteon_search::IdentifyError;
 use osteon_solver::Isa;
 
 use crate::draws::OPTIMUM;
-use crate::identify::{Known, identify, outcomes};
+use crate::identify::{RealizationCache, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
-use crate::table::{Table, two_digits};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Number of repetitions, seed and instruction set.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +61,8 @@ const SEARCHED: [Parameter; 5] = [
 ///
 /// # Errors
 /// If a point has no ensemble.
-pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "set",
         "searched",
         "true",
@@ -76,7 +76,7 @@ pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError>
     for (set, &searched) in (0..twins.repetitions).zip(SEARCHED.iter().cycle()) {
         let (truth, data) = drawn_set(twins, &mut candidates)?;
         let specification = specification(&truth, searched, data, twins.seed);
-        let found = found(&specification, &mut Known::new(), twins.isa)?;
+        let found = found(&specification, &mut RealizationCache::new(), twins.isa)?;
         let mut row = vec![(set + 1).to_string(), searched.name().replace('_', " ")];
         for parameter in [searched, Parameter::Dispersion] {
             let quantity = found.as_ref().and_then(|found| of(found, parameter));
@@ -96,8 +96,8 @@ pub fn table(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError>
 ///
 /// # Errors
 /// If a point has no ensemble.
-pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "quantity",
         "data sets",
         "intervals that hold it (%)",
@@ -106,7 +106,7 @@ pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyErr
     let truths = [bulk_velocity(&OPTIMUM), OPTIMUM.dispersion()];
     let mut counts = [0_u64; 2];
     let mut squares = [0.0; 2];
-    let mut known = Known::new();
+    let mut known = RealizationCache::new();
     for repetition in 0..twins.repetitions {
         let data = velocities(&OPTIMUM, COUNTED, data_seed(twins.seed, repetition), twins.isa)?;
         let searched = Parameter::LongitudinalYoungModulus;
@@ -118,7 +118,9 @@ pub fn coverage(twins: &Twins, progress: Progress<'_>) -> Result<Table, StudyErr
         let found = found(&specification, &mut known, twins.isa)?;
         let quantities = found.map(|found| [found.bulk_velocity, found.dispersion]);
         for (i, quantity) in quantities.iter().flatten().enumerate() {
-            let Some(HowWell { interval: [lower, upper], .. }) = quantity.known else { continue };
+            let Some(Uncertainty { interval: [lower, upper], .. }) = quantity.known else {
+                continue;
+            };
             counts[i] += u64::from((lower..=upper).contains(&truths[i]));
             squares[i] += errors(quantity, truths[i]).map_or(f64::NAN, |errors| errors * errors);
         }
@@ -218,13 +220,13 @@ fn free(parameter: Parameter, start: f64) -> Range {
 
 fn found(
     specification: &JobSpecification,
-    known: &mut Known,
+    known: &mut RealizationCache,
     isa: Isa,
 ) -> Result<Option<Inference>, IdentifyError<Infallible>> {
     Ok(identify(specification, known, isa)?.result.conclusions.inference)
 }
 
-fn of(found: &Inference, parameter: Parameter) -> Option<Quantity> {
+fn of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantity> {
     match parameter {
         Parameter::Dispersion => Some(found.dispersion),
         _ => found.parameters.iter().find(|(name, _)| *name == parameter).map(|(_, found)| *found),
@@ -232,7 +234,7 @@ fn of(found: &Inference, parameter: Parameter) -> Option<Quantity> {
 }
 
 /// Returns the distance from the truth in standard errors.
-fn errors(found: &Quantity, truth: f64) -> Option<f64> {
+fn errors(found: &DerivedQuantity, truth: f64) -> Option<f64> {
     found.known.map(|known| (found.value - truth) / known.standard_error)
 }
 
@@ -247,7 +249,7 @@ mod tests {
 
     use super::*;
 
-    fn cells(table: &Table, column: usize) -> Vec<f64> {
+    fn cells(table: &MarkdownTable, column: usize) -> Vec<f64> {
         table.rows().iter().map(|row| row[column].parse().unwrap_or(f64::NAN)).collect()
     }
 

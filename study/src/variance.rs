@@ -10,8 +10,8 @@ use osteon_common::statistics;
 use osteon_solver::{Isa, Solver};
 
 use crate::draws::{OPTIMUM, solved};
-use crate::table::{Table, two_digits};
-use crate::{Progress, StudyError};
+use crate::table::{MarkdownTable, two_digits};
+use crate::{RowCallback, StudyError};
 
 /// Dispersions.
 const DISPERSIONS: [f64; 2] = [0.1029, 0.3];
@@ -53,8 +53,11 @@ pub struct Scatter {
 ///
 /// # Errors
 /// If there are no draws at a dispersion.
-pub fn table(repetitions: &Repetitions, progress: Progress<'_>) -> Result<Table, StudyError> {
-    let mut table = Table::new(&[
+pub fn table(
+    repetitions: &Repetitions,
+    progress: RowCallback<'_>,
+) -> Result<MarkdownTable, StudyError> {
+    let mut table = MarkdownTable::new(&[
         "dispersion",
         "realizations",
         "sampling",
@@ -116,11 +119,11 @@ pub fn scatter(
             estimates.extend(statistics::estimate(&monte_carlo, point, &outcomes));
         }
     }
-    Ok(estimates.map(|estimates| Scatter::of(&estimates, failed)))
+    Ok(estimates.map(|estimates| Scatter::new(&estimates, failed)))
 }
 
 impl Scatter {
-    fn of(estimates: &[Estimate], failed: usize) -> Self {
+    fn new(estimates: &[Estimate], failed: usize) -> Self {
         let of = |moment: fn(&Moments) -> f64| {
             let values = || estimates.iter().map(|estimate| moment(&estimate.moments));
             let mean = values().sum::<f64>() / estimates.len() as f64;
@@ -203,7 +206,7 @@ mod tests {
             standard_error: Moments { mean: error, coefficient_of_variation: 1.0 },
             controlled: false,
         };
-        let found = Scatter::of(&[estimate(1.0, 3.0), estimate(3.0, 4.0)], 5);
+        let found = Scatter::new(&[estimate(1.0, 3.0), estimate(3.0, 4.0)], 5);
         assert!((found.deviation.mean - 2.0_f64.sqrt()).abs() < 1e-15);
         assert!((found.deviation.coefficient_of_variation - 0.02_f64.sqrt()).abs() < 1e-15);
         assert!((found.reported.mean - 12.5_f64.sqrt()).abs() < 1e-15);

@@ -8,7 +8,7 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_common::version;
 use osteon_proto::v1::{
-    ExpelledWorker, JobFailureKind, JobState, JobStatus, ListExpelledRequest, WorkerHello,
+    BannedWorker, JobFailureKind, JobState, JobStatus, ListBansRequest, WorkerHello,
 };
 use tonic::{Code, Status};
 
@@ -46,9 +46,8 @@ impl Story {
         assert_eq!(self.api.end(&self.job).digest, self.digest);
     }
 
-    fn expelled(&mut self) -> Vec<ExpelledWorker> {
-        let listed =
-            self.api.call(async |client| client.list_expelled(ListExpelledRequest {}).await);
+    fn banned(&mut self) -> Vec<BannedWorker> {
+        let listed = self.api.call(async |client| client.list_bans(ListBansRequest {}).await);
         listed.unwrap().into_inner().workers
     }
 }
@@ -153,7 +152,7 @@ async fn liar(url: String, hello: WorkerHello) -> Status {
 }
 
 #[test]
-fn one_liar_among_three_is_expelled_and_leaves_no_trace() {
+fn one_liar_among_three_is_banned_and_leaves_no_trace() {
     let mut story = Story::begin(&["--audit-fraction", "0.5"]);
     let url = story.service.url().to_owned();
     let liar = on_thread(|| liar(url, hello(1)));
@@ -161,10 +160,10 @@ fn one_liar_among_three_is_expelled_and_leaves_no_trace() {
     story.check_end();
     let end = end(liar);
     assert_eq!(end.code(), Code::PermissionDenied, "{end}");
-    assert!(end.message().contains("expelled") && end.message().contains("agree on"), "{end}");
-    let expelled = story.expelled();
-    assert_eq!(expelled.len(), 1, "{expelled:?}");
-    assert_eq!((expelled[0].host.as_str(), expelled[0].process), ("peer", 1));
+    assert!(end.message().contains("banned") && end.message().contains("agree on"), "{end}");
+    let banned = story.banned();
+    assert_eq!(banned.len(), 1, "{banned:?}");
+    assert_eq!((banned[0].host.as_str(), banned[0].process), ("peer", 1));
 }
 
 #[test]
@@ -182,7 +181,7 @@ fn one_liar_among_two_is_an_integrity_error_that_names_both() {
     let watched = osteon(&["watch", &story.job, "--coordinator", story.service.url()]);
     assert_eq!(watched.code, Some(1), "{watched:?}");
     assert!(watched.stdout.contains("peer (process 1)"), "{watched:?}");
-    assert!(story.expelled().is_empty(), "nobody can say who lied");
+    assert!(story.banned().is_empty(), "nobody can say who lied");
 }
 
 /// A worker receives a batch and is silent until its lease ends; then it returns and answers the
@@ -209,7 +208,7 @@ fn what_a_worker_answers_after_its_lease_changes_nothing() {
     let _honest = [(); 2].map(|()| story.service.worker(&story.scratch));
     story.check_end();
     assert!(story.service.expirations() > 0);
-    assert!(story.expelled().is_empty());
+    assert!(story.banned().is_empty());
 }
 
 /// Workers that compute correctly but die repeatedly of one realization.
@@ -248,7 +247,7 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
     });
     let failed = api.end(&doomed);
     assert_eq!(failed.status(), JobStatus::Failed);
-    assert_eq!(failed.failure(), JobFailureKind::LostRealization);
+    assert_eq!(failed.failure(), JobFailureKind::PoisonRealization);
     for part in ["realization 33", "osteon simulate", "mandel = ["] {
         let reason = failed.reason.as_deref().unwrap_or_default();
         assert!(reason.contains(part), "{part} in {reason}");

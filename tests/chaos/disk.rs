@@ -228,7 +228,7 @@ fn a_coordinator_that_lost_accepted_jobs_says_so_and_does_not_start() {
     *damaged.last_mut().unwrap() ^= 1;
     for bytes in [&whole[..whole.len() - 1], &damaged] {
         fs::write(&log, bytes).unwrap();
-        refused_by(&directory, &["has lost job 3,", "look at the disk", "--accept-lost-jobs"]);
+        refused_by(&directory, &["has lost job 3,", "check the disk", "--accept-lost-jobs"]);
     }
     fs::write(&log, &whole[..32]).unwrap();
     refused_by(&directory, &["has lost jobs 1 to 3,", "restore the store from a copy"]);

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use osteon_common::outcome::{FailureKind, Solved};
+use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::version;
 use osteon_proto::announced::Received;
@@ -78,7 +78,7 @@ impl Peer {
     }
 
     /// Answers a batch.
-    pub(crate) async fn answer(&self, batch: u64, solved: &[Solved]) {
+    pub(crate) async fn answer(&self, batch: u64, solved: &[RealizationResult]) {
         let elapsed_s = 1e-3 * solved.len() as f64;
         self.send(Request::Result(batch::answer_to_message(batch, solved, elapsed_s))).await;
     }
@@ -90,29 +90,29 @@ impl Peer {
 }
 
 /// Computes all realizations of a batch, as every worker does.
-pub(crate) fn solve(work: &Work) -> Vec<Solved> {
+pub(crate) fn solve(work: &Work) -> Vec<RealizationResult> {
     let solver = Solver::new(&work.evaluation.setup);
     let mut workspace = Workspace::default();
     let indices = work.first..work.first + u64::from(work.count);
     let Ok(ensemble) = Ensemble::drawn(&work.evaluation.point, work.evaluation.germs) else {
-        return indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect();
+        return indices.map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect();
     };
     let realization = |index| {
         let Ok(bone) = ensemble.bone(index) else {
-            return Solved::failed(FailureKind::NotFinite);
+            return RealizationResult::failed(FailureKind::NotFinite);
         };
         match solver.arrival(&bone, &mut workspace) {
             Ok(arrival) => {
-                Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+                RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
             }
-            Err(failure) => Solved::failed(failure.kind),
+            Err(failure) => RealizationResult::failed(failure.kind),
         }
     };
     indices.map(realization).collect()
 }
 
 /// Same as [`solve`], with the last bit of the first velocity changed.
-pub(crate) fn lie(work: &Work) -> Vec<Solved> {
+pub(crate) fn lie(work: &Work) -> Vec<RealizationResult> {
     let mut solved = solve(work);
     if let Some(velocity) = solved.iter_mut().find_map(|solved| solved.outcome.as_mut().ok()) {
         *velocity = velocity.next_up();

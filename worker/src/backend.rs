@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use osteon_common::outcome::Solved;
+use osteon_common::outcome::RealizationResult;
 use osteon_proto::batch::Work;
 
 use crate::error::PanickedCase;
@@ -42,7 +42,7 @@ pub(crate) enum Computed {
     /// All realizations are computed, in index order.
     Complete {
         /// The realizations.
-        solved: Vec<Solved>,
+        solved: Vec<RealizationResult>,
         /// Wall time of the computation, s.
         elapsed_s: f64,
     },

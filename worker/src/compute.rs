@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use osteon_common::case::Setup;
-use osteon_common::outcome::{FailureKind, Solved};
+use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_proto::batch::Work;
 use osteon_solver::{Isa, Solver, Workspace};
@@ -110,7 +110,7 @@ enum Interrupted {
 }
 
 /// Computes the realizations of a batch, in index order.
-fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved>, Interrupted> {
+fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<RealizationResult>, Interrupted> {
     if stop.is_raised() {
         return Err(Interrupted::Stopped);
     }
@@ -125,7 +125,7 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved
     }));
     let (solver, ensemble) = prepared.map_err(|payload| panicked(*first, payload))?;
     let Ok(ensemble) = ensemble else {
-        return Ok(indices.map(|_| Solved::failed(FailureKind::NotFinite)).collect());
+        return Ok(indices.map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect());
     };
     indices
         .into_par_iter()
@@ -139,15 +139,15 @@ fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<Solved
         .collect()
 }
 
-fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> Solved {
+fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> RealizationResult {
     let Ok(bone) = ensemble.bone(index) else {
-        return Solved::failed(FailureKind::NotFinite);
+        return RealizationResult::failed(FailureKind::NotFinite);
     };
     match WORKSPACE.with_borrow_mut(|workspace| solver.arrival(&bone, workspace)) {
         Ok(arrival) => {
-            Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+            RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
         }
-        Err(failure) => Solved::failed(failure.kind),
+        Err(failure) => RealizationResult::failed(failure.kind),
     }
 }
 

@@ -37,7 +37,7 @@ pub enum WorkerError {
     /// The coordinator refused this worker; trying again would change nothing.
     #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
     Refused {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The gRPC status code.
         code: Code,
@@ -47,7 +47,7 @@ pub enum WorkerError {
     /// Coordinator and worker do not trust each other's certificates, or cannot establish TLS.
     #[error("no trust between this worker and the coordinator at {endpoint}: {failure}")]
     Distrust {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The TLS failure.
         failure: TlsFailure,
@@ -55,7 +55,7 @@ pub enum WorkerError {
     /// No coordinator was reached within the allowed time.
     #[error("gave up after {seconds} s without the coordinator at {endpoint}; last: {last}")]
     GaveUp {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// Time without a coordinator, s.
         seconds: f64,
@@ -65,14 +65,14 @@ pub enum WorkerError {
     /// A batch or an evaluation cannot be read; a guess could give wrong numbers.
     #[error("the coordinator at {endpoint} sent a message that cannot be read: {source}")]
     Malformed {
-        /// Returns the address of the coordinator.
+        /// Address of the coordinator.
         endpoint: Endpoint,
         /// The defect of the message.
         source: Malformed,
     },
     /// The solver panicked: a bug in the program, never an outcome.
     #[error(
-        "the solver panicked ({message}) on {case}; this is a mistake in osteon, please report it with this line"
+        "the solver panicked ({message}) on {case}; this is a bug in osteon; please report it with this line"
     )]
     Panicked {
         /// The realization at which it panicked.

@@ -35,7 +35,7 @@ const OUTBOX_MAX: usize = 2 * BATCHES_HELD_MAX;
 /// Configuration of a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// Returns the address of the coordinator.
+    /// Address of the coordinator.
     pub endpoint: Endpoint,
     /// Certificates and token for the coordinator, and the authorities that are trusted.
     pub credentials: Credentials,
@@ -249,7 +249,7 @@ impl Worker {
                 Effect::Send(message) => {
                     let request = AttachRequest { message: Some(message) };
                     if outbox.is_some_and(|outbox| outbox.try_send(request).is_err()) {
-                        end = Some(End::Lost("the coordinator takes no messages".to_owned()));
+                        end = Some(End::Lost("the coordinator does not read messages".to_owned()));
                     }
                 }
                 Effect::Compute(task, work) => {

@@ -16,7 +16,7 @@ const SEED_VARIABLE: &str = "OSTEON_TEST_SEED";
 
 /// The request in `words`.
 #[derive(Debug, PartialEq)]
-struct Request {
+struct RandomTestArguments {
     duration: Duration,
     /// Seed of the first round; later rounds count up from it.
     seed: Option<u64>,
@@ -24,7 +24,7 @@ struct Request {
 
 /// Runs rounds, each with its own seed, until the time in `words` has passed or one fails.
 pub(crate) fn rounds(words: &[String]) -> Result<()> {
-    let Request { duration, seed } = request(words)?;
+    let RandomTestArguments { duration, seed } = request(words)?;
     let mut seed = seed.unwrap_or_else(fresh_seed);
     // Building is not included in the time.
     cargo(&mut cargo_command(&["test", "--workspace", "--tests", "--no-run"]))?;
@@ -42,7 +42,7 @@ pub(crate) fn rounds(words: &[String]) -> Result<()> {
     }
 }
 
-fn request(words: &[String]) -> Result<Request> {
+fn request(words: &[String]) -> Result<RandomTestArguments> {
     let (mut minutes, mut seed) = (MINUTES, None);
     let mut words = words.iter();
     while let Some(word) = words.next() {
@@ -53,7 +53,7 @@ fn request(words: &[String]) -> Result<Request> {
             _ => bail!(USAGE),
         }
     }
-    Ok(Request { duration: Duration::from_secs(minutes.saturating_mul(60)), seed })
+    Ok(RandomTestArguments { duration: Duration::from_secs(minutes.saturating_mul(60)), seed })
 }
 
 /// Returns a new seed, made from the clock.
@@ -72,14 +72,16 @@ fn command(seed: u64) -> String {
 mod tests {
     use super::*;
 
-    fn request_of(words: &str) -> Result<Request> {
+    fn request_of(words: &str) -> Result<RandomTestArguments> {
         request(&words.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
     }
 
     #[test]
     fn minutes_and_seed_are_taken() {
-        let request =
-            |minutes: u64, seed| Request { duration: Duration::from_secs(60 * minutes), seed };
+        let request = |minutes: u64, seed| RandomTestArguments {
+            duration: Duration::from_secs(60 * minutes),
+            seed,
+        };
         assert_eq!(request_of("").unwrap(), request(MINUTES, None));
         assert_eq!(request_of("--seed 7 --minutes 3").unwrap(), request(3, Some(7)));
         for wrong in ["--seed", "--seed x", "--hours 1", "5"] {

@@ -21,18 +21,18 @@ impl fmt::Display for Excess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const NEEDED: &str = "more than any job needs";
         match self {
-            Self::Nesting => f.write_str("too many brackets are open here"),
+            Self::Nesting => f.write_str("too many nested brackets"),
             Self::Values => {
-                write!(f, "here begins the value after {DOCUMENT_VALUES_MAX} others, {NEEDED}")
+                write!(f, "this value comes after {DOCUMENT_VALUES_MAX} others, {NEEDED}")
             }
             Self::Keys => write!(
                 f,
-                "here begins the key, table or list after {DOCUMENT_KEYS_MAX} others, {NEEDED}"
+                "this key, table or list comes after {DOCUMENT_KEYS_MAX} others, {NEEDED}"
             ),
             Self::Tokens => write!(
                 f,
-                "before here are {TOML_TOKENS_MAX} words, marks, spaces, comments and line ends, \
-                 {NEEDED}; data.velocities may name a CSV file"
+                "the text before this place has {TOML_TOKENS_MAX} tokens (words, punctuation, \
+                 spaces, comments, line ends), {NEEDED}; data.velocities may name a CSV file"
             ),
         }
     }

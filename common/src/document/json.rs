@@ -7,10 +7,10 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::budget::Budget;
-use super::node::{Format, Malformed, Node, Value, quoted};
+use super::node::{Format, Node, SyntaxError, Value, quoted};
 
 /// Parses a JSON text.
-pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
+pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
     let mut deserializer = serde_json::Deserializer::from_str(text);
     let root = Tree { budget: &mut Budget::new() }.deserialize(&mut deserializer);
     let root = root.and_then(|root| deserializer.end().map(|()| root));
@@ -18,7 +18,7 @@ pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
         let (line, column) = (error.line(), error.column());
         let message = error.to_string();
         let suffix = format!(" at line {line} column {column}");
-        Malformed {
+        SyntaxError {
             format: Format::Json,
             line: line.max(1),
             column: column.max(1),

@@ -42,7 +42,7 @@ impl Format {
 /// Syntax error of a text.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
-pub struct Malformed {
+pub struct SyntaxError {
     /// The expected format.
     pub format: Format,
     /// Line, from 1.

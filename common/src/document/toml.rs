@@ -5,22 +5,27 @@ mod extent;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-use super::node::{Format, Malformed, Node, Value, position};
+use super::node::{Format, Node, SyntaxError, Value, position};
 
 /// Parses a TOML text.
-pub(super) fn parse(text: &str) -> Result<Node, Malformed> {
+pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
     if let Err((offset, excess)) = extent::check(text) {
         let (line, column) = position(text, offset);
-        return Err(Malformed { format: Format::Toml, line, column, message: excess.to_string() });
+        return Err(SyntaxError {
+            format: Format::Toml,
+            line,
+            column,
+            message: excess.to_string(),
+        });
     }
     let table = DeTable::parse(text).map_err(|error| malformed(text, &error))?;
-    let lines = Lines::new(text);
+    let lines = LineStarts::new(text);
     Ok(Node { line: None, value: lines.table(table.get_ref()) })
 }
 
-fn malformed(text: &str, error: &toml::de::Error) -> Malformed {
+fn malformed(text: &str, error: &toml::de::Error) -> SyntaxError {
     let (line, column) = position(text, error.span().map_or(0, |span| span.start));
-    Malformed {
+    SyntaxError {
         format: Format::Toml,
         line,
         column,
@@ -29,9 +34,9 @@ fn malformed(text: &str, error: &toml::de::Error) -> Malformed {
 }
 
 /// Byte offsets at which the lines of a text begin.
-struct Lines(Vec<usize>);
+struct LineStarts(Vec<usize>);
 
-impl Lines {
+impl LineStarts {
     fn new(text: &str) -> Self {
         let after_newline =
             text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);

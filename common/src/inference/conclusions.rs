@@ -10,7 +10,7 @@ impl Conclusions {
     /// Draws the conclusions from set number `set` of the data, given the best evaluation of its
     /// search, if one was feasible, and all evaluations of the job. For a propagation there are
     /// none.
-    pub fn of(
+    pub fn new(
         specification: &JobSpecification,
         set: usize,
         best: Option<&BestPoint>,

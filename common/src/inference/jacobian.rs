@@ -29,7 +29,7 @@ pub fn jacobian(
         if matches!(range, Range::Fixed(_)) {
             continue;
         }
-        let varied = |row: &&Evaluation| row.is_for(set) && row.role.varied == Some(parameter);
+        let varied = |row: &&Evaluation| row.belongs_to(set) && row.role.varied == Some(parameter);
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;

@@ -21,7 +21,7 @@ pub(super) struct Linear {
 
 /// Effect of noise on a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Response {
+pub(super) struct NoiseResponse {
     /// Standard deviation.
     pub(super) deviation: f64,
     /// Change of the quantity with each of the two logarithms.
@@ -31,7 +31,7 @@ pub(super) struct Response {
 }
 
 impl Linear {
-    pub(super) fn of(jacobian: &Jacobian) -> Self {
+    pub(super) fn from_jacobian(jacobian: &Jacobian) -> Self {
         let columns = &jacobian.columns;
         let gram = |i: usize, j: usize| columns.iter().map(|column| column[i] * column[j]).sum();
         let eigen = symmetric(gram(0, 0), gram(0, 1), gram(1, 1));
@@ -57,7 +57,7 @@ impl Linear {
         &self,
         gradient: &[f64],
         covariance: &[[f64; 2]; 2],
-    ) -> Option<Response> {
+    ) -> Option<NoiseResponse> {
         let length = dot(gradient, gradient).sqrt();
         let mut transfer = [0.0; 2];
         let mut inside = 0.0;
@@ -73,7 +73,7 @@ impl Linear {
             + 2.0 * transfer[0] * transfer[1] * covariance[0][1]
             + transfer[1] * transfer[1] * covariance[1][1];
         let known = inside > 0.0 && variance.is_finite();
-        known.then(|| Response { deviation: variance.max(0.0).sqrt(), transfer, free_share })
+        known.then(|| NoiseResponse { deviation: variance.max(0.0).sqrt(), transfer, free_share })
     }
 }
 

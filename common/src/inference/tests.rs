@@ -7,7 +7,7 @@ use crate::case::Setup;
 use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
 use crate::parameters::Point;
-use crate::results::{Estimate, Moments, Role};
+use crate::results::{Estimate, EvaluationRole, Moments};
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
 fn model(point: &Point) -> Moments {
@@ -42,7 +42,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
 fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
     Evaluation {
         number: 0,
-        role: Role { varied, ..Role::default() },
+        role: EvaluationRole { varied, ..EvaluationRole::default() },
         point,
         moments: Some(model(&point)),
         cost: Some(0.0),
@@ -188,7 +188,7 @@ fn what_the_search_has_left_lengthens_the_intervals() {
         (full.bulk_velocity, stopped.bulk_velocity, 1e-3),
         (full.dispersion, stopped.dispersion, 2e-2),
     ] {
-        let half = |quantity: Quantity| {
+        let half = |quantity: DerivedQuantity| {
             let [lower, upper] = quantity.known.unwrap().interval;
             libm::log(upper / lower) / 2.0
         };
@@ -278,7 +278,7 @@ fn solutions_are_the_best_of_each_start() {
     let at = |start: u32, density: f64, cost: f64| {
         let mut point = OPTIMUM;
         point.0[0] = density;
-        let role = Role { start, ..Role::default() };
+        let role = EvaluationRole { start, ..EvaluationRole::default() };
         Evaluation { role, cost: Some(cost), ..row(point, None) }
     };
     let rows = [

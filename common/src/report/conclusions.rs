@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::schema::keyed_by_parameter;
 use super::{MeanModel, Moments, finite};
-use crate::inference::{Conclusions, Inference, Quantity, Solution, Spread};
+use crate::inference::{Conclusions, DerivedQuantity, Inference, Spread};
 use crate::parameters::Parameter;
 use crate::results;
 
@@ -44,7 +44,7 @@ impl From<&Inference> for Identified {
             singular_value: direction.singular_value,
             components: components(&direction.components),
         };
-        let parameter = |(parameter, quantity): &(Parameter, Quantity)| {
+        let parameter = |(parameter, quantity): &(Parameter, DerivedQuantity)| {
             (*parameter, quantity.known.map(|_| quantity.into()))
         };
         Self {
@@ -93,8 +93,8 @@ impl QuantityEstimate {
     }
 }
 
-impl From<&Quantity> for QuantityEstimate {
-    fn from(quantity: &Quantity) -> Self {
+impl From<&DerivedQuantity> for QuantityEstimate {
+    fn from(quantity: &DerivedQuantity) -> Self {
         let known = quantity.known;
         Self {
             value: finite(quantity.value),
@@ -144,15 +144,15 @@ impl Conclusions {
     }
 }
 
-/// The answers of the searches from several starts.
+/// The solutions of the searches from several starts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Solutions {
-    /// Number of answers that match the data as well as the best one, or to the tolerance of the search.
+    /// Number of solutions that match the data as well as the best one, or to the tolerance of the search.
     pub matching: u64,
-    /// Ranges over the matching answers; null if there are none.
+    /// Ranges over the matching solutions; null if there are none.
     pub spread: Option<Spreads>,
     /// The best point of each start that found a feasible one.
-    pub points: Vec<Answer>,
+    pub points: Vec<Solution>,
 }
 
 impl From<&crate::inference::Solutions> for Solutions {
@@ -160,12 +160,12 @@ impl From<&crate::inference::Solutions> for Solutions {
         Self {
             matching: solutions.matching,
             spread: solutions.spread.as_ref().map(Spreads::from),
-            points: solutions.points.iter().map(Answer::from).collect(),
+            points: solutions.points.iter().map(Solution::from).collect(),
         }
     }
 }
 
-/// Ranges over the answers that match the data.
+/// Ranges over the solutions that match the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spreads {
     /// Ranges of the parameters, in their units.
@@ -190,7 +190,7 @@ impl From<&crate::inference::Spreads> for Spreads {
 
 /// The best point of the search from one start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Answer {
+pub struct Solution {
     /// Number of the start, from 0.
     pub start: u32,
     /// Cost of the point.
@@ -203,8 +203,8 @@ pub struct Answer {
     pub dispersion: Option<f64>,
 }
 
-impl From<&Solution> for Answer {
-    fn from(solution: &Solution) -> Self {
+impl From<&crate::inference::Solution> for Solution {
+    fn from(solution: &crate::inference::Solution) -> Self {
         Self {
             start: solution.start,
             cost: finite(solution.cost),

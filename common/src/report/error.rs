@@ -67,7 +67,7 @@ impl From<serde_path_to_error::Error<serde_json::Error>> for ReadError {
 
 /// Why a result has no point to give.
 #[derive(Debug, Error)]
-pub enum PointError {
+pub enum NoPoint {
     /// There is no group of this name.
     #[error("there is no group {name:?}; the groups are {}", listed(.names))]
     NoGroup {
@@ -77,11 +77,11 @@ pub enum PointError {
         names: Vec<String>,
     },
     /// A number of the point is null.
-    #[error("the result has no best point: none was feasible")]
+    #[error("the result has no best point: no evaluated point was feasible")]
     NoPoint,
 }
 
-impl PointError {
+impl NoPoint {
     pub(super) fn no_group(name: &str, groups: &[Group]) -> Self {
         let names = groups.iter().map(|group| group.name.clone()).collect();
         Self::NoGroup { name: name.to_owned(), names }

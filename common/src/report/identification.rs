@@ -108,7 +108,7 @@ impl Identification {
 impl From<&JobResult> for Identification {
     fn from(result: &JobResult) -> Self {
         let best = result.best.as_ref();
-        let found = Found::new(result.objective, best);
+        let found = BestPointKeys::new(result.objective, best);
         let conclusions = &result.conclusions;
         let inference = conclusions.inference.as_ref();
         // A job has one set of data, or groups of them.
@@ -150,7 +150,7 @@ impl From<&JobResult> for Identification {
 }
 
 /// What was found at the best point, for a job or for a group.
-struct Found {
+struct BestPointKeys {
     cost: Option<f64>,
     cost_standard_error: Option<Option<f64>>,
     parameters: MeanModel,
@@ -158,7 +158,7 @@ struct Found {
     failures: BTreeMap<FailureKind, u64>,
 }
 
-impl Found {
+impl BestPointKeys {
     fn new(objective: Objective, best: Option<&BestPoint>) -> Self {
         let point: Option<Point> = best.map(|best| best.point);
         let error = || best.and_then(|best| best.cost_error).and_then(finite);
@@ -216,7 +216,7 @@ pub struct Group {
 impl Group {
     fn new(objective: Objective, group: &GroupResult) -> Self {
         let best = group.best.as_ref();
-        let found = Found::new(objective, best);
+        let found = BestPointKeys::new(objective, best);
         let inference = group.conclusions.inference.as_ref();
         Self {
             name: group.name.clone(),

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{finite, present};
-use crate::moments::{Interval, KolmogorovTest};
+use crate::moments::{ConfidenceInterval, KolmogorovTest};
 use crate::results::{self, BestPoint, DataSummary};
 
 /// One of the two moments of a set of velocities.
@@ -147,7 +147,7 @@ impl MomentIntervals {
 
 impl From<crate::moments::MomentIntervals> for MomentIntervals {
     fn from(found: crate::moments::MomentIntervals) -> Self {
-        let ends = |interval: Interval| [interval.low, interval.high];
+        let ends = |interval: ConfidenceInterval| [interval.low, interval.high];
         Self {
             mean: ends(found.mean),
             coefficient_of_variation: ends(found.coefficient_of_variation),

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Content, Solver};
+use super::{DocumentContent, Solver};
 use crate::outcome::FailureKind;
 use crate::settings::Picking;
 /// One case and its velocity.
@@ -36,7 +36,7 @@ pub struct Simulation {
 impl Simulation {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        super::text(Content::Simulation(self))
+        super::text(DocumentContent::Simulation(self))
     }
 }
 

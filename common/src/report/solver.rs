@@ -11,8 +11,8 @@ use crate::settings::{Method, SolverSettings};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Solver<E> {
-    /// Exact layers in (frequency, wavenumber). In the result of a job the sampling is the nominal one,
-    /// at the usual speeds of bone, and a realization with faster waves may use another.
+    /// Exact layers in (frequency, wavenumber). In the result of a job the sampling is the nominal
+    /// one, at the usual speeds of bone, and a realization with faster waves may use another.
     Exact {
         /// Refinement of the sampling; 1 is the default.
         refinement: f64,
@@ -27,9 +27,9 @@ pub enum Solver<E> {
         /// Number of pairs that were computed in all; only of a simulation.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pairs_computed: Option<u64>,
-        /// How often the bone was looked at; only of a simulation.
+        /// Number of passes for the bone; only of a simulation.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        looks: Option<u32>,
+        passes: Option<u32>,
     },
     /// Fourier in x1, spectral elements in x3, time steps.
     Hybrid {
@@ -63,7 +63,7 @@ impl<E> Solver<E> {
                 pairs: nominal.map(|nominal| nominal.pairs),
                 estimated_error,
                 pairs_computed: None,
-                looks: None,
+                passes: None,
             },
             Method::Hybrid => {
                 Self::Hybrid { refinement, element_size, element_order, time_step, estimated_error }
@@ -72,8 +72,8 @@ impl<E> Solver<E> {
     }
 }
 
-/// Estimated relative errors, by discretisation, of the velocities of a set of realizations; null where
-/// none has a velocity.
+/// Estimated relative errors, by discretisation, of the velocities of a set of realizations; null
+/// where none has a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatedErrors {
     /// The median of the errors.

@@ -8,7 +8,7 @@
 //! second sample fades out while its neighbours fade in, so that the sum of the weights remains
 //! that of the integral.
 
-use crate::sampling::Sampling;
+use crate::sampling::WaveSampling;
 
 /// Frequencies, as multiples of the centre frequency, between which the step doubles.
 const DOUBLINGS: [(f64, f64); 4] = [(2.0, 2.75), (3.25, 4.0), (7.0, 8.5), (12.0, 14.0)];
@@ -18,24 +18,24 @@ pub const RUN: usize = 8;
 
 /// Eight equidistant frequencies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run {
+pub struct FrequencyRun {
     /// Number of its first frequency.
     pub first: usize,
     /// Distance of neighbours, a power of two.
     pub stride: usize,
 }
 
-impl Run {
+impl FrequencyRun {
     /// Returns the numbers of its frequencies.
     pub fn frequencies(self) -> impl Iterator<Item = usize> {
         (0..RUN).map(move |i| self.first + i * self.stride)
     }
 }
 
-impl Sampling {
-    /// Returns the frequencies of the whole band, in runs; [`Sampling::is_within`] tells which
+impl WaveSampling {
+    /// Returns the frequencies of the whole band, in runs; [`WaveSampling::is_within`] tells which
     /// frequencies of a run are not needed.
-    pub fn runs(&self) -> Vec<Run> {
+    pub fn runs(&self) -> Vec<FrequencyRun> {
         let (mut first, mut stride) = (0, 1);
         let mut doublings = DOUBLINGS.into_iter().peekable();
         let mut runs = Vec::new();
@@ -47,7 +47,7 @@ impl Sampling {
                 stride *= 2;
                 doublings.next();
             }
-            runs.push(Run { first, stride });
+            runs.push(FrequencyRun { first, stride });
             first += RUN * stride;
         }
         runs

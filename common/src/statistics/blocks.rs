@@ -23,9 +23,9 @@ const POINTS_MIN: u64 = 16;
 /// the control variate, and for both coefficients of variation. `osteon-study variance` shows the
 /// resulting errors.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Doubled([f64; 2]);
+pub(super) struct DoublingFactors([f64; 2]);
 
-impl Doubled {
+impl DoublingFactors {
     /// Factors for the velocities.
     pub(super) const PLAIN: Self = Self([0.87, 1.0]);
     /// Factors for the remainder after the control variate.
@@ -36,23 +36,23 @@ impl Doubled {
 /// times the moments, in index order, and the number N of successes.
 pub(super) fn standard_error(
     influences: impl Iterator<Item = [f64; 2]>,
-    doubled: Doubled,
+    doubling: DoublingFactors,
     monte_carlo: &MonteCarlo,
     successes: f64,
 ) -> Moments {
     let points = monte_carlo.points().max(1);
     let variances = if monte_carlo.scrambles > 1 {
-        of_scrambles(influences, points)
+        variance_over_scrambles(influences, points)
     } else {
-        of_blocks(influences, doubled)
+        variance_over_blocks(influences, doubling)
     };
     let [mean, coefficient_of_variation] = variances.map(|variance| variance.sqrt() / successes);
     Moments { mean, coefficient_of_variation }
 }
 
 /// Returns the variances of the sums over all scrambles, which have this many points each.
-fn of_scrambles(influences: impl Iterator<Item = [f64; 2]>, points: u64) -> [f64; 2] {
-    let mut scatter = Scatter::default();
+fn variance_over_scrambles(influences: impl Iterator<Item = [f64; 2]>, points: u64) -> [f64; 2] {
+    let mut scatter = PairVariance::default();
     let mut sums = [Sum::default(); 2];
     let mut filled = 0;
     for influence in influences {
@@ -76,8 +76,11 @@ fn of_scrambles(influences: impl Iterator<Item = [f64; 2]>, points: u64) -> [f64
 /// treated as independent. Small ones have the scatter of blocks of their size. Larger ones have
 /// that of the largest blocks of which there are enough, averaged with the next smaller and the
 /// next larger.
-fn of_blocks(influences: impl Iterator<Item = [f64; 2]>, doubled: Doubled) -> [f64; 2] {
-    let levels = Levels::of(influences);
+fn variance_over_blocks(
+    influences: impl Iterator<Item = [f64; 2]>,
+    doubling: DoublingFactors,
+) -> [f64; 2] {
+    let levels = Levels::from_influences(influences);
     if levels.count < POINTS_MIN {
         return levels.variances(0).map(|variance| variance * levels.count as f64);
     }
@@ -92,7 +95,7 @@ fn of_blocks(influences: impl Iterator<Item = [f64; 2]>, doubled: Doubled) -> [f
                 variances[i]
             } else {
                 let average = around.iter().map(|variances| variances[i]).sum::<f64>() / 3.0;
-                (measured..level).fold(average, |variance, _| variance * doubled.0[i])
+                (measured..level).fold(average, |variance, _| variance * doubling.0[i])
             };
         }
     }
@@ -121,11 +124,11 @@ fn signed_digits(number: u64) -> impl Iterator<Item = usize> {
 #[derive(Default)]
 struct Levels {
     count: u64,
-    scatters: Vec<Scatter>,
+    scatters: Vec<PairVariance>,
 }
 
 impl Levels {
-    fn of(influences: impl Iterator<Item = [f64; 2]>) -> Self {
+    fn from_influences(influences: impl Iterator<Item = [f64; 2]>) -> Self {
         let mut levels = Self::default();
         // For each level, the first of two blocks that make one of the next level.
         let mut firsts: Vec<Option<[f64; 2]>> = Vec::new();
@@ -135,7 +138,7 @@ impl Levels {
             for level in 0.. {
                 if level == firsts.len() {
                     firsts.push(None);
-                    levels.scatters.push(Scatter::default());
+                    levels.scatters.push(PairVariance::default());
                 }
                 levels.scatters[level].add(sum);
                 match firsts[level].take() {
@@ -152,19 +155,19 @@ impl Levels {
 
     /// Returns the variances of sums over blocks of 2 to the power `level`.
     fn variances(&self, level: usize) -> [f64; 2] {
-        self.scatters.get(level).map_or([f64::NAN; 2], Scatter::variances)
+        self.scatters.get(level).map_or([f64::NAN; 2], PairVariance::variances)
     }
 }
 
 /// Variance of a set of pairs.
 #[derive(Clone, Copy, Default)]
-struct Scatter {
+struct PairVariance {
     count: f64,
     sums: [Sum; 2],
     squares: [Sum; 2],
 }
 
-impl Scatter {
+impl PairVariance {
     fn add(&mut self, pair: [f64; 2]) {
         self.count += 1.0;
         for ((sum, square), value) in self.sums.iter_mut().zip(&mut self.squares).zip(pair) {
@@ -197,9 +200,9 @@ mod tests {
     fn errors(values: &[f64], scrambles: u64) -> [f64; 2] {
         let influences = values.iter().map(|&value| [value, 2.0 * value]);
         let count = values.len() as u64;
-        let doubled = Doubled([0.25, 1.0]);
+        let doubling = DoublingFactors([0.25, 1.0]);
         let Moments { mean, coefficient_of_variation } =
-            standard_error(influences, doubled, &sobol(count, scrambles), count as f64);
+            standard_error(influences, doubling, &sobol(count, scrambles), count as f64);
         [mean, coefficient_of_variation]
     }
 

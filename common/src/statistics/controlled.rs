@@ -46,7 +46,7 @@ pub(super) struct Controlled {
 impl Controlled {
     /// Returns the regression, if it is requested and possible. It requires every realization, as
     /// the moments of W over the successes alone are not known.
-    pub(super) fn of(
+    pub(super) fn new(
         monte_carlo: &MonteCarlo,
         point: &Point,
         outcomes: &[Outcome],

@@ -17,7 +17,7 @@ const MARGIN: f64 = TAPS as f64 + 4.0;
 
 /// A density on a grid.
 pub(super) struct KernelDensity {
-    grid: Grid,
+    grid: DensityGrid,
     /// Values at the nodes, interpolated by B-splines.
     density: Vec<f64>,
 }
@@ -25,8 +25,8 @@ pub(super) struct KernelDensity {
 impl KernelDensity {
     /// Computes the density of `values` with a kernel of this standard deviation, above 0, in the
     /// unit of the values; there is at least one value, and all are finite.
-    pub(super) fn of(values: &[f64], width: f64) -> Self {
-        let grid = Grid::around(values, width);
+    pub(super) fn new(values: &[f64], width: f64) -> Self {
+        let grid = DensityGrid::around(values, width);
         let share = 1.0 / (values.len() as f64 * grid.step);
         let density = grid.smoothed(values.iter().map(|&value| (value, share)));
         Self { grid, density }
@@ -56,13 +56,13 @@ impl KernelDensity {
 
 /// Equidistant nodes.
 #[derive(Clone, Copy)]
-struct Grid {
+struct DensityGrid {
     first: f64,
     step: f64,
     nodes: usize,
 }
 
-impl Grid {
+impl DensityGrid {
     /// Creates a grid with room for the kernel around each value.
     fn around(values: &[f64], width: f64) -> Self {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -161,7 +161,7 @@ mod tests {
     fn it_is_the_sum_over_gaussians() {
         let values = [-1.0, 0.3, 0.31, 2.0, 7.77];
         for width in [0.05, 0.3, 2.0] {
-            let density = KernelDensity::of(&values, width);
+            let density = KernelDensity::new(&values, width);
             let exact = |x: f64| {
                 values.iter().map(|value| normal(x - value, width)).sum::<f64>()
                     / values.len() as f64
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn integral_mean_and_variance_are_exact() {
         let (values, width) = ([0.137], 0.25);
-        let density = KernelDensity::of(&values, width);
+        let density = KernelDensity::new(&values, width);
         let step = 1e-3;
         let mut sums = [0.0; 3];
         for k in -4000..4000 {
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn reversed_is_the_same_kernel() {
         let values = [-1.0, 0.3, 0.31, 2.0, 7.77];
-        let density = KernelDensity::of(&values, 0.4);
+        let density = KernelDensity::new(&values, 0.4);
         let places = [(0.2, 1.5), (2.2, 0.25), (100.0, 3.0)];
         let forward: f64 = places.iter().map(|&(x, weight)| weight * density.at(x).0).sum();
         let reversed = density.reversed(places.into_iter());
@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn nothing_is_far_away() {
-        let density = KernelDensity::of(&[1.0], 0.1);
+        let density = KernelDensity::new(&[1.0], 0.1);
         for place in [-1e300, -5.0, 5.0, 1e300, f64::INFINITY, f64::NAN] {
             assert_eq!(density.at(place), (0.0, 0.0), "{place}");
         }

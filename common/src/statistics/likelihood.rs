@@ -19,7 +19,7 @@
 
 use super::kernel_density::KernelDensity;
 use super::sum::Sum;
-use super::{Sample, Verdict, blocks};
+use super::{PointStatistics, Sample, blocks};
 use crate::job::{MonteCarlo, Sampling};
 use crate::outcome::Outcome;
 use crate::parameters::Point;
@@ -41,13 +41,14 @@ const NARROWEST: f64 = 0.1;
 /// at an infeasible point, and if all velocities of the model are equal. Failed realizations are
 /// not part of the model's law.
 pub fn likelihood_cost(
-    verdict: &Verdict,
+    statistics: &PointStatistics,
     monte_carlo: &MonteCarlo,
     point: &Point,
     outcomes: &[Outcome],
     measured: &[f64],
 ) -> f64 {
-    let law = if verdict.feasible { Law::of(monte_carlo, point, outcomes) } else { None };
+    let law =
+        if statistics.feasible { Law::from_outcomes(monte_carlo, point, outcomes) } else { None };
     law.map_or(f64::INFINITY, |law| law.cost(measured))
 }
 
@@ -70,7 +71,7 @@ pub fn likelihood_error(
     outcomes: &[Outcome],
     measured: &[f64],
 ) -> Option<f64> {
-    let law = Law::of(monte_carlo, point, outcomes)?;
+    let law = Law::from_outcomes(monte_carlo, point, outcomes)?;
     let influences = law.influences(outcomes, measured);
     let successes = law.sample.central.count;
     let first = match monte_carlo.sampling {
@@ -81,7 +82,13 @@ pub fn likelihood_error(
         }
         Sampling::Sobol => {
             let pairs = influences.iter().map(|&influence| [influence, influence]);
-            blocks::standard_error(pairs, blocks::Doubled::CONTROLLED, monte_carlo, successes).mean
+            blocks::standard_error(
+                pairs,
+                blocks::DoublingFactors::CONTROLLED,
+                monte_carlo,
+                successes,
+            )
+            .mean
         }
     };
     let second = law.second_order_error(measured);
@@ -106,7 +113,7 @@ struct Law<'a> {
 
 /// The contributions of the kernels and of the floor to f, both times σ, with their derivatives by
 /// (x - v)/σ.
-struct Parts {
+struct DensityParts {
     kernels: (f64, f64),
     floor: (f64, f64),
 }
@@ -119,8 +126,12 @@ struct Gradient {
 }
 
 impl<'a> Law<'a> {
-    fn of(monte_carlo: &MonteCarlo, point: &Point, outcomes: &'a [Outcome]) -> Option<Self> {
-        let sample = Sample::of(monte_carlo, point, outcomes)?;
+    fn from_outcomes(
+        monte_carlo: &MonteCarlo,
+        point: &Point,
+        outcomes: &'a [Outcome],
+    ) -> Option<Self> {
+        let sample = Sample::from_outcomes(monte_carlo, point, outcomes)?;
         let Moments { mean, coefficient_of_variation } = sample.moments();
         let plain = sample.central.moments();
         let sampled = (plain.mean, plain.coefficient_of_variation * plain.mean);
@@ -135,7 +146,7 @@ impl<'a> Law<'a> {
         let shrinkage = 1.0 / bandwidth.mul_add(bandwidth, 1.0).sqrt();
         scores.iter_mut().for_each(|score| *score *= shrinkage);
         let width = shrinkage * bandwidth;
-        let density = KernelDensity::of(&scores, width);
+        let density = KernelDensity::new(&scores, width);
         Some(Self { sample, mean, deviation, sampled, shrinkage, width, density })
     }
 
@@ -152,11 +163,11 @@ impl<'a> Law<'a> {
         (velocity - self.mean) / self.deviation
     }
 
-    fn parts(&self, score: f64) -> Parts {
+    fn parts(&self, score: f64) -> DensityParts {
         let (density, slope) = self.density.at(score);
         let cauchy = FLOOR / (std::f64::consts::PI * score.mul_add(score, 1.0));
         let falling = -2.0 * score * cauchy / score.mul_add(score, 1.0);
-        Parts {
+        DensityParts {
             kernels: ((1.0 - FLOOR) * density, (1.0 - FLOOR) * slope),
             floor: (cauchy, falling),
         }
@@ -235,7 +246,7 @@ impl<'a> Law<'a> {
     }
 }
 
-impl Parts {
+impl DensityParts {
     fn density(&self) -> f64 {
         self.kernels.0 + self.floor.0
     }

@@ -5,10 +5,10 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 
 use super::*;
 
-async fn listener() -> (Bound, std::net::SocketAddr) {
+async fn listener() -> (BoundSocket, std::net::SocketAddr) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
-    (Bound::Tcp(listener), address)
+    (BoundSocket::Tcp(listener), address)
 }
 
 /// The clock is paused, and jumps whenever all tasks wait.
@@ -40,7 +40,7 @@ async fn there_are_no_more_connections_than_places() {
     let _first_client = TcpStream::connect(address).await.unwrap();
     let _second_client = TcpStream::connect(address).await.unwrap();
     let (io, place) = accept(&bound, &places).await.unwrap();
-    let first = Connection::new(Either::Right(io), Certificate::Absent, place);
+    let first = AcceptedConnection::new(Either::Right(io), Certificate::Absent, place);
     assert_eq!(places.available_permits(), 0);
     drop(first);
     // The permit is free again.

@@ -12,7 +12,7 @@ const NEEDS: [(&str, Requirement); 14] = [
     ("/grpc.health.v1.Health/Check", Requirement::Nothing),
     ("/osteon.v1.Jobs/Get", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/List", Requirement::Role(Role::Read)),
-    ("/osteon.v1.Jobs/ListExpelled", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/ListBans", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/ListWorkers", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/Watch", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/Fetch", Requirement::Role(Role::Read)),

@@ -18,7 +18,7 @@ use crate::effect::RecordKey;
 use crate::event::Event;
 use crate::store::memory::MemoryStore;
 use crate::store::{EvaluationRecord, JobRecord};
-use crate::store_thread::{Command, serve};
+use crate::store_thread::{StoreCommand, serve};
 
 const JOB: JobId = JobId(1);
 
@@ -69,7 +69,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         client: String::new(),
         priority: 0,
     };
-    let end = EndRecord::new(JOB, ending, Program::this(None), Duration::ZERO, 8, search.best());
+    let end = EndRecord::new(JOB, ending, Program::current(None), Duration::ZERO, 8, search.best());
     let best = search.best().unwrap().number as usize;
     assert!((1..8).contains(&best), "a search that finds nothing tests nothing");
     (record, search, end, records.swap_remove(best))
@@ -92,21 +92,21 @@ fn what_is_missing_is_named() {
     let (record, search, end, best) = ended();
     let mut store = MemoryStore::new();
     let error = read(&mut store, &end).unwrap_err();
-    assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
+    assert!(matches!(error, OutputError::Pruned { job: JOB }), "{error}");
     store.put_job(&record).unwrap();
     let error = read(&mut store, &end).unwrap_err();
-    assert!(matches!(error, ReadError::NoSummary { job: JOB }), "{error}");
+    assert!(matches!(error, OutputError::NoSummary { job: JOB }), "{error}");
     store.finish_job(&end, &search.summary()).unwrap();
     let later = EvaluationRecord { number: best.number + 1, ..best };
     store.put_evaluation(&later, false).unwrap();
     let error = read(&mut store, &end).unwrap_err();
-    assert!(matches!(error, ReadError::NoBest { job: JOB, .. }), "{error}");
+    assert!(matches!(error, OutputError::NoBest { job: JOB, .. }), "{error}");
 }
 
 #[test]
 fn a_path_without_an_evaluation_leaves_a_result() {
     let (record, _, end, _) = ended();
-    let ending = Ending::of_search(osteon_common::results::Status::Cancelled, None);
+    let ending = Ending::from_search(osteon_common::results::Status::Cancelled, None);
     let end = EndRecord { ending, ..end };
     let mut store = MemoryStore::new();
     store.put_job(&record).unwrap();
@@ -129,8 +129,8 @@ fn with_ended() -> (MemoryStore, JobRecord, EndRecord) {
 /// Serves a request at once and returns the reply.
 fn served<T>(
     store: &mut MemoryStore,
-    reading: impl FnOnce(Reply<T>) -> Reading,
-) -> Result<T, ReadError> {
+    reading: impl FnOnce(Reply<T>) -> ReadRequest,
+) -> Result<T, OutputError> {
     let (reply, mut read) = oneshot::channel();
     reading(reply).serve(store);
     read.try_recv().unwrap()
@@ -139,22 +139,22 @@ fn served<T>(
 #[test]
 fn a_job_that_is_pruned_while_it_is_read_is_said_to_be() {
     let (mut store, record, end) = with_ended();
-    assert_eq!(served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap(), record);
-    let summary = served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap();
+    assert_eq!(served(&mut store, |reply| ReadRequest::Job(JOB, reply)).unwrap(), record);
+    let summary = served(&mut store, |reply| ReadRequest::Summary(JOB, reply)).unwrap();
     let best = summary.best.unwrap();
-    let outcomes = served(&mut store, |reply| Reading::Outcomes(JOB, best, reply)).unwrap();
+    let outcomes = served(&mut store, |reply| ReadRequest::Outcomes(JOB, best, reply)).unwrap();
     assert_eq!(outcomes.len(), 2);
-    let left = Left { end, specification: record.specification, summary };
+    let left = StoredOutput { end, specification: record.specification, summary };
     assert_eq!(left.result(Some(outcomes)), read(&mut store, &left.end).unwrap().result);
 
     store.delete_jobs(&[JOB]).unwrap();
     let errors = [
-        served(&mut store, |reply| Reading::Job(JOB, reply)).unwrap_err(),
-        served(&mut store, |reply| Reading::Summary(JOB, reply)).unwrap_err(),
-        served(&mut store, |reply| Reading::Outcomes(JOB, best, reply)).unwrap_err(),
+        served(&mut store, |reply| ReadRequest::Job(JOB, reply)).unwrap_err(),
+        served(&mut store, |reply| ReadRequest::Summary(JOB, reply)).unwrap_err(),
+        served(&mut store, |reply| ReadRequest::Outcomes(JOB, best, reply)).unwrap_err(),
     ];
     for error in errors {
-        assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
+        assert!(matches!(error, OutputError::Pruned { job: JOB }), "{error}");
     }
 }
 
@@ -168,12 +168,12 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     let mut fetches = Vec::new();
     for _ in 0..3 {
         let (reply, fetched) = oneshot::channel();
-        sender.try_send(Command::Fetch(Reading::Summary(JOB, reply))).unwrap();
+        sender.try_send(StoreCommand::Fetch(ReadRequest::Summary(JOB, reply))).unwrap();
         fetches.push(fetched);
     }
     let other = JobRecord { job: JobId(2), ..record };
-    sender.try_send(Command::Put(Record::Job(other))).unwrap();
-    sender.try_send(Command::Prune { token: None, jobs: vec![JOB] }).unwrap();
+    sender.try_send(StoreCommand::Put(Record::Job(other))).unwrap();
+    sender.try_send(StoreCommand::Prune { token: None, jobs: vec![JOB] }).unwrap();
     drop(sender);
     serve(&mut store, &mut commands, &events);
     assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });
@@ -182,6 +182,6 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     // One record is read between the two commands.
     assert!(read.next().unwrap().is_ok());
     for error in read.map(Result::unwrap_err) {
-        assert!(matches!(error, ReadError::Pruned { job: JOB }), "{error}");
+        assert!(matches!(error, OutputError::Pruned { job: JOB }), "{error}");
     }
 }

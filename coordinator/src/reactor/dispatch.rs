@@ -33,18 +33,18 @@ pub(super) mod sizing;
 pub(super) mod speculation;
 
 /// Sends batches while workers can accept more and work waits, then duplicates.
-pub(crate) fn hand_out(turn: &mut Turn) {
+pub(crate) fn dispatch(turn: &mut Turn) {
     if turn.state.draining {
         return;
     }
-    let mut kept = poison::hand_out(turn);
-    overdue::hand_out(turn, &mut kept);
+    let mut kept = poison::dispatch(turn);
+    overdue::dispatch(turn, &mut kept);
     while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
-    duplicates::of_late_ones(turn);
+    duplicates::duplicate_late_batches(turn);
     if kept.is_empty() && !schedule::work_waits(turn.state) {
-        idle::hand_out(turn);
+        idle::dispatch(turn);
     }
-    duplicates::of_slow_ones(turn);
+    duplicates::duplicate_slow_batches(turn);
 }
 
 /// Sends one check or batch to the first free worker that is eligible for it, and returns whether

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{Outcome, Solved};
+use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::version;
 
 use super::*;
@@ -114,7 +114,7 @@ impl Rig {
     }
 
     /// Applies a heartbeat of a worker.
-    fn hear(&mut self, worker: u64) {
+    fn heartbeat(&mut self, worker: u64) {
         self.check(Event::Heartbeat { worker: WorkerId(worker) }, &[]);
     }
 }
@@ -182,7 +182,7 @@ fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
 
 /// Returns an answer whose velocities follow from the indices, computed in `elapsed_s`.
 fn answer_in(elapsed_s: f64, worker: u64, batch: u64, first: u64, count: u64) -> Event {
-    let solved = |index| Solved { outcome: velocity(index), estimated_error: 0.0 };
+    let solved = |index| RealizationResult { outcome: velocity(index), estimated_error: 0.0 };
     let solved = (first..first + count).map(solved).collect();
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s }
 }
@@ -215,7 +215,7 @@ fn described(effect: &Effect) -> String {
             format!("store job {} evaluation {}", record.job, record.number)
         }
         Effect::Store(Record::Ban(record)) => {
-            format!("store expulsion {}: {} {}", record.number, record.worker, record.reason)
+            format!("store ban {}: {} {}", record.number, record.worker, record.reason)
         }
         Effect::Read { job, number } => format!("read job {job} evaluation {number}"),
         Effect::Prune { jobs, .. } => {
@@ -244,11 +244,11 @@ fn answered(answer: &Answer) -> String {
         }
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
-        Answer::Banned(banned) => format!("expelled {}", banned.len()),
+        Answer::Banned(banned) => format!("banned {}", banned.len()),
         Answer::Workers(list) => {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }
-        Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.standing()),
+        Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.state()),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }

@@ -11,12 +11,12 @@ use crate::worker_name::WorkerName;
 
 /// A store in memory. Clones share their contents, as if one file were opened twice.
 #[derive(Debug, Clone, Default)]
-pub struct MemoryStore(Arc<Mutex<Content>>);
+pub struct MemoryStore(Arc<Mutex<StoreContent>>);
 
 #[derive(Debug, Default)]
-struct Content {
+struct StoreContent {
     jobs: BTreeMap<JobId, StoredJob>,
-    last_forgotten: Option<JobId>,
+    last_deleted_job: Option<JobId>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
     summaries: BTreeMap<JobId, Summary>,
     bans: BTreeMap<u64, BanRecord>,
@@ -28,7 +28,7 @@ impl MemoryStore {
         Self::default()
     }
 
-    fn content(&self) -> MutexGuard<'_, Content> {
+    fn content(&self) -> MutexGuard<'_, StoreContent> {
         // No change can panic half-way.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -100,15 +100,15 @@ impl Store for MemoryStore {
 
     fn delete_jobs(&mut self, jobs: &[JobId]) -> Result<(), StoreError> {
         let mut content = self.content();
-        content.last_forgotten = content.last_forgotten.max(jobs.iter().max().copied());
+        content.last_deleted_job = content.last_deleted_job.max(jobs.iter().max().copied());
         content.jobs.retain(|job, _| !jobs.contains(job));
         content.summaries.retain(|job, _| !jobs.contains(job));
         content.evaluations.retain(|(job, _), _| !jobs.contains(job));
         Ok(())
     }
 
-    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
-        Ok(self.content().last_forgotten)
+    fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError> {
+        Ok(self.content().last_deleted_job)
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
@@ -120,7 +120,7 @@ impl Store for MemoryStore {
         Ok(self.content().bans.values().cloned().collect())
     }
 
-    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
         let content = self.content();
         let of_worker = content.evaluations.values().filter(|it| it.workers.contains(worker));
         let jobs: BTreeSet<JobId> = of_worker.map(|evaluation| evaluation.job).collect();
@@ -128,7 +128,7 @@ impl Store for MemoryStore {
         Ok(jobs.into_iter().filter(ended).collect())
     }
 
-    fn forget_bans(&mut self) -> Result<(), StoreError> {
+    fn delete_bans(&mut self) -> Result<(), StoreError> {
         self.content().bans.clear();
         Ok(())
     }

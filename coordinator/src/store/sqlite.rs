@@ -19,8 +19,8 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    BanRecord, Between, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError,
-    StoredJob,
+    BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store,
+    StoreError, StoredJob,
 };
 use crate::ids::JobId;
 use crate::worker_name::WorkerName;
@@ -29,8 +29,8 @@ mod acknowledged;
 mod backup;
 mod columns;
 mod opening;
-mod owned;
 mod schema;
+mod store_trait;
 mod summary;
 
 pub use acknowledged::LostJobs;
@@ -42,7 +42,7 @@ use columns::{
 
 /// The header field of the file that holds the highest identifier of a deleted job. It is part of
 /// the database, so it changes in one transaction with the tables.
-const LAST_FORGOTTEN: &str = "user_version";
+const LAST_DELETED_JOB: &str = "user_version";
 
 /// A store in a SQLite file.
 #[derive(Debug)]
@@ -215,9 +215,10 @@ impl SqliteStore {
         for job in jobs {
             transaction.execute("DELETE FROM job WHERE id = ?1", params![job.0])?;
         }
-        let known: i32 = transaction.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
+        let known: i32 =
+            transaction.pragma_query_value(None, LAST_DELETED_JOB, |row| row.get(0))?;
         let highest = jobs.iter().map(|job| i32::try_from(job.0).unwrap_or(i32::MAX)).max();
-        transaction.pragma_update(None, LAST_FORGOTTEN, known.max(highest.unwrap_or(0)))?;
+        transaction.pragma_update(None, LAST_DELETED_JOB, known.max(highest.unwrap_or(0)))?;
         transaction.commit()
     }
 }
@@ -382,19 +383,18 @@ impl Store for &SqliteStore {
         Ok(())
     }
 
-    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
+    fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError> {
         let read = |row: &Row<'_>| row.get(0);
         let known: i32 = self
             .connection
-            .pragma_query_value(None, LAST_FORGOTTEN, read)
+            .pragma_query_value(None, LAST_DELETED_JOB, read)
             .map_err(|source| self.refused(source))?;
         Ok(u64::try_from(known).ok().filter(|known| *known > 0).map(JobId))
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
         let BanRecord { number, worker, job, reason, at } = record;
-        let sql =
-            "INSERT OR REPLACE INTO expulsion (number, host, process, instance, job, reason, at_ns,
+        let sql = "INSERT OR REPLACE INTO ban (number, host, process, instance, job, reason, at_ns,
                    checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
         let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
         let instance = worker.instance().cast_signed();
@@ -405,8 +405,7 @@ impl Store for &SqliteStore {
     }
 
     fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
-        let sql =
-            "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM expulsion
+        let sql = "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM ban
                    ORDER BY number";
         let read = |row: &Row<'_>| {
             let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);
@@ -430,7 +429,7 @@ impl Store for &SqliteStore {
         checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Ban))
     }
 
-    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
         let sql = "SELECT DISTINCT evaluation.job FROM evaluation
                    JOIN ending ON ending.job = evaluation.job
                    WHERE instr(char(10) || workers || char(10), char(10) || ?1 || char(10)) > 0
@@ -443,12 +442,12 @@ impl Store for &SqliteStore {
         run().map_err(|source| self.refused(source))
     }
 
-    fn forget_bans(&mut self) -> Result<(), StoreError> {
-        let forgotten = self.connection.execute("DELETE FROM expulsion", []);
-        forgotten.map(drop).map_err(|source| self.refused(source))
+    fn delete_bans(&mut self) -> Result<(), StoreError> {
+        let deleted = self.connection.execute("DELETE FROM ban", []);
+        deleted.map(drop).map_err(|source| self.refused(source))
     }
 
-    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+    fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {
         let mut store = *self;
         let mut lend = || between(&mut store as &mut dyn Store);
         backup::copy(&self.connection, &self.path, &mut lend)
@@ -463,14 +462,14 @@ fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
     } else {
         None
     };
-    let forgotten: i32 = connection.pragma_query_value(None, LAST_FORGOTTEN, |row| row.get(0))?;
-    Ok(stored.unwrap_or(0).max(u64::try_from(forgotten).unwrap_or(0)))
+    let deleted: i32 = connection.pragma_query_value(None, LAST_DELETED_JOB, |row| row.get(0))?;
+    Ok(stored.unwrap_or(0).max(u64::try_from(deleted).unwrap_or(0)))
 }
 
 /// Makes durable that no job gets an identifier up to `last`.
 fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
     let last = i32::try_from(last).unwrap_or(i32::MAX);
-    connection.pragma_update(None, LAST_FORGOTTEN, last)?;
+    connection.pragma_update(None, LAST_DELETED_JOB, last)?;
     connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }
 

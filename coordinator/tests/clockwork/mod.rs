@@ -48,7 +48,7 @@ enum Occurrence {
 pub(crate) enum Times {
     /// All equal.
     Equal,
-    /// Between 0.5 and 1.5 times the average, always the same for the same realization.
+    /// BetweenPieces 0.5 and 1.5 times the average, always the same for the same realization.
     Spread,
 }
 
@@ -60,7 +60,7 @@ struct Worker {
     queue: VecDeque<(BatchId, u32)>,
     batches: BTreeMap<BatchId, Held>,
     /// It never answers one in this many of the batches; `None`: it answers all.
-    swallows: Option<u64>,
+    ignores_every: Option<u64>,
 }
 
 struct Held {
@@ -90,7 +90,7 @@ pub(crate) struct Clockwork {
     /// Number of batches that were sent.
     pub(crate) sent: u64,
     /// Number of batches that were never answered.
-    pub(crate) swallowed: u64,
+    pub(crate) ignored: u64,
 }
 
 impl Clockwork {
@@ -123,7 +123,7 @@ impl Clockwork {
             unfinished: BTreeSet::new(),
             ends: BTreeMap::new(),
             sent: 0,
-            swallowed: 0,
+            ignored: 0,
         };
         for (process, &threads) in (1..).zip(threads) {
             let worker = WorkerId(process.into());
@@ -131,7 +131,7 @@ impl Clockwork {
                 idle_threads: threads,
                 queue: VecDeque::new(),
                 batches: BTreeMap::new(),
-                swallows: None,
+                ignores_every: None,
             };
             clockwork.workers.insert(worker, idle);
             let hello = Hello { slots: threads, ..fake::hello(process) };
@@ -143,7 +143,7 @@ impl Clockwork {
 
     /// Makes a worker that sends heartbeats never answer one in `n` of the batches.
     pub(crate) fn swallow(&mut self, worker: u64, n: u64) {
-        self.workers.get_mut(&WorkerId(worker)).unwrap().swallows = Some(n);
+        self.workers.get_mut(&WorkerId(worker)).unwrap().ignores_every = Some(n);
     }
 
     /// Runs jobs to their ends, each for a client of its own.
@@ -189,8 +189,8 @@ impl Clockwork {
             Occurrence::Batch(worker, batch, work) => {
                 self.sent += 1;
                 let known = self.workers.get_mut(&worker).unwrap();
-                if known.swallows.is_some_and(|n| self.sent.is_multiple_of(n)) {
-                    self.swallowed += 1;
+                if known.ignores_every.is_some_and(|n| self.sent.is_multiple_of(n)) {
+                    self.ignored += 1;
                     return;
                 }
                 known.queue.push_back((batch, work.count));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{FailureKind, Outcome, Solved};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, JobResult};
 use osteon_common::version::{self, Program, VERSION};
@@ -117,22 +117,22 @@ pub(crate) fn read(store: &mut dyn Store, job: JobId, number: u64) -> Event {
 }
 
 /// Returns all realizations of a batch.
-pub(crate) fn solved(work: &Work) -> Vec<Solved> {
+pub(crate) fn solved(work: &Work) -> Vec<RealizationResult> {
     (work.first..work.first + u64::from(work.count)).map(|index| realization(work, index)).collect()
 }
 
 /// Returns the realization at one index.
-fn realization(work: &Work, index: u64) -> Solved {
+fn realization(work: &Work, index: u64) -> RealizationResult {
     let noise = mix(work.evaluation.germs.seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     if noise.is_multiple_of(29) {
-        return Solved::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
+        return RealizationResult::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
     }
     let uniform = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
     let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.evaluation.point.0;
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
     let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
-    Solved { outcome: Ok(velocity), estimated_error: 1e-5 * (noise % 1000) as f64 / velocity }
+    RealizationResult { outcome: Ok(velocity), estimated_error: 1e-5 * (noise % 1000) as f64 / velocity }
 }
 
 /// Returns a well mixed function of one number (splitmix64).
@@ -175,7 +175,7 @@ pub(crate) fn left_by(
     let groups =
         groups.filter_map(|(set, group)| summary.group(specification, set, best(group.best)));
     let groups = groups.collect();
-    summary.result(specification, ending, &Program::this(None), best(summary.best), groups)
+    summary.result(specification, ending, &Program::current(None), best(summary.best), groups)
 }
 
 /// Returns all outcomes at one point, with the median and the largest of their estimated errors.

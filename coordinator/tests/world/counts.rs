@@ -46,7 +46,7 @@ pub(crate) struct Counts {
     /// Losses of workers on a node where they are lost over everything they get.
     pub(crate) bad_deaths: u64,
     /// Batches that a worker with heartbeats never answered.
-    pub(crate) swallowed: u64,
+    pub(crate) ignored: u64,
     /// Longest simulated time of a schedule without a bad node.
     pub(crate) longest: Duration,
 }
@@ -74,7 +74,7 @@ impl Counts {
         self.dropped += other.dropped;
         self.pruned += other.pruned;
         self.bad_deaths += other.bad_deaths;
-        self.swallowed += other.swallowed;
+        self.ignored += other.ignored;
         self.longest = self.longest.max(other.longest);
         self.pauses += other.pauses;
         self.damaged += other.damaged;

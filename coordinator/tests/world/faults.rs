@@ -22,8 +22,8 @@ impl World {
         }
         if self.draw(3) == 0 {
             // Half of them never answer.
-            let swallows = [1, 1, 2, 5][self.draw(4) as usize];
-            self.within(500, Occurrence::ArriveSilent(SILENT_PROCESSES, swallows));
+            let ignores_every = [1, 1, 2, 5][self.draw(4) as usize];
+            self.within(500, Occurrence::ArriveSilent(SILENT_PROCESSES, ignores_every));
         }
         if self.draw(3) == 0 {
             self.within(3000, Occurrence::Drain);
@@ -50,7 +50,7 @@ impl World {
             let known = self.workers.get_mut(&worker).unwrap();
             known.heard = until;
             if !known.bad
-                && known.swallows == 0
+                && known.ignores_every == 0
                 && !self.banned.contains(&process)
                 && self.draw(2) == 0
             {
@@ -67,22 +67,22 @@ impl World {
         }
     }
 
-    /// Attaches a process that sends heartbeats, and never answers one in `swallows` of its
+    /// Attaches a process that sends heartbeats, and never answers one in `ignores_every` of its
     /// batches.
-    pub(super) fn arrive_silent(&mut self, process: u32, swallows: u64) {
+    pub(super) fn arrive_silent(&mut self, process: u32, ignores_every: u64) {
         let worker = WorkerId(self.number());
         let hello = Hello { host: "silent".to_owned(), slots: 2, ..fake::hello(process) };
-        let known = Worker { process, swallows, heard: self.now, ..Worker::default() };
+        let known = Worker { process, ignores_every, heard: self.now, ..Worker::default() };
         self.workers.insert(worker, known);
         self.react(Event::Hello { worker, hello });
     }
 
     /// Returns whether a batch is one of those that its worker never answers.
-    pub(super) fn swallows(&mut self, worker: WorkerId, batch: BatchId) -> bool {
-        let swallows = self.workers[&worker].swallows;
-        let swallowed = swallows > 0 && batch.0.is_multiple_of(swallows);
-        self.counts.swallowed += u64::from(swallowed);
-        swallowed
+    pub(super) fn ignores(&mut self, worker: WorkerId, batch: BatchId) -> bool {
+        let ignores_every = self.workers[&worker].ignores_every;
+        let ignored = ignores_every > 0 && batch.0.is_multiple_of(ignores_every);
+        self.counts.ignored += u64::from(ignored);
+        ignored
     }
 
     /// Attaches a process on a faulty node.

@@ -87,7 +87,7 @@ struct Worker {
     /// It is lost over everything it gets.
     bad: bool,
     /// It never answers one in this many of its batches; 0: it answers all.
-    swallows: u64,
+    ignores_every: u64,
     heard: Duration,
     holds: BTreeMap<BatchId, Work>,
 }
@@ -260,7 +260,9 @@ impl World {
             Occurrence::Submit(client) => self.submit(client),
             Occurrence::Arrive => self.arrive(),
             Occurrence::ArriveBad => self.arrive_bad(),
-            Occurrence::ArriveSilent(process, swallows) => self.arrive_silent(process, swallows),
+            Occurrence::ArriveSilent(process, ignores_every) => {
+                self.arrive_silent(process, ignores_every)
+            }
             Occurrence::Return(process) => self.attach(process),
             Occurrence::Pause => self.pause(),
             Occurrence::GiveUp(worker) => self.give_up(worker),
@@ -399,11 +401,13 @@ impl World {
 
     /// Schedules the arrival of a worker that replaces a lost one.
     fn replace(&mut self, gone: &Worker) {
-        let other = match gone.swallows {
+        let other = match gone.ignores_every {
             0 if gone.bad => Occurrence::ArriveBad,
             0 => Occurrence::Arrive,
             // It comes back itself, or as another process of its host.
-            swallows => Occurrence::ArriveSilent(gone.process + self.draw(2) as u32, swallows),
+            ignores_every => {
+                Occurrence::ArriveSilent(gone.process + self.draw(2) as u32, ignores_every)
+            }
         };
         self.within(if gone.bad { 100 } else { 500 }, other);
     }
@@ -526,7 +530,7 @@ impl World {
             self.within(50, Occurrence::Break(worker));
             return;
         }
-        if self.swallows(worker, batch) {
+        if self.ignores(worker, batch) {
             return;
         }
         let right = self.answer(worker, batch, &work);

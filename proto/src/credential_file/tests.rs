@@ -127,7 +127,7 @@ fn what_comes_through_a_pipe_is_read_once() {
     assert_eq!(token(&path).unwrap().reveal(), secret);
     let again = token(&path).unwrap_err();
     assert!(matches!(again, CredentialError::EmptyPipe { .. }), "{again}");
-    assert!(again.to_string().contains("name a file"), "{again}");
+    assert!(again.to_string().contains("give a regular file"), "{again}");
 
     // Certificates, keys, and named pipes.
     let (certificate, key) = place.pair("good", 2000, 4000);

@@ -26,9 +26,9 @@ fn files_that_do_not_fit_the_address_are_refused_unread() {
     for (url, options, expected) in [
         ("https://a:1", "", "needs --tls-ca"),
         ("https://a:1", "cert key", "needs --tls-ca"),
-        ("http://127.0.0.1:1", "ca", "--tls-ca is for TLS"),
-        ("http://a:1", "cert", "--tls-cert is for TLS"),
-        ("unix:a", "key", "--tls-key is for TLS"),
+        ("http://127.0.0.1:1", "ca", "--tls-ca requires TLS"),
+        ("http://a:1", "cert", "--tls-cert requires TLS"),
+        ("unix:a", "key", "--tls-key requires TLS"),
         ("http://a:1", "token", "not sent to http://a:1 in the clear"),
         ("http://10.0.0.1:1", "token", "in the clear"),
         // These combinations are accepted, so the files are read.
@@ -54,7 +54,7 @@ fn without_files_nothing_is_shown() {
 #[test]
 fn a_token_is_shown_and_not_printed() {
     let token = Token::generate().unwrap();
-    let mut bearer = Bearer::new(Some(&token));
+    let mut bearer = TokenInterceptor::new(Some(&token));
     let request = bearer.call(Request::new(())).unwrap();
     let header = request.metadata().get("authorization").unwrap();
     assert_eq!(header.to_str().unwrap(), format!("Bearer {}", token.reveal()));

@@ -5,8 +5,8 @@ use proptest::prelude::*;
 
 use super::*;
 use osteon_common::inference::{
-    Direction, Inference, Known, NoiseErrors, Profile, Quantity, Sensitivity, Solution, Solutions,
-    Spread, Spreads,
+    DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity, Solution, Solutions,
+    Spread, Spreads, Uncertainty,
 };
 use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
@@ -85,8 +85,8 @@ prop_compose! {
     }
 }
 
-fn interval() -> impl Strategy<Value = Interval> {
-    (number(), number()).prop_map(|(low, high)| Interval { low, high })
+fn interval() -> impl Strategy<Value = ConfidenceInterval> {
+    (number(), number()).prop_map(|(low, high)| ConfidenceInterval { low, high })
 }
 
 prop_compose! {
@@ -106,11 +106,11 @@ prop_compose! {
     fn quantity()(
         value in number(),
         known in proptest::option::of((number(), number(), number(), number())),
-    ) -> Quantity {
+    ) -> DerivedQuantity {
         let known = known.map(|(standard_error, lower, upper, free_share)| {
-            Known { standard_error, interval: [lower, upper], free_share }
+            Uncertainty { standard_error, interval: [lower, upper], free_share }
         });
-        Quantity { value, known }
+        DerivedQuantity { value, known }
     }
 }
 
@@ -291,7 +291,7 @@ properties! {
         failures in failures(),
         estimated_error in estimated_error(),
     ) {
-        let role = Role { group, start, varied: varied.map(|k| Parameter::ALL[k]) };
+        let role = EvaluationRole { group, start, varied: varied.map(|k| Parameter::ALL[k]) };
         let evaluation =
             Evaluation { number, role, point, moments, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);
@@ -323,9 +323,9 @@ fn what_no_coordinator_writes_is_refused() {
 /// A result of an identification in which every field is set.
 fn complete() -> v1::JobResult {
     let spread = Spread { smallest: 1.0, largest: 3.0, mean: 2.0 };
-    let quantity = Quantity {
+    let quantity = DerivedQuantity {
         value: 1.0,
-        known: Some(Known { standard_error: 0.1, interval: [0.8, 1.2], free_share: 0.0 }),
+        known: Some(Uncertainty { standard_error: 0.1, interval: [0.8, 1.2], free_share: 0.0 }),
     };
     let free = vec![Parameter::Density];
     let moments = Moments { mean: 1.0, coefficient_of_variation: 0.1 };
@@ -377,7 +377,7 @@ fn complete() -> v1::JobResult {
         solver: SolverSettings::default(),
         nominal: None,
         picking: Picking::default(),
-        program: Program::this(None),
+        program: Program::current(None),
     })
 }
 

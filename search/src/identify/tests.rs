@@ -29,16 +29,16 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
 const MOMENTS: Data = Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 };
 
 /// Uses the speed of the bulk wave instead of the solver's velocity.
-fn speeds(realizations: &Realizations) -> Vec<Solved> {
+fn speeds(realizations: &Realizations) -> Vec<RealizationResult> {
     let speed = |index| {
         let bone = realizations.ensemble.bone(index).unwrap();
         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
     };
-    let solved = |index| Solved { outcome: Ok(speed(index)), estimated_error: 1e-5 };
+    let solved = |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 1e-5 };
     (0..realizations.count).map(solved).collect()
 }
 
-fn identified(specification: &JobSpecification) -> Identified {
+fn identified(specification: &JobSpecification) -> CompletedJob {
     identify(specification, |realizations| Ok::<_, Infallible>(speeds(realizations))).unwrap()
 }
 
@@ -61,7 +61,7 @@ fn the_result_is_that_of_the_search() {
             }
         };
         let found = identified(&specification);
-        assert_eq!(found.result, search.result(&ending, &Program::this(None)));
+        assert_eq!(found.result, search.result(&ending, &Program::current(None)));
         assert_eq!(found.history, search.history());
         assert_eq!(found.result.best.unwrap().estimated_error, errors);
     }
@@ -97,13 +97,13 @@ fn a_propagation_is_one_evaluation() {
         data: None,
         ..specification(MOMENTS, SearchMethod::Simplex)
     };
-    let Identified { result, history } = identified(&specification);
+    let CompletedJob { result, history } = identified(&specification);
     assert_eq!((result.status, history.len()), (Status::Converged, 1));
     assert_eq!(result.best.unwrap().point, specification.start());
 }
 
 /// Returns the error after `change` to the realizations of evaluation 2.
-fn refused(change: impl Fn(Vec<Solved>) -> Result<Vec<Solved>, &'static str>) -> String {
+fn refused(change: impl Fn(Vec<RealizationResult>) -> Result<Vec<RealizationResult>, &'static str>) -> String {
     let mut number = 0;
     let evaluate = |realizations: &Realizations| {
         number += 1;
@@ -117,16 +117,16 @@ fn what_no_worker_answers_is_refused() {
     let few = refused(|solved| Ok(solved[1..].to_vec()));
     assert_eq!(few, "evaluation 2 has 49 outcomes; it must have 50, one of each realization");
     for wrong in [
-        Solved { outcome: Ok(f64::NAN), estimated_error: 0.0 },
-        Solved { outcome: Ok(-1.0), estimated_error: 0.0 },
-        Solved { outcome: Ok(3900.0), estimated_error: -1e-5 },
-        Solved { outcome: Err(FailureKind::NoArrival), estimated_error: 1e-5 },
+        RealizationResult { outcome: Ok(f64::NAN), estimated_error: 0.0 },
+        RealizationResult { outcome: Ok(-1.0), estimated_error: 0.0 },
+        RealizationResult { outcome: Ok(3900.0), estimated_error: -1e-5 },
+        RealizationResult { outcome: Err(FailureKind::NoArrival), estimated_error: 1e-5 },
     ] {
         let text = refused(|mut solved| {
             solved[7] = wrong;
             Ok(solved)
         });
-        assert!(text.starts_with("realization 7 of evaluation 2 is Solved"), "{text}");
+        assert!(text.starts_with("realization 7 of evaluation 2 is RealizationResult"), "{text}");
     }
     let failed = refused(|_| Err("no machine is left"));
     assert!(failed.starts_with("the realizations of evaluation 2 at [1598.8, "), "{failed}");

@@ -97,7 +97,7 @@ impl Model {
     }
 
     /// Makes the model exact at `at`, where `found` was evaluated.
-    pub(super) fn settle_on(&mut self, at: &[f64], found: Logarithms) {
+    pub(super) fn make_exact_at(&mut self, at: &[f64], found: Logarithms) {
         let Some((closed, _)) = closed_form(&self.space, at) else { return };
         self.offset = difference(found, closed);
         self.at = at.to_vec();
@@ -105,14 +105,14 @@ impl Model {
 
     /// Broyden's update: the smallest change of the slopes with which the model is exact both at
     /// `at`, where `found` was evaluated, and at its present point.
-    pub(super) fn learn(&mut self, at: &[f64], found: Logarithms) {
+    pub(super) fn update_slopes(&mut self, at: &[f64], found: Logarithms) {
         let step = subtract(at, &self.at);
         let square = dot(&step, &step);
-        let Some((believed, _)) = self.believed(at) else { return };
+        let Some((predicted, _)) = self.predict(at) else { return };
         if square < TELLING_MOVE_MIN * TELLING_MOVE_MIN {
             return;
         }
-        let error = difference(found, believed);
+        let error = difference(found, predicted);
         for (slopes, error) in self.slopes.iter_mut().zip(error) {
             for (slope, step) in slopes.iter_mut().zip(&step) {
                 *slope += error * step / square;
@@ -122,10 +122,10 @@ impl Model {
 
     /// Corrects the slopes along one axis, from `found` at a point that differs from the model's
     /// own in that coordinate only.
-    pub(super) fn learn_along(&mut self, axis: usize, at: &[f64], found: Logarithms) {
+    pub(super) fn correct_slope(&mut self, axis: usize, at: &[f64], found: Logarithms) {
         let step = at[axis] - self.at[axis];
-        let Some((believed, _)) = self.believed(at) else { return };
-        for (slopes, error) in self.slopes.iter_mut().zip(difference(found, believed)) {
+        let Some((predicted, _)) = self.predict(at) else { return };
+        for (slopes, error) in self.slopes.iter_mut().zip(difference(found, predicted)) {
             slopes[axis] += error / step;
         }
     }
@@ -199,7 +199,7 @@ impl Model {
 
     /// Returns whether this point solves the model for `target`.
     fn solves(&self, at: &[f64], target: Logarithms) -> bool {
-        let missed = self.believed(at).map(|(believed, _)| difference(believed, target));
+        let missed = self.predict(at).map(|(predicted, _)| difference(predicted, target));
         missed.is_some_and(|missed| missed.iter().all(|d| d.abs() < SOLVED))
     }
 
@@ -228,8 +228,8 @@ impl Model {
 
     /// Returns two equations, linear in the coordinates, that express that `goal` is reached.
     fn linear(&self, goal: Goal, at: &[f64], target: Logarithms) -> Option<(Rows, [f64; 2])> {
-        let (believed, mut rows) = self.believed(at)?;
-        let mut residual = difference(believed, target);
+        let (predicted, mut rows) = self.predict(at)?;
+        let mut residual = difference(predicted, target);
         if goal == Goal::Cost {
             for (row, residual) in rows.iter_mut().zip(&mut residual) {
                 let ratio = libm::exp(*residual);
@@ -256,7 +256,7 @@ impl Model {
 
     /// Returns the model's value and Jacobian at a point; `None` where the closed form is
     /// undefined.
-    pub(super) fn believed(&self, at: &[f64]) -> Option<(Logarithms, Rows)> {
+    pub(super) fn predict(&self, at: &[f64]) -> Option<(Logarithms, Rows)> {
         let (closed, mut rows) = closed_form(&self.space, at)?;
         let step = subtract(at, &self.at);
         for (row, slopes) in rows.iter_mut().zip(&self.slopes) {

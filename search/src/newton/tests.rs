@@ -81,7 +81,7 @@ fn rule(point: &Point) -> Moments {
 /// Result of a finished search.
 #[derive(Debug, PartialEq)]
 struct Found {
-    stop: Stop,
+    stop: StopReason,
     evaluations: u64,
     cost: f64,
     at: Vec<f64>,
@@ -98,8 +98,8 @@ fn search(
     let (mut cost, mut at) = (f64::INFINITY, Vec::new());
     loop {
         let pending = match newton.ask() {
-            Ask::At(pending) => pending.to_vec(),
-            Ask::Stopped(stop) => {
+            Proposal::Evaluate(pending) => pending.to_vec(),
+            Proposal::Stopped(stop) => {
                 return Found { stop, evaluations: newton.evaluations(), cost, at };
             }
         };
@@ -162,7 +162,7 @@ fn a_bone_is_found_in_a_few_evaluations() {
             continue;
         }
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
-        assert_eq!(found.stop, Stop::CostReached, "{start:?}: {found:?}");
+        assert_eq!(found.stop, StopReason::CostReached, "{start:?}: {found:?}");
         evaluations.push(found.evaluations);
     }
     evaluations.sort_unstable();
@@ -190,7 +190,7 @@ properties! {
         let space = all_free(&start);
         prop_assume!(admissible(&space.point(&space.start())));
         let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
-        prop_assert_eq!(found.stop, Stop::CostReached);
+        prop_assert_eq!(found.stop, StopReason::CostReached);
         let (off, _) = off_nearest(space, &found.at, &rule);
         prop_assert!(off <= 1e-5, "off by {off}: {found:?}");
     }
@@ -210,7 +210,7 @@ properties! {
         let settings = Settings { max_evaluations: 3000, cost_tolerance: 0.0, size_tolerance };
         let mut newton = Newton::new(space, bone(&OPTIMUM), settings);
         let mut turns = 0;
-        while let Ask::At(at) = newton.ask() {
+        while let Proposal::Evaluate(at) = newton.ask() {
             prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)));
             turns += 1;
             prop_assert!(turns < 10_000);
@@ -233,7 +233,7 @@ properties! {
 #[test]
 fn a_start_that_matches_is_the_answer() {
     let found = search(all_free(&in_box(&OPTIMUM)), bone(&OPTIMUM), SETTINGS, |p| Some(bone(p)));
-    assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::CostReached, 1));
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn what_the_data_leave_free_and_do_not_feel_does_not_move() {
     // By the closed form alone, g_L has no influence.
     let start = [0.3; 7];
     let found = search(all_free(&start), rule(&OPTIMUM), SETTINGS, |p| Some(rule(p)));
-    assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 2));
+    assert_eq!((found.stop, found.evaluations), (StopReason::CostReached, 2));
     assert_eq!(found.at[3], all_free(&start).start()[3]);
 }
 
@@ -250,7 +250,7 @@ fn one_elastic_parameter_and_the_dispersion_are_found_again() {
     for axis in [0, 1, 2, 4, 5] {
         let space = some_free(&[axis, 6]);
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
-        assert_eq!(found.stop, Stop::CostReached, "{axis}: {found:?}");
+        assert_eq!(found.stop, StopReason::CostReached, "{axis}: {found:?}");
         assert!(found.evaluations <= 9, "{axis}: {found:?}");
         let point = space.point(&found.at);
         assert!((point.0[axis] / OPTIMUM.0[axis] - 1.0).abs() < 1e-4, "{axis}: {found:?}");
@@ -261,7 +261,7 @@ fn one_elastic_parameter_and_the_dispersion_are_found_again() {
 #[test]
 fn the_dispersion_alone_can_match_data_made_with_the_other_values() {
     let found = search(some_free(&[6]), bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
-    assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+    assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
 }
 
 /// Returns the lowest cost of one free coordinate, by an exhaustive search.
@@ -277,7 +277,7 @@ fn data_that_one_parameter_cannot_match_end_at_the_least_cost() {
     for axis in 0..7 {
         let space = some_free(&[axis]);
         let found = search(space, data, SETTINGS, |point| Some(bone(point)));
-        assert_eq!(found.stop, Stop::Settled, "{axis}: {found:?}");
+        assert_eq!(found.stop, StopReason::Converged, "{axis}: {found:?}");
         let least = least_of_one(space, data);
         assert!(found.cost <= least * (1.0 + 1e-6) + 1e-12, "{axis}: {found:?}, {least}");
         assert!(found.evaluations < 25, "{axis}: {found:?}");
@@ -289,7 +289,7 @@ fn data_outside_the_bounds_end_on_them() {
     let slow = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
     for start in [0.2, 0.5, 0.6] {
         let found = search(all_free(&[start; 7]), slow, SETTINGS, |point| Some(bone(point)));
-        assert_eq!(found.stop, Stop::Settled, "{found:?}");
+        assert_eq!(found.stop, StopReason::Converged, "{found:?}");
         assert_eq!((found.at[0], found.at[1], found.at[6]), (1.0, 0.0, 1.0), "{found:?}");
         assert!(found.evaluations < 25, "{found:?}");
     }
@@ -305,11 +305,11 @@ fn an_infeasible_part_of_the_box_halves_the_step() {
         (!(1e-3..=0.05).contains(&cost)).then(|| bone(point))
     };
     let found = search(all_free(&start), target, SETTINGS, wall);
-    assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+    assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
     // A half space that contains the solution, but not the first step.
     let wall = |point: &Point| (point.0[6] > 0.09).then(|| bone(point));
     let found = search(all_free(&start), target, SETTINGS, wall);
-    assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+    assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
 }
 
 #[test]
@@ -317,18 +317,18 @@ fn an_infeasible_start_is_left() {
     let start = [0.5, 0.2, 0.3, 0.1, 0.5, 0.3, 0.9];
     let wall = |point: &Point| (point.0[6] < 0.2).then(|| bone(point));
     let found = search(all_free(&start), bone(&OPTIMUM), SETTINGS, wall);
-    assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+    assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
     assert!(found.evaluations <= 8, "{found:?}");
 }
 
 #[test]
 fn nothing_feasible_ends_soon() {
     let found = search(all_free(&[0.3; 7]), bone(&OPTIMUM), SETTINGS, |_| None);
-    assert_eq!(found.stop, Stop::Infeasible);
+    assert_eq!(found.stop, StopReason::Infeasible);
     assert!((3..10).contains(&found.evaluations), "{found:?}");
     let same = Moments { mean: 4000.0, coefficient_of_variation: 0.0 };
     let found = search(all_free(&[0.3; 7]), bone(&OPTIMUM), SETTINGS, |_| Some(same));
-    assert_eq!(found.stop, Stop::Infeasible);
+    assert_eq!(found.stop, StopReason::Infeasible);
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn a_rule_that_does_not_hold_is_unlearnt() {
     for start in [0.1, 0.3, 0.5, 0.6] {
         let data = strange(&OPTIMUM);
         let found = search(all_free(&[start; 7]), data, SETTINGS, |p| Some(strange(p)));
-        assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+        assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
         assert!(found.evaluations < 40, "{found:?}");
     }
 }
@@ -355,7 +355,10 @@ fn evaluations_are_bounded() {
     for max_evaluations in 1..4 {
         let settings = Settings { max_evaluations, cost_tolerance: 0.0, ..SETTINGS };
         let found = search(all_free(&[0.2; 7]), bone(&OPTIMUM), settings, |p| Some(bone(p)));
-        assert_eq!((found.stop, found.evaluations), (Stop::EvaluationsUsedUp, max_evaluations));
+        assert_eq!(
+            (found.stop, found.evaluations),
+            (StopReason::EvaluationsUsedUp, max_evaluations)
+        );
     }
 }
 
@@ -364,9 +367,9 @@ fn without_a_free_parameter_there_is_one_evaluation() {
     let space = some_free(&[]);
     let far = Moments { mean: 3000.0, coefficient_of_variation: 0.1 };
     let found = search(space, far, SETTINGS, |point| Some(bone(point)));
-    assert_eq!((found.stop, found.evaluations), (Stop::Settled, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::Converged, 1));
     let found = search(space, far, SETTINGS, |_| None);
-    assert_eq!((found.stop, found.evaluations), (Stop::Infeasible, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::Infeasible, 1));
 }
 
 #[test]
@@ -376,7 +379,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
     let data = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
     let mut newton = Newton::new(space, data, SETTINGS);
     let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
-    while let Ask::At(pending) = newton.ask() {
+    while let Proposal::Evaluate(pending) = newton.ask() {
         let pending = pending.to_vec();
         if !admissible(&space.point(&pending)) {
             newton.refuse();
@@ -388,9 +391,9 @@ fn the_points_that_measure_slopes_are_foreseen() {
             asked += 1;
         }
         let before = newton.clone();
-        foreseen = newton.likely(8);
-        assert_eq!(newton, before, "what is likely is a question");
-        assert!(newton.likely(2).len() <= 2);
+        foreseen = newton.candidates(8);
+        assert_eq!(newton, before, "finding candidates changes nothing");
+        assert!(newton.candidates(2).len() <= 2);
         let moments = bone(&space.point(&pending));
         newton.tell(statistics::cost(data, moments), Some(moments));
     }

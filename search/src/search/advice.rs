@@ -21,15 +21,15 @@ pub(super) fn after_failures(row: &Evaluation, specification: &JobSpecification)
                 [monte_carlo] max_failed_fraction"
             .to_owned();
     };
-    let likely = likely(kind, specification.setup.solver.method);
+    let cause = likely_cause(kind, specification.setup.solver.method);
     let warnings = warnings::job_warnings(specification);
     let unusual: Vec<String> =
         warnings.iter().take(UNUSUAL_MAX).map(|warning| format!("; {warning}")).collect();
-    format!("{likely}{}", unusual.concat())
+    format!("{cause}{}", unusual.concat())
 }
 
 /// Returns the probable cause if nearly all realizations fail in this way.
-fn likely(kind: FailureKind, method: Method) -> &'static str {
+fn likely_cause(kind: FailureKind, method: Method) -> &'static str {
     match (kind, method) {
         (FailureKind::DirectWaveFirst, _) => {
             "such a bone is too slow for this probe: the wave through the coupling arrives first. Check \

@@ -7,12 +7,12 @@ use osteon_common::ensemble::Germs;
 use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{Evaluation, GroupEnding, Moments, Role, Status};
-use osteon_common::statistics::{Verdict, likelihood_cost};
+use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
+use osteon_common::statistics::{PointStatistics, likelihood_cost};
 
-use super::method::Method;
+use super::method::MethodState;
 use super::reasons;
-use crate::ask::{Ask, Stop};
+use crate::proposal::{Proposal, StopReason};
 use crate::search_box::{SearchBox, admissible};
 
 /// Step of the finite differences that measure derivatives, in edges of the box.
@@ -29,14 +29,14 @@ pub(super) struct DatasetSearch {
     /// Number of the current start.
     start: u32,
     space: SearchBox,
-    method: Method,
+    method: MethodState,
     /// Number of points evaluated for this set, and the first of them.
     evaluations: u64,
     first: Option<Evaluation>,
     best: Option<Best>,
     /// Why the search from the start of the best point stopped, or, while there is none, the latest
     /// search.
-    stop: Option<Stop>,
+    stop: Option<StopReason>,
     /// Points that measure derivatives, in reverse order.
     differences: Vec<(Parameter, Point)>,
     ending: Option<GroupEnding>,
@@ -61,7 +61,7 @@ impl DatasetSearch {
             data,
             start: 0,
             space,
-            method: Method::new(specification, data, measured(specification, set), space),
+            method: MethodState::new(specification, data, measured(specification, set), space),
             evaluations: 0,
             first: None,
             best: None,
@@ -83,17 +83,17 @@ impl DatasetSearch {
         }
         match (self.differences.last(), self.method.ask()) {
             (Some((_, point)), _) => Some(*point),
-            (None, Ask::At(at)) => Some(self.space.point(at)),
-            (None, Ask::Stopped(_)) => None,
+            (None, Proposal::Evaluate(at)) => Some(self.space.point(at)),
+            (None, Proposal::Stopped(_)) => None,
         }
     }
 
     /// Returns at most `most` points that the search may ask for after the pending one, the most
     /// probable first.
-    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
+    pub(super) fn candidates(&self, most: usize) -> Vec<Point> {
         if self.differences.is_empty() {
-            let likely = self.method.likely(most);
-            return likely.iter().map(|at| self.space.point(at)).filter(admissible).collect();
+            let candidates = self.method.candidates(most);
+            return candidates.iter().map(|at| self.space.point(at)).filter(admissible).collect();
         }
         self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
     }
@@ -102,16 +102,16 @@ impl DatasetSearch {
     pub(super) fn cost(
         &self,
         specification: &JobSpecification,
-        verdict: &Verdict,
+        statistics: &PointStatistics,
         point: &Point,
         outcomes: &[Outcome],
     ) -> f64 {
         let measured = measured(specification, self.set as usize);
         let cost = match (specification.objective, measured) {
             (Objective::Likelihood, Some(measured)) => {
-                likelihood_cost(verdict, &specification.monte_carlo, point, outcomes, measured)
+                likelihood_cost(statistics, &specification.monte_carlo, point, outcomes, measured)
             }
-            _ => verdict.cost(self.data),
+            _ => statistics.cost(self.data),
         };
         cost + specification.penalty(point)
     }
@@ -122,16 +122,16 @@ impl DatasetSearch {
         &mut self,
         specification: &JobSpecification,
         mut row: Evaluation,
-        verdict: Verdict,
+        statistics: PointStatistics,
         outcomes: Arc<[Outcome]>,
     ) -> Evaluation {
-        row.role = Role { group: self.set, start: self.start, varied: None };
+        row.role = EvaluationRole { group: self.set, start: self.start, varied: None };
         if let Some((varied, _)) = self.differences.pop() {
             let start = self.best().map_or(0, |best| best.role.start);
-            row.role = Role { start, varied: Some(varied), ..row.role };
-            row.moments = verdict.moments.filter(|_| self.fails_alike(&outcomes));
+            row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
+            row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
         } else {
-            self.method.tell(row.cost.unwrap_or(f64::INFINITY), verdict.moments);
+            self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.moments);
             self.evaluations += 1;
             self.first.get_or_insert(row);
             self.keep_if_better(specification, row, outcomes);
@@ -185,15 +185,15 @@ impl DatasetSearch {
     fn settle(&mut self, specification: &JobSpecification) {
         while self.ending.is_none() && self.differences.is_empty() {
             match self.method.ask() {
-                Ask::At(at) if admissible(&self.space.point(at)) => return,
-                Ask::At(_) => self.method.refuse(),
-                Ask::Stopped(stop) => self.stopped(specification, stop),
+                Proposal::Evaluate(at) if admissible(&self.space.point(at)) => return,
+                Proposal::Evaluate(_) => self.method.refuse(),
+                Proposal::Stopped(stop) => self.stopped(specification, stop),
             }
         }
     }
 
     /// Starts the search from the next start; after the last start, the derivatives or the end.
-    fn stopped(&mut self, specification: &JobSpecification, stop: Stop) {
+    fn stopped(&mut self, specification: &JobSpecification, stop: StopReason) {
         if u64::from(self.start) == specification.search.starts {
             return self.end(specification);
         }
@@ -204,7 +204,7 @@ impl DatasetSearch {
         if u64::from(self.start) < specification.search.starts {
             self.space = space_of_start(specification, self.start);
             let measured = measured(specification, self.set as usize);
-            self.method = Method::new(specification, self.data, measured, self.space);
+            self.method = MethodState::new(specification, self.data, measured, self.space);
             return;
         }
         if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {
@@ -222,7 +222,7 @@ impl DatasetSearch {
             evaluations: self.evaluations,
         };
         // Always set before the end.
-        let stop = self.stop.unwrap_or(Stop::Settled);
+        let stop = self.stop.unwrap_or(StopReason::Converged);
         let super::Ending { status, reason, .. } = reasons::ending(stop, &evidence, specification);
         let best = self.best().map(|row| row.number);
         self.ending = Some(GroupEnding { status, reason, best });

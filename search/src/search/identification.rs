@@ -6,21 +6,21 @@ use osteon_common::job::{Data, Group, JobSpecification};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 use osteon_common::results::{Evaluation, GroupEnding, Status};
-use osteon_common::statistics::Verdict;
+use osteon_common::statistics::PointStatistics;
 
 use super::Ending;
 use super::dataset_search::DatasetSearch;
 
 /// State of an identification.
 #[derive(Debug, Clone)]
-pub(super) struct Identification {
+pub(super) struct IdentificationSearch {
     /// Endings of the searches for the earlier sets.
     ended: Vec<GroupEnding>,
     /// The search for the current set; the last one when all have ended.
     present: DatasetSearch,
 }
 
-impl Identification {
+impl IdentificationSearch {
     /// Creates the identification of a specification that has data.
     pub(super) fn new(specification: &JobSpecification) -> Self {
         let present = DatasetSearch::new(specification, 0);
@@ -36,19 +36,19 @@ impl Identification {
 
     /// Returns at most `most` points of the current set that the search may ask for after the
     /// pending one, the most probable first.
-    pub(super) fn likely(&self, most: usize) -> Vec<Point> {
-        self.present.likely(most)
+    pub(super) fn candidates(&self, most: usize) -> Vec<Point> {
+        self.present.candidates(most)
     }
 
     /// Returns the cost of the pending point, given its moments.
     pub(super) fn cost(
         &self,
         specification: &JobSpecification,
-        verdict: &Verdict,
+        statistics: &PointStatistics,
         point: &Point,
         outcomes: &[Outcome],
     ) -> f64 {
-        self.present.cost(specification, verdict, point, outcomes)
+        self.present.cost(specification, statistics, point, outcomes)
     }
 
     /// Takes the moments and the outcomes of the pending point, with its cost in the row. Returns
@@ -57,10 +57,10 @@ impl Identification {
         &mut self,
         specification: &JobSpecification,
         row: Evaluation,
-        verdict: Verdict,
+        statistics: PointStatistics,
         outcomes: Arc<[Outcome]>,
     ) -> Evaluation {
-        let row = self.present.tell(specification, row, verdict, outcomes);
+        let row = self.present.tell(specification, row, statistics, outcomes);
         self.begin_next(specification);
         row
     }
@@ -99,11 +99,13 @@ impl Identification {
                     .iter()
                     .zip(endings)
                     .partition(|(group, _)| group.no_variation().is_some());
-                together(&searched, &unsearched)
+                combined_ending(&searched, &unsearched)
             }
-            (_, [GroupEnding { status, reason, .. }]) => Ending::of_search(*status, reason.clone()),
+            (_, [GroupEnding { status, reason, .. }]) => {
+                Ending::from_search(*status, reason.clone())
+            }
             // Not reached: called only once all searches have ended.
-            _ => Ending::of_search(Status::Cancelled, None),
+            _ => Ending::from_search(Status::Cancelled, None),
         }
     }
 
@@ -123,7 +125,10 @@ impl Identification {
 
 /// Combines the endings of the groups' searches. Groups that could not be searched are mentioned,
 /// but do not influence the status.
-fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEnding)]) -> Ending {
+fn combined_ending(
+    groups: &[(&Group, &GroupEnding)],
+    unsearched: &[(&Group, &GroupEnding)],
+) -> Ending {
     for (status, what) in [(Status::Failed, "failed"), (Status::MaxEvaluations, "did not converge")]
     {
         let of_status: Vec<_> =
@@ -137,7 +142,7 @@ fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEndi
             let reason = format!(
                 "the searches for {count} of {all} groups {what}; the first is {name:?}{why}"
             );
-            return Ending::of_search(status, Some(reason));
+            return Ending::from_search(status, Some(reason));
         }
     }
     let reason = unsearched.first().map(|(Group { name, .. }, first)| {
@@ -145,5 +150,5 @@ fn together(groups: &[(&Group, &GroupEnding)], unsearched: &[(&Group, &GroupEndi
         let why = first.reason.as_deref().unwrap_or_default();
         format!("no search was made for {count} of {all} groups; the first is {name:?}: {why}")
     });
-    Ending::of_search(Status::Converged, reason)
+    Ending::from_search(Status::Converged, reason)
 }

@@ -3,8 +3,8 @@
 use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
 
-use crate::ask::Ask;
 use crate::newton::{self, Newton};
+use crate::proposal::Proposal;
 use crate::search_box::SearchBox;
 use crate::simplex::{self, Costs, Simplex};
 
@@ -14,12 +14,12 @@ const EQUAL_LIKELIHOODS: f64 = 5e-4;
 
 /// State of a search method.
 #[derive(Debug, Clone)]
-pub(super) enum Method {
+pub(super) enum MethodState {
     Simplex(Simplex),
     Newton(Box<Newton>),
 }
 
-impl Method {
+impl MethodState {
     /// Creates the method that the specification names, starting at the start of the box, for a set
     /// of data with these moments and, where they are known, these velocities.
     pub(super) fn new(
@@ -48,7 +48,7 @@ impl Method {
     }
 
     /// Returns the next point, or the reason why there is none.
-    pub(super) fn ask(&self) -> Ask<'_> {
+    pub(super) fn ask(&self) -> Proposal<'_> {
         match self {
             Self::Simplex(simplex) => simplex.ask(),
             Self::Newton(newton) => newton.ask(),
@@ -65,10 +65,10 @@ impl Method {
 
     /// Returns at most `most` points that the method may ask for after the pending one, the most
     /// probable first.
-    pub(super) fn likely(&self, most: usize) -> Vec<Vec<f64>> {
+    pub(super) fn candidates(&self, most: usize) -> Vec<Vec<f64>> {
         match self {
-            Self::Simplex(simplex) => simplex.likely(most),
-            Self::Newton(newton) => newton.likely(most),
+            Self::Simplex(simplex) => simplex.candidates(most),
+            Self::Newton(newton) => newton.candidates(most),
         }
     }
 

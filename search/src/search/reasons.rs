@@ -4,7 +4,7 @@ use osteon_common::job::{JobSpecification, Objective, SearchMethod};
 use osteon_common::results::{Evaluation, Status};
 
 use super::{Ending, advice};
-use crate::ask::Stop;
+use crate::proposal::StopReason;
 use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
 
@@ -20,27 +20,29 @@ pub(super) struct Evidence<'a> {
 
 /// Returns status and explanation of a search that stopped for this reason.
 pub(super) fn ending(
-    stop: Stop,
+    stop: StopReason,
     evidence: &Evidence<'_>,
     specification: &JobSpecification,
 ) -> Ending {
     let (status, reason) = match stop {
-        Stop::CostReached => (Status::Converged, None),
-        Stop::Settled => (Status::Converged, out_of_reach(evidence.best, specification)),
-        Stop::EvaluationsUsedUp if evidence.best.is_none() => {
+        StopReason::CostReached => (Status::Converged, None),
+        StopReason::Converged => (Status::Converged, out_of_reach(evidence.best, specification)),
+        StopReason::EvaluationsUsedUp if evidence.best.is_none() => {
             (Status::Failed, Some(no_feasible_point(evidence, specification)))
         }
-        Stop::EvaluationsUsedUp => (Status::MaxEvaluations, None),
-        Stop::RestartsUsedUp => {
+        StopReason::EvaluationsUsedUp => (Status::MaxEvaluations, None),
+        StopReason::RestartsUsedUp => {
             let reason = format!(
                 "the simplex collapsed, was restarted {RESTARTS_MAX} times and was still \
-                 finding better points; run on from the best point"
+                 finding better points; start another search from the best point"
             );
             (Status::MaxEvaluations, Some(reason))
         }
-        Stop::Infeasible => (Status::Failed, Some(no_feasible_point(evidence, specification))),
+        StopReason::Infeasible => {
+            (Status::Failed, Some(no_feasible_point(evidence, specification)))
+        }
     };
-    Ending::of_search(status, reason)
+    Ending::from_search(status, reason)
 }
 
 /// Describes the failed realizations of an evaluation.
@@ -56,7 +58,7 @@ pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> Stri
     )
 }
 
-/// Explains why a search that settled has no lower cost, if its method can tell.
+/// Explains why a search that converged has no lower cost, if its method can tell.
 fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> Option<String> {
     let best = best.filter(|_| specification.search.method == SearchMethod::Newton)?;
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
@@ -73,7 +75,7 @@ fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> 
         (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
     };
     Some(format!(
-        "settled at a cost of {:.3e}, above cost_tolerance {:?}: no nearby point fits better{}; \
+        "converged at a cost of {:.3e}, above cost_tolerance {:?}: no nearby point fits better{}; \
          {}",
         best.cost.unwrap_or(f64::NAN),
         specification.search.cost_tolerance,
@@ -84,16 +86,16 @@ fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> 
 
 fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) -> String {
     if evidence.best.is_some() {
-        return "every velocity of the points evaluated is the same: their coefficient of \
-                variation has no logarithm; raise [monte_carlo] realizations"
+        return "all velocities at the evaluated points are equal: their coefficient of variation is \
+                0 and has no logarithm; raise [monte_carlo] realizations"
             .to_owned();
     }
     // If all velocities are equal, a point has no likelihood even if no realization failed.
     if specification.objective == Objective::Likelihood
         && evidence.first.is_some_and(|row| row.failures.total() == 0)
     {
-        return "every velocity of the first point is the same: they have no law; raise \
-                [monte_carlo] realizations"
+        return "all velocities at the first point are equal: they have no probability density; \
+                raise [monte_carlo] realizations"
             .to_owned();
     }
     match evidence.first {

@@ -65,8 +65,8 @@ fn ending(search: &Search) -> Ending {
 fn an_identification_finds_what_made_the_data() {
     let (search, _) = run(&specification(400));
     let ending = ending(&search);
-    assert_eq!(ending, Ending::of_search(Status::Converged, None));
-    let result = search.result(&ending, &Program::this(None));
+    assert_eq!(ending, Ending::from_search(Status::Converged, None));
+    let result = search.result(&ending, &Program::current(None));
     let best = result.best.unwrap();
     assert!(best.cost.unwrap() <= 1e-10);
     assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-4, "{best:?}");
@@ -86,7 +86,7 @@ fn by_newton(max_evaluations: u64) -> JobSpecification {
 fn newton_finds_what_made_the_data() {
     let (search, _) = run(&by_newton(400));
     let ending = ending(&search);
-    assert_eq!(ending, Ending::of_search(Status::Converged, None));
+    assert_eq!(ending, Ending::from_search(Status::Converged, None));
     let best = search.best().unwrap();
     assert!(best.cost.unwrap() <= 1e-12);
     assert!((best.point.0[1] / 17.7e9 - 1.0).abs() < 1e-5, "{best:?}");
@@ -102,7 +102,7 @@ fn newton_says_why_it_settled_above_its_tolerance() {
     let Ending { status, reason, .. } = ending(&search);
     let reason = reason.unwrap();
     assert_eq!(status, Status::Converged);
-    assert!(reason.contains("settled at a cost of 1.037e-1"), "{reason}");
+    assert!(reason.contains("converged at a cost of 1.037e-1"), "{reason}");
     assert!(reason.contains("(longitudinal_young_modulus on its lower bound)"), "{reason}");
     assert!(reason.contains("widen the bounds"), "{reason}");
     // The simplex gives no such explanation, since it may have collapsed anywhere.
@@ -142,7 +142,7 @@ fn the_best_evaluated_point_is_returned_and_not_the_last() {
         let costs: Vec<f64> = searched.map(|row| row.cost.unwrap()).collect();
         let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
         let first = costs.iter().position(|cost| *cost == lowest).unwrap();
-        let best = search.result(&ending(&search), &Program::this(None)).best.unwrap();
+        let best = search.result(&ending(&search), &Program::current(None)).best.unwrap();
         assert_eq!((best.point, best.cost), (told[first].0, Some(lowest)));
         assert_eq!(search.best().unwrap().number, first as u64);
     }
@@ -177,7 +177,7 @@ fn replay_of_any_part(specification: &JobSpecification) {
         }
         assert_eq!(search.ask(), full.ask());
         assert_eq!(search.history(), full.history());
-        let (ending, program) = (ending(&full), Program::this(None));
+        let (ending, program) = (ending(&full), Program::current(None));
         assert_eq!(search.result(&ending, &program), full.result(&ending, &program));
     }
 }
@@ -203,7 +203,7 @@ fn the_digest_follows_the_order_of_the_path() {
             digest.add_evaluation(point, outcomes);
         }
     }
-    assert_eq!(search.result(&ending(&search), &Program::this(None)).digest, digest.finish());
+    assert_eq!(search.result(&ending(&search), &Program::current(None)).digest, digest.finish());
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
     // A search whose points all failed has no best point, and the data determine nothing.
     assert_eq!(search.best(), None);
-    assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
+    assert_eq!(search.result(&ending(&search), &Program::current(None)).best, None);
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn a_propagation_is_one_evaluation_at_the_start() {
     let (search, told) = run(&propagation);
     assert_eq!(told.len(), 1);
     assert_eq!(told[0].0, propagation.start());
-    let result = search.result(&ending(&search), &Program::this(None));
+    let result = search.result(&ending(&search), &Program::current(None));
     assert_eq!((result.status, result.data), (Status::Converged, None));
     let best = result.best.unwrap();
     assert_eq!((best.cost, best.estimated_error), (None, ERRORS));
@@ -291,7 +291,7 @@ fn without_an_admissible_point_the_job_fails_without_an_evaluation() {
     let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
     assert!(reason.unwrap().contains("inadmissible"));
-    assert!(search.result(&ending(&search), &Program::this(None)).best.is_none());
+    assert!(search.result(&ending(&search), &Program::current(None)).best.is_none());
 }
 
 /// If the control variate explains the velocities completely, their moments are those of the
@@ -329,9 +329,9 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
         search.tell(explained(&asked, &point), ERRORS);
         again.replay(point, explained(&asked, &point), ERRORS).unwrap();
     }
-    let result = search.result(&ending(&search), &Program::this(None));
+    let result = search.result(&ending(&search), &Program::current(None));
     assert_eq!(result.status, Status::Converged);
-    assert_eq!(result, again.result(&ending(&again), &Program::this(None)));
+    assert_eq!(result, again.result(&ending(&again), &Program::current(None)));
     assert_eq!((result.sampling, result.scrambles), (Sampling::Sobol, 2));
     let best = result.best.unwrap();
     assert!(best.velocity.unwrap().controlled);
@@ -359,23 +359,23 @@ fn where_a_search_goes_is_known_before_it_is_told() {
         let mut search = Search::new(Arc::new(specification));
         let mut foreseen = 0;
         while let Step::Evaluate(point) = search.ask() {
-            let likely = search.likely(8);
+            let candidates = search.candidates(8);
             let outcomes = outcomes(&point);
             let after = search.candidates_after(&outcomes, 8);
-            assert!(likely.len() <= 8 && after.len() <= 8);
-            assert!(likely.iter().all(|at| !same_point(at, &point)), "{point:?} is asked for");
+            assert!(candidates.len() <= 8 && after.len() <= 8);
+            assert!(candidates.iter().all(|at| !same_point(at, &point)), "{point:?} is asked for");
             assert_eq!(search.ask(), Step::Evaluate(point), "a question changes nothing");
             search.tell(outcomes, ERRORS);
             match search.ask() {
                 Step::Evaluate(next) => {
                     assert!(same_point(&after[0], &next), "{after:?} and not {next:?}");
-                    foreseen += u32::from(likely.iter().any(|at| same_point(at, &next)));
+                    foreseen += u32::from(candidates.iter().any(|at| same_point(at, &next)));
                 }
                 Step::Done(_) => assert_eq!(after, []),
             }
         }
         let by_simplex = search.specification.search.method == SearchMethod::Simplex;
         assert!(foreseen > 20 || !by_simplex, "{foreseen} points were foreseen");
-        assert_eq!(search.likely(8), []);
+        assert_eq!(search.candidates(8), []);
     }
 }

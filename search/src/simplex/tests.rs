@@ -15,7 +15,7 @@ const SETTINGS: Settings = Settings {
 /// Result of a finished search.
 #[derive(Debug, PartialEq)]
 struct Found {
-    stop: Stop,
+    stop: StopReason,
     evaluations: u64,
     restarts: u32,
     best: f64,
@@ -28,8 +28,8 @@ fn minimise(start: &[f64], settings: Settings, cost: impl Fn(&[f64]) -> f64) -> 
     let (mut best, mut at, mut told) = (f64::INFINITY, start.to_vec(), Vec::new());
     loop {
         let point = match simplex.ask() {
-            Ask::At(point) => point.to_vec(),
-            Ask::Stopped(stop) => {
+            Proposal::Evaluate(point) => point.to_vec(),
+            Proposal::Stopped(stop) => {
                 let (evaluations, restarts) = (simplex.evaluations(), simplex.restarts());
                 assert_eq!(evaluations, told.len() as u64);
                 return Found { stop, evaluations, restarts, best, at, told };
@@ -80,7 +80,7 @@ fn flat_valley(at: &[f64]) -> f64 {
 fn the_sphere_is_found_with_a_pinned_number_of_evaluations() {
     for (dimension, evaluations) in [(1, 32), (2, 74), (3, 129), (5, 266), (7, 473)] {
         let found = minimise(&vec![0.8; dimension], SETTINGS, sphere);
-        assert_eq!(found.stop, Stop::CostReached);
+        assert_eq!(found.stop, StopReason::CostReached);
         assert!(found.best <= 1e-10);
         assert_eq!(found.evaluations, evaluations, "{dimension} dimensions");
     }
@@ -89,7 +89,7 @@ fn the_sphere_is_found_with_a_pinned_number_of_evaluations() {
 #[test]
 fn rosenbrocks_valley_is_followed_to_its_end() {
     let found = minimise(&[0.2, 0.75], SETTINGS, rosenbrock);
-    assert_eq!((found.stop, found.restarts), (Stop::CostReached, 0));
+    assert_eq!((found.stop, found.restarts), (StopReason::CostReached, 0));
     assert!(found.at.iter().all(|u| (u - 0.75).abs() < 1e-5), "{found:?}");
 }
 
@@ -97,7 +97,7 @@ fn rosenbrocks_valley_is_followed_to_its_end() {
 fn the_flat_valley_of_an_identification_is_found() {
     for start in [0.3, 0.5, 0.6] {
         let found = minimise(&[start; 7], SETTINGS, flat_valley);
-        assert_eq!(found.stop, Stop::CostReached, "{found:?}");
+        assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
         assert!((30..400).contains(&found.evaluations), "{}", found.evaluations);
     }
 }
@@ -107,7 +107,7 @@ fn infinite_regions_are_walls() {
     // Only a band is feasible, the minimum lies on its edge.
     let band = |at: &[f64]| if at[0] + at[1] < 0.7 { f64::INFINITY } else { sphere(at) };
     let found = minimise(&[0.8, 0.6], SETTINGS, band);
-    assert_eq!(found.stop, Stop::Settled);
+    assert_eq!(found.stop, StopReason::Converged);
     assert!((found.at[0] - 0.35).abs() < 2e-3 && (found.at[1] - 0.35).abs() < 2e-3, "{found:?}");
     assert!((found.best - 0.005).abs() < 1e-5);
 }
@@ -116,7 +116,7 @@ fn infinite_regions_are_walls() {
 fn an_optimum_on_a_bound_is_reached() {
     let tilted = |at: &[f64]| at[0] + 2.0 * at[1] + 0.5 * at[2] + 1.0;
     let found = minimise(&[0.5, 0.6, 0.7], SETTINGS, tilted);
-    assert_eq!(found.stop, Stop::Settled);
+    assert_eq!(found.stop, StopReason::Converged);
     assert!(found.best < 1.0 + 1e-3, "{found:?}");
     let corner = |at: &[f64]| at.iter().map(|u| (u - 1.0) * (u - 1.0)).sum();
     let found = minimise(&[0.5, 0.95], SETTINGS, corner);
@@ -136,7 +136,7 @@ fn a_simplex_pinned_to_a_bound_is_not_reported_as_converged() {
     };
     let mut simplex = Simplex::new(&[0.01, 0.1, 0.1, 0.1], SETTINGS);
     let (mut best, mut at_first_collapse) = (f64::INFINITY, f64::NAN);
-    while let Ask::At(at) = simplex.ask() {
+    while let Proposal::Evaluate(at) = simplex.ask() {
         let cost = pinned(at);
         best = best.min(cost);
         simplex.tell(cost);
@@ -145,7 +145,7 @@ fn a_simplex_pinned_to_a_bound_is_not_reported_as_converged() {
         }
     }
     assert!(at_first_collapse > 0.01, "this simplex did not collapse: {at_first_collapse}");
-    assert_eq!((simplex.ask(), simplex.restarts()), (Ask::Stopped(Stop::Settled), 3));
+    assert_eq!((simplex.ask(), simplex.restarts()), (Proposal::Stopped(StopReason::Converged), 3));
     assert!(best - FLOOR < 1e-6, "{best}");
 }
 
@@ -153,7 +153,7 @@ fn a_simplex_pinned_to_a_bound_is_not_reported_as_converged() {
 fn a_cost_that_cannot_be_lowered_ends_after_a_restart_without_progress() {
     let floor = |at: &[f64]| 0.5 + sphere(at);
     let found = minimise(&[0.8, 0.8], SETTINGS, floor);
-    assert_eq!((found.stop, found.restarts), (Stop::Settled, 1), "{found:?}");
+    assert_eq!((found.stop, found.restarts), (StopReason::Converged, 1), "{found:?}");
     assert!(found.best < 0.5 + 1e-6);
 }
 
@@ -161,7 +161,7 @@ fn a_cost_that_cannot_be_lowered_ends_after_a_restart_without_progress() {
 fn nothing_feasible_ends_after_the_first_simplex() {
     for bad in [f64::INFINITY, f64::NAN] {
         let found = minimise(&[0.5; 3], SETTINGS, |_| bad);
-        assert_eq!((found.stop, found.evaluations), (Stop::Infeasible, 4));
+        assert_eq!((found.stop, found.evaluations), (StopReason::Infeasible, 4));
     }
 }
 
@@ -170,34 +170,37 @@ fn one_feasible_vertex_is_enough_to_go_on() {
     let start = [0.9, 0.9];
     // The start is the only infeasible vertex.
     let found = minimise(&start, SETTINGS, |at| if at == start { f64::NAN } else { sphere(at) });
-    assert_eq!(found.stop, Stop::CostReached);
+    assert_eq!(found.stop, StopReason::CostReached);
     // Only the start is feasible, and the simplex falls on it.
     let found = minimise(&start, SETTINGS, |at| if at == start { 1.0 } else { f64::INFINITY });
-    assert_eq!((found.stop, found.at), (Stop::Settled, start.to_vec()));
+    assert_eq!((found.stop, found.at), (StopReason::Converged, start.to_vec()));
 }
 
 #[test]
 fn without_a_free_parameter_there_is_one_evaluation() {
     let found = minimise(&[], SETTINGS, |_| 0.5);
-    assert_eq!((found.stop, found.evaluations), (Stop::Settled, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::Converged, 1));
     let found = minimise(&[], SETTINGS, |_| f64::INFINITY);
-    assert_eq!((found.stop, found.evaluations), (Stop::Infeasible, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::Infeasible, 1));
     let found = minimise(&[], SETTINGS, |_| 0.0);
-    assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::CostReached, 1));
 }
 
 #[test]
 fn evaluations_are_bounded() {
     for max_evaluations in 1..40 {
         let found = minimise(&[0.2, 0.75], Settings { max_evaluations, ..SETTINGS }, rosenbrock);
-        assert_eq!((found.stop, found.evaluations), (Stop::EvaluationsUsedUp, max_evaluations));
+        assert_eq!(
+            (found.stop, found.evaluations),
+            (StopReason::EvaluationsUsedUp, max_evaluations)
+        );
     }
 }
 
 #[test]
 fn a_cost_at_the_tolerance_stops_at_once() {
     let found = minimise(&[0.3, 0.3], SETTINGS, sphere);
-    assert_eq!((found.stop, found.evaluations), (Stop::CostReached, 1));
+    assert_eq!((found.stop, found.evaluations), (StopReason::CostReached, 1));
 }
 
 #[test]
@@ -205,12 +208,15 @@ fn refused_points_are_not_counted_and_end_the_search() {
     let mut simplex = Simplex::new(&[0.5; 7], SETTINGS);
     simplex.tell(1.0);
     let mut refusals = 0;
-    while let Ask::At(_) = simplex.ask() {
+    while let Proposal::Evaluate(_) = simplex.ask() {
         simplex.refuse();
         refusals += 1;
         assert!(refusals < 10_000, "refusing never ends");
     }
-    assert_eq!((simplex.ask(), simplex.evaluations()), (Ask::Stopped(Stop::Settled), 1));
+    assert_eq!(
+        (simplex.ask(), simplex.evaluations()),
+        (Proposal::Stopped(StopReason::Converged), 1)
+    );
 }
 
 #[test]
@@ -233,7 +239,7 @@ fn equal_costs_keep_the_order_of_their_making() {
     let plateau = |at: &[f64]| if at[0] < 0.1 { 0.0 } else { 1.0 };
     let twice = [(); 2].map(|()| minimise(&[0.5, 0.5, 0.5], SETTINGS, plateau));
     assert_eq!(twice[0], twice[1]);
-    assert_eq!(twice[0].stop, Stop::Settled);
+    assert_eq!(twice[0].stop, StopReason::Converged);
 }
 
 properties! {
@@ -247,7 +253,7 @@ properties! {
         let mut simplex = Simplex::new(&start, Settings { max_evaluations: 250, ..SETTINGS });
         let mut again = simplex.clone();
         for (number, cost) in costs.iter().cycle().take(1000).enumerate() {
-            if let Ask::At(at) = simplex.ask() {
+            if let Proposal::Evaluate(at) = simplex.ask() {
                 prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)), "{:?}", at);
             }
             let refuse = number % 7 == 3;
@@ -256,7 +262,7 @@ properties! {
             }
             prop_assert_eq!(&simplex, &again);
         }
-        prop_assert!(matches!(simplex.ask(), Ask::Stopped(_)));
+        prop_assert!(matches!(simplex.ask(), Proposal::Stopped(_)));
         prop_assert!(simplex.evaluations() <= 250);
     }
 }
@@ -268,7 +274,7 @@ fn logarithms_are_minimised_by_their_differences() {
     for offset in [-1000.0, 0.0, 1000.0] {
         let settings = Settings { costs, ..SETTINGS };
         let found = minimise(&[0.8, 0.9], settings, |at| sphere(at) + offset);
-        assert_eq!(found.stop, Stop::Settled, "{offset}");
+        assert_eq!(found.stop, StopReason::Converged, "{offset}");
         // With an offset of 1000, rounding leaves differences of 1e-13.
         assert!(found.at.iter().all(|u| (u - 0.3).abs() < 1e-5), "{offset}: {:?}", found.at);
     }
@@ -279,22 +285,22 @@ fn logarithms_are_minimised_by_their_differences() {
 fn foreseen(start: &[f64], most: usize, cost: impl Fn(&[f64]) -> f64) -> f64 {
     let mut simplex = Simplex::new(start, SETTINGS);
     let (mut asked, mut foreseen) = (0, 0);
-    let mut likely: Option<Vec<Vec<f64>>> = None;
-    while let Ask::At(point) = simplex.ask() {
+    let mut candidates: Option<Vec<Vec<f64>>> = None;
+    while let Proposal::Evaluate(point) = simplex.ask() {
         let point = point.to_vec();
-        if let Some(likely) = likely {
+        if let Some(candidates) = candidates {
             asked += 1;
-            foreseen += u32::from(likely.contains(&point));
+            foreseen += u32::from(candidates.contains(&point));
         }
         let before = simplex.clone();
-        let found = simplex.likely(most);
-        assert_eq!(simplex, before, "what is likely is a question");
+        let found = simplex.candidates(most);
+        assert_eq!(simplex, before, "finding candidates changes nothing");
         assert!(found.len() <= most);
         for (i, at) in found.iter().enumerate() {
             assert!(at.iter().all(|u| (0.0..=1.0).contains(u)), "outside the box: {at:?}");
             assert!(*at != point && !found[..i].contains(at), "twice: {at:?}");
         }
-        likely = Some(found);
+        candidates = Some(found);
         simplex.tell(cost(&point));
     }
     f64::from(foreseen) / f64::from(asked)
@@ -330,14 +336,14 @@ properties! {
         };
         let settings = Settings { max_evaluations: 60, ..SETTINGS };
         let mut simplex = Simplex::new(&start, settings);
-        while let Ask::At(point) = simplex.ask() {
+        while let Proposal::Evaluate(point) = simplex.ask() {
             let made = matches!(simplex.purpose, Move::Build | Move::Shrink { .. });
-            let found = simplex.likely(60);
+            let found = simplex.candidates(60);
             let before = point.to_vec();
             let told = cost(point);
             simplex.tell(told);
             // Whether a restart is worthwhile depends on other conditions.
-            if let Ask::At(next) = simplex.ask() && !made && simplex.restarts == 0 {
+            if let Proposal::Evaluate(next) = simplex.ask() && !made && simplex.restarts == 0 {
                 let known = next == before || found.iter().any(|at| at == next);
                 prop_assert!(known, "after {told}: {next:?}");
             }

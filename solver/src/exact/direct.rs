@@ -20,8 +20,8 @@ const SERIES_TERMS: u32 = 4;
 const EULER_GAMMA: f64 = 0.577_215_664_901_532_9;
 
 /// Pressure over F at complex frequency `s` (1/s, real part above 0) of a wave that needs `travel`
-/// (s, above 0) from the source, in a fluid of density `density` (kg/m³). At the source itself it is
-/// infinite.
+/// (s, above 0) from the source, in a fluid of density `density` (kg/m³). At the source itself it
+/// is infinite.
 pub(crate) fn pressure(density: f64, travel: f64, s: Complex) -> Complex {
     bessel_k0(s.scale(travel)).scale(density / (2.0 * PI))
 }
@@ -31,8 +31,8 @@ fn bessel_k0(z: Complex) -> Complex {
     if z.abs() <= SERIES_END { k0_near_zero(z) } else { k0_by_quadrature(z) }
 }
 
-/// K0(z) = Σ (z²/4)^j/(j!)² (H_j - γ - ln(z/2)) with H_j = 1 + 1/2 + … + 1/j: Abramowitz and Stegun,
-/// Handbook of Mathematical Functions, 9.6.13.
+/// K0(z) = Σ (z²/4)^j/(j!)² (H_j - γ - ln(z/2)) with H_j = 1 + 1/2 + … + 1/j: Abramowitz and
+/// Stegun, Handbook of Mathematical Functions, 9.6.13.
 fn k0_near_zero(z: Complex) -> Complex {
     let modulus = libm::hypot(z.re, z.im);
     let log = Complex::new(libm::log(modulus) - LN_2, libm::atan2(z.im, z.re));

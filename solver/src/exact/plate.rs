@@ -37,11 +37,11 @@ pub(crate) struct Plate<const TERMS: usize> {
     prepared: Option<Prepared>,
 }
 
-/// The plate of quick looks: the remainder of its series is 3e-7 of the leading terms. This error
+/// The plate of quick passes: the remainder of its series is 3e-7 of the leading terms. This error
 /// is as smooth as that of a slightly different solid, and has no visible effect on a velocity.
 pub(crate) type FastPlate = Plate<8>;
 
-/// The plate of thorough looks, traces and single admittances: accurate to 1e-13.
+/// The plate of thorough passes, traces and single admittances: accurate to 1e-13.
 pub(crate) type AccuratePlate = Plate<11>;
 
 impl Default for FastPlate {

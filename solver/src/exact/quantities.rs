@@ -9,8 +9,8 @@ use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
 use crate::vector::{ComplexVector, Scalar, Vector as _};
 
-/// Bound of the speed, m/s, of every wave along x1 in the bone: √(λ/ρ) with the largest eigenvalue λ
-/// of the Christoffel matrix of x1.
+/// Bound of the speed, m/s, of every wave along x1 in the bone: √(λ/ρ) with the largest eigenvalue
+/// λ of the Christoffel matrix of x1.
 pub fn fastest_wave(bone: &Bone) -> f64 {
     Medium::new(bone).fastest
 }

@@ -124,12 +124,12 @@ impl<const TERMS: usize> Series<TERMS> {
 }
 
 /// One entry: `even` + κ `odd`.
-pub(crate) struct Parts<V> {
+pub(crate) struct EntryParts<V> {
     even: ComplexVector<V>,
     odd: ComplexVector<V>,
 }
 
-impl<V: Vector> Parts<V> {
+impl<V: Vector> EntryParts<V> {
     /// Returns the entry at wavenumbers `k`: κ = -ik.
     #[inline(always)]
     pub(crate) fn at(&self, k: V) -> ComplexVector<V> {
@@ -150,7 +150,7 @@ impl Polynomials {
     ///
     /// Horner's rule in κ² = -k² for the even and the odd powers.
     #[inline(always)]
-    pub(crate) fn entry<const TERMS: usize, V: Vector>(&self, entry: usize, k: V) -> Parts<V> {
+    pub(crate) fn entry<const TERMS: usize, V: Vector>(&self, entry: usize, k: V) -> EntryParts<V> {
         debug_assert!(entry < ENTRIES);
         let (group, lane) = (entry / LANES, entry % LANES);
         let (re, im) = (&self.re[..2 * TERMS], &self.im[..2 * TERMS]);
@@ -171,6 +171,6 @@ impl Polynomials {
             odd.re = square.mul_add(odd.re, V::splat(re[d][group].0[lane]));
             odd.im = square.mul_add(odd.im, V::splat(im[d][group].0[lane]));
         }
-        Parts { even, odd }
+        EntryParts { even, odd }
     }
 }

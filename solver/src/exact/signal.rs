@@ -4,12 +4,12 @@
 //! p(t) = 2 e^{αt}/T Re Σ c_n e^{iω_n t}, and so is its slope.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{Run, Sampling, direct_arrival, distances};
+use osteon_common::sampling::{FrequencyRun, WaveSampling, direct_arrival, distances};
 
 use crate::complex::Complex;
 use crate::exact::tables::Tables;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
-use crate::picking::Extremum;
+use crate::picking::PressureExtremum;
 use crate::vector::{ComplexVector, Vector};
 
 /// Grid points per period of the centre frequency on which extrema are bracketed.
@@ -26,7 +26,7 @@ const GROUP: usize = 4;
 /// A grid of times, eight at a time: e^{iωt} at lane l of block b is `coarse` (the block's first
 /// time) times `fine` (the lane's delay).
 #[derive(Debug)]
-pub(crate) struct Grid {
+pub(crate) struct TimeGrid {
     step: f64,
     blocks: usize,
     /// α + iω of each line.
@@ -63,7 +63,7 @@ struct Bracket {
     done: bool,
 }
 
-impl Grid {
+impl TimeGrid {
     /// Creates a grid that covers every window of the setup.
     ///
     /// `keep`: whether its waves are kept, or recomputed whenever they are needed.
@@ -184,9 +184,9 @@ impl Grid {
 
 /// The pressure at one receiver.
 pub(crate) struct Signal<'a> {
-    pub(crate) sampling: &'a Sampling,
+    pub(crate) sampling: &'a WaveSampling,
     /// The runs in which the lines are stored.
-    pub(crate) runs: &'a [Run],
+    pub(crate) runs: &'a [FrequencyRun],
     /// The lines of the first runs, tapered; zero where a line is not computed.
     pub(crate) spectrum: &'a [ComplexLanes],
 }
@@ -219,11 +219,11 @@ impl Signal<'_> {
     #[inline(always)]
     pub(crate) fn extrema<V: Vector>(
         &self,
-        grid: &Grid,
+        grid: &TimeGrid,
         from: f64,
         to: f64,
         slopes: &mut Slopes,
-        extrema: &mut Vec<Extremum>,
+        extrema: &mut Vec<PressureExtremum>,
     ) -> f64 {
         let first = (from / grid.step) as usize / LANES;
         let last = ((to / grid.step) as usize / LANES + 1).min(grid.blocks - 1);
@@ -239,7 +239,7 @@ impl Signal<'_> {
                 let time = bracket.time;
                 last = self.pressure(time, value);
                 if time >= from && time < to {
-                    extrema.push(Extremum { time, pressure: last });
+                    extrema.push(PressureExtremum { time, pressure: last });
                 }
             }
         }

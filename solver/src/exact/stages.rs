@@ -1,17 +1,17 @@
 //! The individual stages of one realization, for benchmarks.
 //!
 //! They use the code of [`Solver::arrival`](crate::Solver::arrival), divided so that the time
-//! between them can be measured, for the first look at a bone, after which most bones need nothing
+//! between them can be measured, for the first pass at a bone, after which most bones need nothing
 //! more. There, admittances and sums alternate, frequency by frequency; here all admittances come
 //! first. Each stage may be repeated.
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::sampling::{self, Grade, RUNGS};
+use osteon_common::sampling::{self, Grade, SPEED_BINS};
 
 use crate::exact::Exact;
-use crate::exact::ladder::Held;
-use crate::exact::look::{ExactWorkspace, Look, Rung};
+use crate::exact::pass::{Band, BinTables, ExactWorkspace};
 use crate::exact::response::respond;
+use crate::exact::table_cache::TablesRef;
 use crate::isa::Isa;
 use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
@@ -25,7 +25,7 @@ pub struct Stages {
 
 /// Scratch memory of one thread.
 #[derive(Debug, Default)]
-pub struct Memory {
+pub struct StageWorkspace {
     exact: ExactWorkspace,
     /// Responses of each line.
     responses: Vec<Vec<ComplexLanes>>,
@@ -35,11 +35,11 @@ pub struct Memory {
 #[derive(Debug)]
 pub struct Filled<'a> {
     exact: &'a Exact,
-    rung: Held<'a>,
+    bin: TablesRef<'a>,
     accurate: bool,
     medium: Medium,
     speed: f64,
-    memory: &'a mut Memory,
+    memory: &'a mut StageWorkspace,
 }
 
 /// A plate whose responses at every frequency and wavenumber are known.
@@ -68,7 +68,7 @@ impl Stages {
     pub fn tensor<'a>(
         &'a self,
         bone: &Bone,
-        memory: &'a mut Memory,
+        memory: &'a mut StageWorkspace,
     ) -> Result<Filled<'a>, Failure> {
         let exact = &self.exact;
         let accurate = sampling::first_grade(&exact.setup) == Grade::Thorough;
@@ -78,33 +78,34 @@ impl Stages {
         } else {
             exact.fill_plate(&medium, &mut memory.exact.fast);
         }
-        let ladder = if accurate { &exact.thorough } else { &exact.quick };
-        let index = sampling::rung(&exact.setup, speed).unwrap_or(RUNGS);
-        let rung = exact.rung(ladder, index, speed)?;
-        Ok(Filled { exact, rung, accurate, medium, speed, memory })
+        let cache = if accurate { &exact.thorough } else { &exact.quick };
+        let index = sampling::speed_bin(&exact.setup, speed).unwrap_or(SPEED_BINS);
+        let bin = exact.bin_tables(cache, index, speed)?;
+        Ok(Filled { exact, bin, accurate, medium, speed, memory })
     }
 }
 
-/// Returns the first look of a rung.
-fn look(rung: &Rung, accurate: bool) -> &Look {
-    if accurate { &rung.whole } else { &rung.first }
+/// Returns the first pass of a bin.
+fn band(bin: &BinTables, accurate: bool) -> &Band {
+    if accurate { &bin.whole } else { &bin.first }
 }
 
 impl<'b> Filled<'b> {
-    fn look(&self) -> &Look {
-        look(&self.rung, self.accurate)
+    fn band(&self) -> &Band {
+        band(&self.bin, self.accurate)
     }
 
     /// Returns the number of (frequency, wavenumber) pairs.
     pub fn pairs(&self) -> usize {
-        self.look().sampled.pairs as usize
+        self.band().sampled.pairs as usize
     }
 
     /// Admittance: computes the plate's response at every pair.
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
-        let (isa, tables, medium) = (self.exact.isa, &self.rung.tables, &self.medium);
-        let lines = &tables.lines[..self.look().lines];
-        let Memory { exact: ExactWorkspace { fast, accurate, .. }, responses } = &mut *self.memory;
+        let (isa, tables, medium) = (self.exact.isa, &self.bin.tables, &self.medium);
+        let lines = &tables.lines[..self.band().lines];
+        let StageWorkspace { exact: ExactWorkspace { fast, accurate, .. }, responses } =
+            &mut *self.memory;
         responses.resize_with(lines.len(), Vec::new);
         for (line, responses) in lines.iter().zip(responses) {
             if self.accurate {
@@ -120,10 +121,10 @@ impl<'b> Filled<'b> {
 impl<'b> Responded<'_, 'b> {
     /// Wavenumber sum: computes the spectra at every receiver.
     pub fn sum(&mut self) -> Summed<'_, 'b> {
-        let Filled { exact, rung, memory, .. } = &mut *self.0;
-        memory.exact.spectra.clear(&rung.tables);
+        let Filled { exact, bin, memory, .. } = &mut *self.0;
+        memory.exact.spectra.clear(&bin.tables);
         for (i, responses) in memory.responses.iter().enumerate() {
-            memory.exact.spectra.sum(exact.isa, &rung.tables, i, responses);
+            memory.exact.spectra.sum(exact.isa, &bin.tables, i, responses);
         }
         Summed(self.0)
     }
@@ -135,8 +136,8 @@ impl<'b> Summed<'_, 'b> {
     /// # Errors
     /// If a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
-        let Filled { exact, rung, accurate, speed, memory, .. } = &mut *self.0;
-        exact.observe(*speed, rung, look(rung, *accurate), &mut memory.exact)?;
+        let Filled { exact, bin, accurate, speed, memory, .. } = &mut *self.0;
+        exact.observe(*speed, bin, band(bin, *accurate), &mut memory.exact)?;
         Ok(Observed(self.0))
     }
 }
@@ -147,10 +148,10 @@ impl Observed<'_, '_> {
     /// # Errors
     /// If there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
-        let Filled { exact, rung, memory, .. } = &*self.0;
-        let look = self.0.look();
-        let found = exact.picked(rung, look, &memory.exact)?;
-        Ok(found.arrival(1, look.sampled.pairs))
+        let Filled { exact, bin, memory, .. } = &*self.0;
+        let band = self.0.band();
+        let found = exact.picked(bin, band, &memory.exact)?;
+        Ok(found.arrival(1, band.sampled.pairs))
     }
 }
 
@@ -171,7 +172,7 @@ mod tests {
             setup.solver.refinement = refinement;
             let solver = Solver::new(&setup);
             let stages = Stages::new(&setup, Isa::fastest());
-            let (mut workspace, mut memory) = (Workspace::default(), Memory::default());
+            let (mut workspace, mut memory) = (Workspace::default(), StageWorkspace::default());
             let mut same = 0;
             for i in 0..20 {
                 let bone = ensemble.bone(i).unwrap();
@@ -181,10 +182,10 @@ mod tests {
                 let mut summed = responded.sum();
                 let arrival = summed.synthesis().unwrap().picking().unwrap();
                 same += usize::from(arrival == expected);
-                // If the solver makes further looks, it finds nearly the same.
+                // If the solver makes further passes, it finds nearly the same.
                 assert!((arrival.velocity / expected.velocity - 1.0).abs() < 3e-4, "index {i}");
             }
-            assert!(same >= 15, "only {same} of 20 arrivals are those of a first look");
+            assert!(same >= 15, "only {same} of 20 arrivals are those of a first band");
         }
     }
 }

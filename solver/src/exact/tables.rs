@@ -1,11 +1,11 @@
 //! Tables that all realizations of one setup share: they depend only on layers, probe, solver
-//! settings and the rung of the speed ladder.
+//! settings and the speed bin.
 
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{RUN, Run, Sampling, distances};
+use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling, distances};
 
 use crate::complex::Complex;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -15,9 +15,9 @@ use crate::pulse::Pulse;
 #[derive(Debug)]
 pub(crate) struct Tables {
     setup: Setup,
-    pub(crate) sampling: Sampling,
+    pub(crate) sampling: WaveSampling,
     /// Positions of the lines on the frequency axis, eight lines per run.
-    pub(crate) runs: Vec<Run>,
+    pub(crate) runs: Vec<FrequencyRun>,
     pub(crate) lines: Vec<Line>,
     /// Wavenumbers, rad/m, in blocks.
     wavenumbers: Vec<Lanes>,
@@ -61,7 +61,7 @@ pub(crate) struct Block {
 
 impl Tables {
     /// Returns the memory of tables of this many pairs that are kept, bytes.
-    pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> f64 {
+    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling, pairs: f64) -> f64 {
         let a_pair = (size_of::<Block>() + size_of::<ComplexLanes>()) / LANES;
         let highest = sampling.runs().iter().flat_map(|run| run.frequencies()).max().unwrap_or(0);
         let cosines = sampling.wavenumbers(highest) * setup.probe.receivers.count as usize;
@@ -74,7 +74,7 @@ impl Tables {
     /// are needed.
     pub(crate) fn new(
         setup: &Setup,
-        sampling: Sampling,
+        sampling: WaveSampling,
         amplitude: f64,
         taper: (f64, f64),
         keep: bool,
@@ -166,7 +166,7 @@ impl Tables {
 
     /// Returns the weights of the lines, eight at a time, for a taper with this start and end, Hz.
     pub(crate) fn taper(&self, taper: (f64, f64)) -> Vec<Lanes> {
-        let weights = |run: &Run| {
+        let weights = |run: &FrequencyRun| {
             let mut lanes = Lanes::ZERO;
             for (lane, n) in lanes.0.iter_mut().zip(run.frequencies()) {
                 *lane = self.sampling.taper(n, taper);
@@ -180,7 +180,7 @@ impl Tables {
 impl Line {
     fn new(
         setup: &Setup,
-        sampling: &Sampling,
+        sampling: &WaveSampling,
         n: usize,
         pulse: Complex,
         taper: (f64, f64),
@@ -204,7 +204,7 @@ impl Line {
     }
 
     /// Computes and keeps all blocks.
-    fn keep(&mut self, setup: &Setup, sampling: &Sampling) {
+    fn keep(&mut self, setup: &Setup, sampling: &WaveSampling) {
         for b in 0..self.blocks {
             let (block, echo) = self.block(setup, sampling, b);
             self.kept.push(block);
@@ -216,7 +216,7 @@ impl Line {
 
     /// Computes one block, and exp(-2 g h1) if echoes of the coupling's outer face matter,
     /// otherwise 0.
-    fn block(&self, setup: &Setup, sampling: &Sampling, b: usize) -> (Block, ComplexLanes) {
+    fn block(&self, setup: &Setup, sampling: &WaveSampling, b: usize) -> (Block, ComplexLanes) {
         let zero = ComplexLanes::ZERO;
         let (mut block, mut echo) = (Block { g: zero, load: zero, weight: zero }, zero);
         for lane in 0..LANES {
@@ -254,7 +254,7 @@ struct SpectralPoint {
 /// ```
 ///
 /// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window.
-fn spectral_point(setup: &Setup, sampling: &Sampling, s: Complex, k: f64) -> SpectralPoint {
+fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
     let one = Complex::new(1.0, 0.0);

@@ -2,7 +2,7 @@
 
 use osteon_common::case::Bone;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{Sampling, trace_taper};
+use osteon_common::sampling::{WaveSampling, trace_taper};
 use thiserror::Error;
 
 use crate::exact::plate::AccuratePlate;
@@ -81,12 +81,12 @@ fn pressures(duration: f64, time_step: f64, receivers: u32) -> f64 {
 }
 
 /// Kernel that computes the pressure at many times.
-struct Sample<'a> {
+struct SamplePressure<'a> {
     signal: Signal<'a>,
     times: &'a [f64],
 }
 
-impl Kernel for Sample<'_> {
+impl Kernel for SamplePressure<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
@@ -125,7 +125,7 @@ impl Solver {
         self.isa().run(FillPlate { medium: &medium, thickness, plate: &mut plate });
         let fluids =
             self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
-        let sampling = Sampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
+        let sampling = WaveSampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
         let pairs = sampling.pairs(sampling.band);
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Err(TraceError::TooLong { duration, pairs });
@@ -148,7 +148,7 @@ impl Solver {
                 }
                 let signal =
                     Signal { sampling: &tables.sampling, runs: &tables.runs, spectrum: &spectrum };
-                self.isa().run(Sample { signal, times: &times })
+                self.isa().run(SamplePressure { signal, times: &times })
             })
             .collect();
         if pressures.iter().flatten().any(|p| !p.is_finite()) {

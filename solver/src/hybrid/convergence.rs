@@ -7,7 +7,7 @@
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
 
-use super::march::{Limit, Memory, Response};
+use super::march::{Limit, LoadResponse, MarchWorkspace};
 use super::mesh::Mesh;
 use super::operator::Operator;
 use super::plan::Times;
@@ -59,7 +59,7 @@ pub fn element_convergence(
     sizes: &[f64],
 ) -> Result<Vec<ConvergenceRow>, Failure> {
     let finest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
-    let mut study = Study::new(setup, bone);
+    let mut study = SmoothLoadStudy::new(setup, bone);
     let reference = study.mesh(REFERENCE_ORDER, finest);
     let mut stable = study.limit(&reference);
     for &size in sizes {
@@ -92,7 +92,7 @@ pub fn time_step_convergence(
     bone: &Bone,
     halvings: u32,
 ) -> Result<Vec<ConvergenceRow>, Failure> {
-    let mut study = Study::new(setup, bone);
+    let mut study = SmoothLoadStudy::new(setup, bone);
     let mesh = Mesh::new(setup, bone, &study.scope, setup.solver.refinement.sqrt());
     let limit = study.limit(&mesh);
     let first = study.ratio(limit);
@@ -113,15 +113,15 @@ pub fn time_step_convergence(
 }
 
 /// One bone under the smooth load.
-struct Study<'a> {
+struct SmoothLoadStudy<'a> {
     setup: &'a Setup,
     bone: &'a Bone,
     scope: Scope,
     wavenumbers: Lanes,
-    memory: Memory,
+    memory: MarchWorkspace,
 }
 
-impl<'a> Study<'a> {
+impl<'a> SmoothLoadStudy<'a> {
     fn new(setup: &'a Setup, bone: &'a Bone) -> Self {
         let fc = setup.probe.center_frequency;
         let fluid = 2.0 * std::f64::consts::PI * fc / setup.layers.coupling.sound_speed;
@@ -133,9 +133,9 @@ impl<'a> Study<'a> {
         Self {
             setup,
             bone,
-            scope: Scope::whole(setup, speed),
+            scope: Scope::until_direct_wave(setup, speed),
             wavenumbers,
-            memory: Memory::default(),
+            memory: MarchWorkspace::default(),
         }
     }
 
@@ -174,7 +174,7 @@ impl<'a> Study<'a> {
             *load = Lanes::splat(libm::exp(-t * t));
         }
         let (node, weights) = mesh.receiver(self.setup.probe.receivers.x3);
-        Isa::fastest().run(Response {
+        Isa::fastest().run(LoadResponse {
             operator: &Operator::new(self.setup, self.bone, mesh),
             k: self.wavenumbers,
             times,

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 
 use osteon_common::case::Setup;
 
-use super::mesh::path_heard;
+use super::mesh::longest_coupling_path;
 use super::scope::Scope;
 use crate::lanes::{LANES, Lanes};
 use crate::pulse::Pulse;
@@ -38,7 +38,7 @@ pub(super) struct Image {
 /// Returns the source, and its images in fluid 1's outer face whose waves can arrive in a window.
 pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
     let (source, depth) = (setup.probe.source.x3, setup.layers.coupling.thickness);
-    let heard = path_heard(setup, scope) - setup.probe.receivers.x3;
+    let heard = longest_coupling_path(setup, scope) - setup.probe.receivers.x3;
     let mut images = vec![Image { height: source, sign: 1.0 }];
     let mut sign = -1.0;
     for n in 1..=IMAGES_MAX / 2 {

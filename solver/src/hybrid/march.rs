@@ -3,7 +3,7 @@
 use super::incident::Incident;
 use super::operator::Operator;
 use super::plan::{Plan, Times};
-use super::stepping::{State, stability_limit};
+use super::stepping::{WaveState, stability_limit};
 use crate::isa::Kernel;
 use crate::lanes::{LANES, Lanes};
 use crate::vector::Vector;
@@ -12,7 +12,7 @@ use crate::vector::Vector;
 pub(super) struct Limit<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) wavenumber: f64,
-    pub(super) state: &'a mut State,
+    pub(super) state: &'a mut WaveState,
 }
 
 impl Kernel for Limit<'_> {
@@ -30,15 +30,15 @@ pub(super) struct March<'a> {
     pub(super) plan: &'a Plan,
     pub(super) times: Times,
     pub(super) incident: &'a mut Incident,
-    pub(super) receivers: &'a [Receiver],
+    pub(super) receivers: &'a [ReceiverSamples],
     /// Height of the receivers, m.
     pub(super) height: f64,
-    pub(super) memory: &'a mut Memory,
+    pub(super) memory: &'a mut MarchWorkspace,
 }
 
 /// The samples required at one receiver.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Receiver {
+pub(super) struct ReceiverSamples {
     /// Distance from the source along x1, m.
     pub(super) distance: f64,
     /// First sample required.
@@ -49,8 +49,8 @@ pub(super) struct Receiver {
 
 /// Memory that a thread reuses.
 #[derive(Debug, Default)]
-pub(super) struct Memory {
-    pub(super) state: State,
+pub(super) struct MarchWorkspace {
+    pub(super) state: WaveState,
     /// Pressure on the bone's face at every time step.
     pub(super) load: Vec<Lanes>,
     /// Samples of the pressure at the receivers' height.
@@ -61,7 +61,7 @@ pub(super) struct Memory {
     pub(super) row: Vec<f64>,
 }
 
-impl Memory {
+impl MarchWorkspace {
     /// Makes room for a load and a record.
     pub(super) fn rest(&mut self, times: Times) {
         for (lanes, len) in
@@ -75,16 +75,16 @@ impl Memory {
 
 /// Kernel that steps eight wavenumbers under a load in `memory`; the result is its record.
 #[cfg(feature = "measure")]
-pub(super) struct Response<'a> {
+pub(super) struct LoadResponse<'a> {
     pub(super) operator: &'a Operator<1>,
     pub(super) k: Lanes,
     pub(super) times: Times,
     pub(super) receiver: (usize, &'a [f64]),
-    pub(super) memory: &'a mut Memory,
+    pub(super) memory: &'a mut MarchWorkspace,
 }
 
 #[cfg(feature = "measure")]
-impl Kernel for Response<'_> {
+impl Kernel for LoadResponse<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -131,7 +131,7 @@ fn run_block<V: Vector>(
     k: Lanes,
     times: Times,
     (node, weights): (usize, &[f64]),
-    memory: &mut Memory,
+    memory: &mut MarchWorkspace,
 ) {
     let load = &memory.load;
     let state = &mut memory.state;
@@ -155,7 +155,7 @@ fn transform(plan: &Plan, k: Lanes, distance: f64) -> Lanes {
 
 /// Adds one block's contribution to a receiver's pressure.
 #[inline(always)]
-fn add(factor: Lanes, record: &[Lanes], receiver: &Receiver, sums: &mut [f64]) {
+fn add(factor: Lanes, record: &[Lanes], receiver: &ReceiverSamples, sums: &mut [f64]) {
     let range = receiver.first..=receiver.last;
     for (sum, &pressure) in sums[range.clone()].iter_mut().zip(&record[range]) {
         *sum += (factor * pressure).sum();
@@ -183,14 +183,15 @@ mod tests {
         setup.layers.marrow.thickness = 4e-3;
         let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
         let bone = Ensemble::new(&point, 3).unwrap().bone(1).unwrap();
-        let mesh = Mesh::with_sizes(&setup, &Scope::whole(&setup, 5000.0), 8, [0.4e-3; 3]);
+        let mesh =
+            Mesh::with_sizes(&setup, &Scope::until_direct_wave(&setup, 5000.0), 8, [0.4e-3; 3]);
         let operator = Operator::<1>::new(&setup, &bone, &mesh);
         let step = 5e-9;
         // Echoes from the coupling's outer face after 13 µs are weakened by e^-25.
         let (damping, samples) = (1.9e6, 2600);
         let times = Times { step, ratio: 1, samples };
         let k = Lanes(std::array::from_fn(|lane| 600.0 * lane as f64));
-        let mut memory = Memory::default();
+        let mut memory = MarchWorkspace::default();
         memory.rest(times);
         let pulse = |n: usize| {
             let t = n as f64 * step / 0.15e-6 - 6.1;
@@ -203,7 +204,13 @@ mod tests {
         let (node, weights) = mesh.receiver(height);
         let receiver = (node, weights.as_slice());
         let memory_ = &mut memory;
-        Isa::fastest().run(Response { operator: &operator, k, times, receiver, memory: memory_ });
+        Isa::fastest().run(LoadResponse {
+            operator: &operator,
+            k,
+            times,
+            receiver,
+            memory: memory_,
+        });
         let transform = |s: Complex, value: &dyn Fn(usize) -> f64| {
             (0..samples).fold(Complex::default(), |sum, n| {
                 sum + s.scale(-(n as f64) * step).exp().scale(value(n) * step)

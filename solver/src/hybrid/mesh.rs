@@ -118,7 +118,7 @@ impl Mesh {
 
 /// Returns the longest path, m, across the coupling fluid on which a wave can arrive within its
 /// window.
-pub(super) fn path_heard(setup: &Setup, scope: &Scope) -> f64 {
+pub(super) fn longest_coupling_path(setup: &Setup, scope: &Scope) -> f64 {
     scope.across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
 }
 
@@ -134,7 +134,7 @@ fn bone_speed(setup: &Setup, bone: &Bone) -> f64 {
 /// up to the cut and down to the receiver.
 fn coupling_depth(setup: &Setup, scope: &Scope) -> f64 {
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
-    let heard = 0.5 * (path_heard(setup, scope) + receivers - source);
+    let heard = 0.5 * (longest_coupling_path(setup, scope) + receivers - source);
     (DEPTH_MARGIN * heard.max(receivers)).min(setup.layers.coupling.thickness)
 }
 
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn elements_in_the_bone_follow_the_mean_of_slow_waves_there_and_in_the_coupling() {
         let setup = Setup::default();
-        let scope = Scope::whole(&setup, 3960.1);
+        let scope = Scope::until_direct_wave(&setup, 3960.1);
         let mut slow = bone();
         // Four times the density: waves of half the speed, 0.728 mm long; in the fluid 1.5 mm.
         slow.density *= 4.0;
@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn fluids_end_where_no_echo_is_heard() {
         let setup = Setup::default();
-        let scope = Scope::whole(&setup, 3960.1);
+        let scope = Scope::until_direct_wave(&setup, 3960.1);
         let mesh = Mesh::new(&setup, &bone(), &scope, 1.0);
         // By hand, at the farthest receiver: (14.267 - 5.404) µs / 616.99 µs/m is a path of
         // 14.36 mm, half of it 7.18 mm; below, (14.267 - 5.404 - 2.468) µs leaves 5.18 mm.
@@ -209,7 +209,7 @@ mod tests {
         let mut thin = setup;
         thin.layers.coupling.thickness = 4e-3;
         thin.layers.marrow.thickness = 2e-3;
-        let mesh = Mesh::new(&thin, &bone(), &Scope::whole(&thin, 3960.1), 1.0);
+        let mesh = Mesh::new(&thin, &bone(), &Scope::until_direct_wave(&thin, 3960.1), 1.0);
         assert!((depth(&mesh.coupling) - 4e-3).abs() < 1e-12);
         assert!((depth(&mesh.marrow) - 2e-3).abs() < 1e-12);
     }

@@ -4,9 +4,9 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
 
 use super::incident::Incident;
-use super::march::{Limit, March, Memory, Receiver};
+use super::march::{Limit, March, MarchWorkspace, ReceiverSamples};
 use super::operator::Operator;
-use super::plan::{Budget, Plan, SAMPLES_BEYOND, Times, thinness};
+use super::plan::{Plan, SAMPLES_BEYOND, Times, WorkBudget, thinness};
 use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
 use crate::isa::Isa;
@@ -52,16 +52,16 @@ pub(super) struct Passes<'a> {
     pub(super) bone: &'a Bone,
     /// The windows up to the direct wave.
     pub(super) whole: Scope,
-    pub(super) memory: &'a mut Memory,
+    pub(super) memory: &'a mut MarchWorkspace,
     pub(super) windows: &'a mut Vec<Window>,
     /// Ratio of the time step to the stability limit, once it is known.
     pub(super) share: Option<f64>,
     /// The work that the passes may still use.
-    pub(super) budget: Budget,
+    pub(super) budget: WorkBudget,
 }
 
 /// Result of a pass.
-struct Found {
+struct PassResult {
     pick: Pick,
     /// Extrema below these are noise, Pa per Pa of the pulse's amplitude; one per receiver.
     floors: Vec<f64>,
@@ -112,12 +112,12 @@ impl Passes<'_> {
                 _ => last = next,
             }
         }
-        last.map(|Found { pick, dispersion, .. }| Arrival {
+        last.map(|PassResult { pick, dispersion, .. }| Arrival {
             velocity: pick.velocity,
             times: pick.times,
             // Passes that do not resolve the waves can agree by accident.
             estimated_error: estimate.max(dispersion.min(1.0)),
-            looks: None,
+            passes: None,
         })
     }
 
@@ -157,7 +157,7 @@ impl Passes<'_> {
 
     /// Computes the bone `finer` times as fine as in the setup: the packet found `before`, or the
     /// whole windows.
-    fn pass(&mut self, finer: f64, before: Option<&Found>) -> Result<Found, Failure> {
+    fn pass(&mut self, finer: f64, before: Option<&PassResult>) -> Result<PassResult, Failure> {
         let after = PACKET_PERIODS / self.setup.probe.center_frequency;
         let scope = match before {
             Some(found) => self.whole.until(&found.pick.times, after),
@@ -165,7 +165,7 @@ impl Passes<'_> {
         };
         let (times, dispersion) = self.march(finer, &scope)?;
         let (pick, floors) = self.pick(&scope, times, before)?;
-        Ok(Found { pick, floors, dispersion })
+        Ok(PassResult { pick, floors, dispersion })
     }
 
     /// Computes the pressures at the receivers; also returns the relative error of the speed of
@@ -182,7 +182,7 @@ impl Passes<'_> {
         let share = self.share(limit)?;
         let times = plan.times(setup, self.onset(), limit, share, &mut self.budget)?;
         let filter = LowPass::new(plan.band * times.sample());
-        let receivers: Vec<Receiver> =
+        let receivers: Vec<ReceiverSamples> =
             scope.windows.iter().map(|span| self.receiver(span, times, filter.reach())).collect();
         let mut incident = Incident::new(setup, scope, times.sample());
         let finite = self.isa.run(March {
@@ -197,7 +197,7 @@ impl Passes<'_> {
         if !finite {
             return Err(pressure_not_finite());
         }
-        let Memory { pressures, row, .. } = &mut *self.memory;
+        let MarchWorkspace { pressures, row, .. } = &mut *self.memory;
         for values in pressures.chunks_exact_mut(times.samples) {
             row.clear();
             row.extend_from_slice(values);
@@ -242,10 +242,10 @@ impl Passes<'_> {
     }
 
     /// Returns the samples that a window needs with a filter of this `reach`.
-    fn receiver(&self, span: &Span, times: Times, reach: usize) -> Receiver {
+    fn receiver(&self, span: &Span, times: Times, reach: usize) -> ReceiverSamples {
         let margin = SAMPLES_BEYOND + reach;
         let sample = |t: f64| ((t - self.onset()) / times.sample()).max(0.0) as usize;
-        Receiver {
+        ReceiverSamples {
             distance: span.distance,
             first: sample(span.from).saturating_sub(margin),
             last: (sample(span.to) + margin).min(times.samples - 1),
@@ -257,7 +257,7 @@ impl Passes<'_> {
         &mut self,
         scope: &Scope,
         times: Times,
-        before: Option<&Found>,
+        before: Option<&PassResult>,
     ) -> Result<(Pick, Vec<f64>), Failure> {
         let onset = self.onset();
         self.windows.resize_with(scope.windows.len(), Window::default);

@@ -68,15 +68,15 @@ pub(super) struct Times {
 
 /// The work that passes may still use.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Budget(f64);
+pub(super) struct WorkBudget(f64);
 
-impl Default for Budget {
+impl Default for WorkBudget {
     fn default() -> Self {
         Self(WORK_MAX)
     }
 }
 
-impl Budget {
+impl WorkBudget {
     /// Takes the work of one pass off the budget.
     ///
     /// # Errors
@@ -162,7 +162,7 @@ impl Plan {
         onset: f64,
         limit: f64,
         share: f64,
-        budget: &mut Budget,
+        budget: &mut WorkBudget,
     ) -> Result<Times, Failure> {
         let step = share * limit;
         let duration = (self.end - onset).max(0.0);

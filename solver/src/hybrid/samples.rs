@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::picking::Extremum;
+use crate::picking::PressureExtremum;
 
 /// Samples of one interpolating polynomial.
 const POINTS: usize = 8;
@@ -74,7 +74,7 @@ pub(super) struct Samples<'a> {
 
 impl Samples<'_> {
     /// Writes all local extrema in `from` ≤ t < `to` (s), in order of time, to `extrema`.
-    pub(super) fn extrema(&self, from: f64, to: f64, extrema: &mut Vec<Extremum>) {
+    pub(super) fn extrema(&self, from: f64, to: f64, extrema: &mut Vec<PressureExtremum>) {
         extrema.clear();
         if self.values.len() < POINTS {
             return;
@@ -94,7 +94,7 @@ impl Samples<'_> {
             let place = piece.flat_place(low < 0.0);
             let time = (i as f64 + place).mul_add(self.step, self.start);
             if time >= from && time < to {
-                extrema.push(Extremum { time, pressure: piece.at(place).0 });
+                extrema.push(PressureExtremum { time, pressure: piece.at(place).0 });
             }
         }
     }

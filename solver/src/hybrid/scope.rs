@@ -25,7 +25,7 @@ pub(super) struct Span {
 
 impl Scope {
     /// Returns the windows up to the direct wave.
-    pub(super) fn whole(setup: &Setup, speed: f64) -> Self {
+    pub(super) fn until_direct_wave(setup: &Setup, speed: f64) -> Self {
         let span = |x| Span {
             distance: x,
             from: earliest_arrival(setup, x, speed),

@@ -22,7 +22,7 @@ pub(super) const STABLE_SHARE: f64 = 0.98;
 pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     operator: &Operator<COUPLING>,
     k: f64,
-    state: &mut State,
+    state: &mut WaveState,
 ) -> f64 {
     state.rest(operator);
     let mut noise = 1_u64;
@@ -57,7 +57,7 @@ pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
 
 /// The state at two neighbouring times of eight wavenumbers, and scratch memory.
 #[derive(Debug, Default)]
-pub(super) struct State {
+pub(super) struct WaveState {
     pub(super) now: Vec<Lanes>,
     pub(super) before: Vec<Lanes>,
     first: Vec<Lanes>,
@@ -65,7 +65,7 @@ pub(super) struct State {
     scratch: Scratch,
 }
 
-impl State {
+impl WaveState {
     /// Sets everything to rest.
     pub(super) fn rest<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
         let len = operator.len();

@@ -1,6 +1,6 @@
 //! The table of a check: one case solved in several ways.
 
-use osteon_solver::check::{Check, Difference, Solution};
+use osteon_solver::check::{Check, Difference, MethodSolution};
 
 use super::layout::aligned;
 use super::number::{VELOCITY_DIGITS, digits, significant};
@@ -15,7 +15,7 @@ pub(super) fn table(check: &Check) -> String {
     } else if !check.same_picks() {
         "THE PICKS DIFFER".to_owned()
     } else {
-        let off = check.off().map(|one| one.setup.solver.method.name().to_uppercase());
+        let off = check.outside_limit().map(|one| one.setup.solver.method.name().to_uppercase());
         let methods = off.collect::<Vec<_>>().join(" AND ");
         format!("OFF by more than {:e}: {methods}", check.error_max())
     };
@@ -23,7 +23,7 @@ pub(super) fn table(check: &Check) -> String {
     format!("against exact, refinement {refined}:\n{}{verdict}\n", aligned(&rows))
 }
 
-fn row(solution: &Solution) -> [String; 5] {
+fn row(solution: &MethodSolution) -> [String; 5] {
     let settings = &solution.setup.solver;
     let name =
         format!("{}, refinement {}", settings.method.name(), significant(settings.refinement, 3));

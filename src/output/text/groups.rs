@@ -11,11 +11,11 @@ use super::{aligned, significant};
 /// A column of numbers: its heading, and for each group a value with its interval.
 struct Column {
     heading: String,
-    cells: Vec<Cell>,
+    cells: Vec<GroupCell>,
 }
 
 #[derive(Clone, Copy)]
-struct Cell {
+struct GroupCell {
     value: Option<f64>,
     ends: Option<[f64; 2]>,
 }
@@ -81,7 +81,7 @@ fn side_by_side(groups: &[Group], columns: [Column; 2]) -> String {
 
 /// Returns the column of a moment of the data.
 fn data(groups: &[Group], moment: Moment, heading: &str) -> Column {
-    let cell = |Group { data, .. }: &Group| Cell {
+    let cell = |Group { data, .. }: &Group| GroupCell {
         value: data.moments.get(moment),
         ends: Data::intervals(data).map(|intervals| intervals.get(moment)),
     };
@@ -98,7 +98,7 @@ fn quantities(
     let cell = |group| {
         let quantity = of(group);
         let ends = quantity.and_then(|quantity| quantity.ends());
-        Cell {
+        GroupCell {
             value: quantity.and_then(|quantity| quantity.value).map(|value| value * scale),
             ends: ends.map(|ends| ends.map(|end| end * scale)),
         }
@@ -131,7 +131,7 @@ fn known_parameters(groups: &[Group]) -> Vec<Parameter> {
 
 /// Returns the cells of a column, all with the decimals of the narrowest interval: two digits of
 /// half its width.
-fn shown(cells: &[Cell]) -> Vec<String> {
+fn shown(cells: &[GroupCell]) -> Vec<String> {
     let halves = cells.iter().filter_map(|cell| cell.ends).map(|[low, high]| 0.5 * (high - low));
     let narrowest = halves.filter(|half| *half > 0.0).fold(f64::INFINITY, f64::min);
     let decimals = (1.0 - narrowest.log10().floor()).clamp(0.0, 9.0);
@@ -142,7 +142,7 @@ fn shown(cells: &[Cell]) -> Vec<String> {
             significant(value, 5)
         }
     };
-    let cell = |cell: &Cell| match (cell.value, cell.ends) {
+    let cell = |cell: &GroupCell| match (cell.value, cell.ends) {
         (Some(value), Some([low, high])) => {
             format!("{} ({} to {})", number(value), number(low), number(high))
         }

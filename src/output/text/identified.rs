@@ -3,7 +3,7 @@
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::inference::Spread;
 use osteon_common::parameters::Parameter;
-use osteon_common::report::{Answer, Identification, Identified, Moments, QuantityEstimate};
+use osteon_common::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, digits, measured, significant};
@@ -56,7 +56,7 @@ fn row(name: &str, quantity: &QuantityEstimate, scale: f64, unit: &str) -> Optio
     let value = quantity.value? * scale;
     let error = quantity.standard_error? * scale;
     let [lower, upper] = quantity.ends()?.map(|end| end * scale);
-    let shown = |number: f64| match Decimals::of_error(error) {
+    let shown = |number: f64| match Decimals::for_standard_error(error) {
         Some(decimals) => decimals.show(number),
         None => digits(number, DIGITS),
     };
@@ -139,7 +139,7 @@ fn solutions(found: &Identification) -> String {
 /// Returns both ends to the third digit of their distance.
 fn range([smallest, largest]: [f64; 2]) -> String {
     let ends = [smallest, largest];
-    let [smallest, largest] = match Decimals::of(largest - smallest, 3) {
+    let [smallest, largest] = match Decimals::new(largest - smallest, 3) {
         Some(decimals) => ends.map(|end| decimals.show(end)),
         None => ends.map(|end| digits(end, DIGITS)),
     };
@@ -147,7 +147,7 @@ fn range([smallest, largest]: [f64; 2]) -> String {
 }
 
 /// Returns the smallest and the largest √(c1111/ρ) of the points that match the data, m/s.
-fn speeds(found: &Identification, points: &[Answer]) -> Option<[f64; 2]> {
+fn speeds(found: &Identification, points: &[Solution]) -> Option<[f64; 2]> {
     // Same criterion as for counting the solutions: a likelihood has no cost that is low enough.
     let best = found.cost?;
     let most = found.search.cost_tolerance.map_or(best, |most| most.max(best));

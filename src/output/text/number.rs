@@ -18,13 +18,13 @@ pub(super) struct Decimals(i32);
 impl Decimals {
     /// Returns the decimals that show two significant digits of a standard error; `None` if it is
     /// not above 0.
-    pub(super) fn of_error(error: f64) -> Option<Self> {
-        Self::of(error, 2)
+    pub(super) fn for_standard_error(error: f64) -> Option<Self> {
+        Self::new(error, 2)
     }
 
     /// Returns the decimals that show this many significant digits of `value`; `None` if it is 0,
     /// not finite, or smaller than any decimal that is shown.
-    pub(super) fn of(value: f64, digits: usize) -> Option<Self> {
+    pub(super) fn new(value: f64, digits: usize) -> Option<Self> {
         if value == 0.0 || !value.is_finite() {
             return None;
         }
@@ -49,7 +49,7 @@ impl Decimals {
 /// Returns `value ± error`, the error with two significant digits and the value with the same
 /// decimals; the value with [`DIGITS`] digits if there is no error.
 pub(super) fn measured(value: f64, error: f64) -> String {
-    match Decimals::of_error(error) {
+    match Decimals::for_standard_error(error) {
         Some(decimals) => format!("{} ± {}", decimals.show(value), decimals.show(error)),
         None => digits(value, DIGITS),
     }
@@ -60,7 +60,7 @@ pub(super) fn digits(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    match Decimals::of(value, digits) {
+    match Decimals::new(value, digits) {
         Some(decimals) if (-4..=9).contains(&exponent(value, digits)) => decimals.show(value),
         _ => format!("{value:.*e}", digits.saturating_sub(1)),
     }

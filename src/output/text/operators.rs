@@ -5,7 +5,7 @@ use osteon_common::visible;
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     DepartedWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
-    WorkerStanding,
+    WorkerState,
 };
 
 use unicode_width::UnicodeWidthStr as _;
@@ -66,7 +66,7 @@ pub(super) fn workers(list: &ListWorkersResponse) -> String {
 pub(super) fn attached(workers: &[WorkerSnapshot]) -> String {
     let header = [
         "NUMBER", "HOST", "PROCESS", "SLOTS", "VERSION", "ATTACHED", "HEARD", "RATE", "BATCHES",
-        "OLDEST", "STANDING",
+        "OLDEST", "STATE",
     ];
     let row = |worker: &WorkerSnapshot| {
         let attached = worker.attach_time.as_ref().and_then(timestamp::from_message);
@@ -81,7 +81,7 @@ pub(super) fn attached(workers: &[WorkerSnapshot]) -> String {
             format!("{:.0}/s", worker.realizations_per_second),
             worker.batches.to_string(),
             worker.oldest_batch_s.map(span).unwrap_or_default(),
-            standing_name(worker).to_owned(),
+            worker_state_name(worker).to_owned(),
         ]
     };
     table(&header, workers.iter().map(|worker| (row(worker), String::new())).collect())
@@ -100,13 +100,13 @@ fn departed(gone: &DepartedWorker) -> String {
 }
 
 /// `ok`, `draining`, `distrusted` or `probation`.
-pub(in crate::output) fn standing_name(worker: &WorkerSnapshot) -> &'static str {
-    match worker.standing() {
-        WorkerStanding::Ok => "ok",
-        WorkerStanding::Draining => "draining",
-        WorkerStanding::Distrusted => "distrusted",
-        WorkerStanding::Probation => "probation",
-        WorkerStanding::Unspecified => "unknown",
+pub(in crate::output) fn worker_state_name(worker: &WorkerSnapshot) -> &'static str {
+    match worker.state() {
+        WorkerState::Ok => "ok",
+        WorkerState::Draining => "draining",
+        WorkerState::Distrusted => "distrusted",
+        WorkerState::Probation => "probation",
+        WorkerState::Unspecified => "unknown",
     }
 }
 
@@ -160,7 +160,7 @@ mod tests {
             realizations_per_second: 2811.4,
             batches: 2,
             oldest_batch_s: Some(0.25),
-            standing: WorkerStanding::Ok.into(),
+            state: WorkerState::Ok.into(),
         }
     }
 
@@ -170,7 +170,7 @@ mod tests {
             realizations_per_second: 0.0,
             batches: 0,
             oldest_batch_s: None,
-            standing: WorkerStanding::Draining.into(),
+            state: WorkerState::Draining.into(),
             ..worker(12)
         };
         let gone = DepartedWorker {
@@ -183,7 +183,7 @@ mod tests {
         };
         let list = ListWorkersResponse { workers: vec![worker(1), idle], departed: vec![gone] };
         let expected = "\
-NUMBER  HOST    PROCESS  SLOTS  VERSION  ATTACHED              HEARD      RATE    BATCHES  OLDEST  STANDING
+NUMBER  HOST    PROCESS  SLOTS  VERSION  ATTACHED              HEARD      RATE    BATCHES  OLDEST  STATE
 1       node-7  4711     64     0.1.0    2026-09-21T14:13:20Z  0.5 s ago  2811/s  2        0.2 s   ok
 12      node-7  4711     64     0.1.0    2026-09-21T14:13:20Z  0.5 s ago  0/s     0                draining
 left 2026-09-21T14:14:20Z: node-8 (process 5), worker 3: its connection ended;

@@ -13,7 +13,7 @@ use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
 use super::{fit, groups, identified, solver};
 use crate::output::ShownResult;
-use crate::verdict;
+use crate::result_status;
 
 /// Returns the table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
@@ -101,7 +101,7 @@ fn headline(found: &Identification, specification: &JobSpecification) -> String 
 }
 
 fn propagation(text: &mut String, found: &Propagation, specification: &JobSpecification) {
-    if let Some(reason) = verdict::propagation_failure(specification, found) {
+    if let Some(reason) = result_status::propagation_failure(specification, found) {
         text.push_str(&wrapped(&format!("Failed: {reason}")));
     }
     let failed = failures(&found.failures);
@@ -171,11 +171,12 @@ fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
 fn of_data(data: &Data, moment: Moment, error_of_model: f64) -> [String; 2] {
     let Some(number) = data.moments.get(moment) else { return [String::new(), String::new()] };
     let Some([low, high]) = data.intervals().map(|intervals| intervals.get(moment)) else {
-        let shown = Decimals::of_error(error_of_model).map(|decimals| decimals.show(number));
+        let shown =
+            Decimals::for_standard_error(error_of_model).map(|decimals| decimals.show(number));
         return [shown.unwrap_or_else(|| digits(number, DIGITS)), String::new()];
     };
     // An interval of 95 % reaches two standard errors to each side.
-    match Decimals::of_error((high - low) / 4.0) {
+    match Decimals::for_standard_error((high - low) / 4.0) {
         Some(decimals) => {
             [decimals.show(number), format!("{} to {}", decimals.show(low), decimals.show(high))]
         }

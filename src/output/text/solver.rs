@@ -16,7 +16,7 @@ pub(super) fn line(solver: &Solver<EstimatedErrors>) -> String {
 }
 
 /// Returns the line for one velocity, without line end.
-pub(super) fn line_of_one(solver: &Solver<Option<f64>>) -> String {
+pub(super) fn single_velocity_line(solver: &Solver<Option<f64>>) -> String {
     line_with(solver, |found| found.map(error))
 }
 
@@ -70,7 +70,7 @@ mod tests {
             pairs: Some(1900),
             estimated_error: errors,
             pairs_computed: None,
-            looks: None,
+            passes: None,
         };
         let errors = EstimatedErrors { median: Some(2.04e-5), largest: Some(0.000123) };
         assert_eq!(
@@ -90,7 +90,7 @@ mod tests {
             estimated_error: Some(1e-4),
         };
         assert_eq!(
-            line_of_one(&hybrid),
+            single_velocity_line(&hybrid),
             "solver hybrid: refinement 1, elements of 0.5 mm, order 8; \
              estimated relative error 0.0001"
         );

@@ -30,9 +30,9 @@ fn propagation() -> JobSnapshot {
     }
 }
 
-const OBSERVED: Observed = Observed { derivatives: 7, bar: None, evaluation_s: None };
+const OBSERVED: JobProgress = JobProgress { derivatives: 7, bar: None, evaluation_s: None };
 
-fn shown(snapshot: &JobSnapshot, observed: Observed, width: usize) -> Vec<String> {
+fn shown(snapshot: &JobSnapshot, observed: JobProgress, width: usize) -> Vec<String> {
     let lines = lines(snapshot, &observed, width);
     for line in &lines {
         assert!(line.chars().count() <= width, "{width}: {line}");
@@ -85,18 +85,18 @@ fn what_matters_is_seen_at_every_width_from_40_on() {
 
 #[test]
 fn a_long_evaluation_has_a_bar() {
-    let observed = Observed { bar: Some(1747), ..OBSERVED };
+    let observed = JobProgress { bar: Some(1747), ..OBSERVED };
     let at = |width| shown(&search(), observed, width).pop().unwrap();
     assert_eq!(at(40), "█████░░░ 63 % of this evaluation");
     assert_eq!(at(80), "██████████░░░░░░ 63 % of this evaluation, 1747 of 2747 realizations");
     // An incomplete evaluation is never shown as 100 %.
-    let almost = Observed { bar: Some(2746), ..OBSERVED };
+    let almost = JobProgress { bar: Some(2746), ..OBSERVED };
     assert!(shown(&search(), almost, 80)[2].contains("░ 99 %"));
 }
 
 #[test]
 fn a_propagation_is_a_bar() {
-    let observed = Observed { bar: Some(1747), ..Observed::default() };
+    let observed = JobProgress { bar: Some(1747), ..JobProgress::default() };
     let check = |width: usize, expected: &str| {
         assert_eq!(shown(&propagation(), observed, width), [expected], "{width}");
     };
@@ -109,7 +109,7 @@ fn a_propagation_is_a_bar() {
 
 #[test]
 fn the_mean_of_evaluations_counts_before_the_rate() {
-    let observed = Observed { evaluation_s: Some(10.0), ..OBSERVED };
+    let observed = JobProgress { evaluation_s: Some(10.0), ..OBSERVED };
     let first = shown(&search(), observed, 80).remove(0);
     // 365 further evaluations and the rest of this one, of 10 s each.
     assert!(first.ends_with("up to 61 min left"), "{first}");
@@ -155,11 +155,11 @@ fn one_line_has_it_all_or_what_fits() {
     }
     let ended = JobSnapshot { state: JobState::Ended.into(), ..search() };
     assert_eq!(
-        line(&ended, &Observed::default(), 80),
+        line(&ended, &JobProgress::default(), 80),
         "41 evaluations, best cost 1.25e-5, mean 3906.3 m/s, CV 0.02708"
     );
     assert_eq!(
-        line(&propagation(), &Observed::default(), 80),
+        line(&propagation(), &JobProgress::default(), 80),
         "1747 of 2747 realizations, 1000 realizations/s, 1.0 s left"
     );
 }

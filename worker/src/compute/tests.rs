@@ -20,7 +20,7 @@ fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
     Work { evaluation: Arc::new(evaluation), first, count }
 }
 
-fn solved(threads: u32, work: Work) -> Vec<Solved> {
+fn solved(threads: u32, work: Work) -> Vec<RealizationResult> {
     let (sender, receiver) = mpsc::channel();
     let mut cores = Cores::new(threads, Isa::fastest()).unwrap();
     assert_eq!(cores.slots(), threads);
@@ -51,7 +51,7 @@ fn outcomes_are_those_of_the_solver_alone() {
             .map(|index| {
                 let bone = ensemble.bone(index).unwrap();
                 let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
-                Solved { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+                RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
             })
             .collect();
         assert_eq!(solved(2, drawn(POINT, germs, 3, 4)), expected, "{scheme:?}");
@@ -62,7 +62,7 @@ fn outcomes_are_those_of_the_solver_alone() {
 fn a_point_without_an_ensemble_fails_at_every_index() {
     let mut inadmissible = POINT;
     inadmissible.0[5] = 1.2;
-    assert_eq!(solved(2, work(inadmissible, 0, 3)), [Solved::failed(FailureKind::NotFinite); 3]);
+    assert_eq!(solved(2, work(inadmissible, 0, 3)), [RealizationResult::failed(FailureKind::NotFinite); 3]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use osteon_common::case::Setup;
 use osteon_common::germ_source::GermSource;
-use osteon_common::outcome::Solved;
+use osteon_common::outcome::RealizationResult;
 use osteon_common::parameters::Point;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, Evaluation};
@@ -168,9 +168,9 @@ impl Backend for FakeBackend {
     }
 }
 
-fn outcomes(work: &Work) -> Vec<Solved> {
+fn outcomes(work: &Work) -> Vec<RealizationResult> {
     let indices = work.first..work.first + u64::from(work.count);
-    indices.map(|index| Solved { outcome: Ok(index as f64), estimated_error: 0.0 }).collect()
+    indices.map(|index| RealizationResult { outcome: Ok(index as f64), estimated_error: 0.0 }).collect()
 }
 
 #[tokio::test]

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::germ_source::GermSource;
-use osteon_common::outcome::{FailureKind, Solved};
+use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_proto::announced::EVALUATIONS_KEPT_MAX;
 use osteon_proto::evaluation::{self, Evaluation};
@@ -103,9 +103,9 @@ fn abandon(attachment: u64, batch: u64) -> Effect {
     Effect::Abandon(Task { attachment, batch })
 }
 
-fn solved() -> Vec<Solved> {
-    let success = Solved { outcome: Ok(3900.0), estimated_error: 2e-5 };
-    vec![success, Solved::failed(FailureKind::NoArrival)]
+fn solved() -> Vec<RealizationResult> {
+    let success = RealizationResult { outcome: Ok(3900.0), estimated_error: 2e-5 };
+    vec![success, RealizationResult::failed(FailureKind::NoArrival)]
 }
 
 fn answer(batch: u64) -> Effect {

@@ -26,13 +26,13 @@ fn outcomes(velocities: &[f64]) -> Vec<Outcome> {
 }
 
 fn law(outcomes: &[Outcome]) -> Law<'_> {
-    Law::of(&MonteCarlo::default(), &OPTIMUM, outcomes).unwrap()
+    Law::from_outcomes(&MonteCarlo::default(), &OPTIMUM, outcomes).unwrap()
 }
 
 fn cost(max_failed_fraction: f64, outcomes: &[Outcome], measured: &[f64]) -> f64 {
     let monte_carlo = MonteCarlo { max_failed_fraction, ..MonteCarlo::default() };
-    let verdict = Verdict::of(&monte_carlo, &OPTIMUM, outcomes);
-    likelihood_cost(&verdict, &monte_carlo, &OPTIMUM, outcomes, measured)
+    let statistics = PointStatistics::from_outcomes(&monte_carlo, &OPTIMUM, outcomes);
+    likelihood_cost(&statistics, &monte_carlo, &OPTIMUM, outcomes, measured)
 }
 
 fn average_and_scatter(values: &[f64]) -> (f64, f64) {
@@ -132,7 +132,8 @@ fn the_standard_error_is_that_of_repetition() {
             for seed in 1..=200 {
                 let asked = MonteCarlo { seed, ..monte_carlo };
                 let outcomes = speeds(&asked, seed);
-                costs.push(Law::of(&asked, &OPTIMUM, &outcomes).unwrap().cost(&measured));
+                costs
+                    .push(Law::from_outcomes(&asked, &OPTIMUM, &outcomes).unwrap().cost(&measured));
                 let error = likelihood_error(&asked, &OPTIMUM, &outcomes, &measured).unwrap();
                 variance += error * error / 200.0;
             }

@@ -6,7 +6,7 @@ use crate::dispute::Dispute;
 use crate::evaluation::Audit;
 use crate::ids::{JobId, WorkerId};
 use crate::reactor::turn::Turn;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 
 /// Sends a worker a tie-breaker or an audit that it is eligible for, if there is one; disputes come
 /// first.
@@ -46,8 +46,9 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let worker = state.workers.get(&worker)?;
     let is_for = |dispute: &Dispute| {
-        let reputation = |worker: &Worker| poison::reputation(state, worker, &dispute.crashes);
-        let may = |worker: &&Worker| !worker.draining && !dispute.involves(&worker.name);
+        let reputation =
+            |worker: &AttachedWorker| poison::reputation(state, worker, &dispute.crashes);
+        let may = |worker: &&AttachedWorker| !worker.draining && !dispute.has_vote_of(&worker.name);
         let best = state.workers.values().filter(may).map(reputation).min();
         dispute.tie_breakers.is_empty() && may(&worker) && best == Some(reputation(worker))
     };

@@ -11,7 +11,7 @@ use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::job::Speculation;
 use crate::reactor::turn::Turn;
-use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
+use crate::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 
 /// Number of workers that may be lost over one audit before it is given up.
 const LOST_MAX: u32 = 3;
@@ -146,7 +146,7 @@ pub(crate) fn preempt(turn: &mut Turn, worker: WorkerId) {
 }
 
 /// Counts the realizations of all batches that a worker holds.
-pub(crate) fn realizations_held(state: &State, worker: &Worker) -> u64 {
+pub(crate) fn realizations_held(state: &State, worker: &AttachedWorker) -> u64 {
     let held = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
     held.map(|batch| batch.assignment.indices.count).sum()
 }

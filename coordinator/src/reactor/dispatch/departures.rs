@@ -5,11 +5,11 @@ use crate::effect::Effect;
 use crate::ids::WorkerId;
 use crate::notice::{Departure, Notice};
 use crate::reactor::turn::Turn;
-use crate::state::{DEPARTED_MAX, Departed, Worker};
+use crate::state::{AttachedWorker, DEPARTED_MAX, Departed};
 
 /// Closes the stream of a draining worker that holds no batch any more.
 pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
-    let drained = |worker: &Worker| worker.draining && worker.in_flight.is_empty();
+    let drained = |worker: &AttachedWorker| worker.draining && worker.in_flight.is_empty();
     if turn.state.workers.get(&worker).is_some_and(drained) {
         let reason = CloseReason::Drained;
         turn.effects.push(Effect::Close { worker, reason: reason.clone() });
@@ -19,7 +19,7 @@ pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
 
 /// Removes a worker from the state and returns it: its later events are ignored. The caller returns
 /// the batches that it held to the queue.
-pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<Worker> {
+pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<AttachedWorker> {
     let gone = turn.state.workers.remove(&worker)?;
     if turn.state.workers.is_empty() {
         turn.state.no_worker_since = turn.now;

@@ -4,7 +4,7 @@ use super::{batches, eta, schedule};
 use crate::batch::Batch;
 use crate::ids::{BatchId, WorkerId};
 use crate::reactor::turn::Turn;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 
 /// A batch that has taken this many times its expected time is duplicated before anything is
 /// computed speculatively.
@@ -12,9 +12,9 @@ const LATE: u32 = 2;
 
 /// Sends each otherwise idle worker a duplicate of a late batch, starting with the batch that has
 /// been out longest.
-pub(crate) fn of_late_ones(turn: &mut Turn) {
+pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
-    let idle = |state: &State, worker: &Worker| schedule::held(state, worker) == 0;
+    let idle = |state: &State, worker: &AttachedWorker| schedule::held(state, worker) == 0;
     let late = |state: &State, batch: &Batch| {
         now.saturating_sub(batch.sent) >= LATE * eta::expected(state, batch)
     };
@@ -22,7 +22,7 @@ pub(crate) fn of_late_ones(turn: &mut Turn) {
 }
 
 /// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
-pub(crate) fn of_slow_ones(turn: &mut Turn) {
+pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
     duplicate(turn, |_, worker| worker.in_flight.is_empty(), |_, _| true);
 }
 
@@ -31,7 +31,7 @@ pub(crate) fn of_slow_ones(turn: &mut Turn) {
 /// duplicated.
 fn duplicate(
     turn: &mut Turn,
-    idle: impl Fn(&State, &Worker) -> bool,
+    idle: impl Fn(&State, &AttachedWorker) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
     let (state, now) = (&*turn.state, turn.now);
@@ -40,7 +40,7 @@ fn duplicate(
     if !open(state).next().is_some_and(|(_, oldest)| old(oldest)) {
         return;
     }
-    let idle = |worker: &Worker| state.is_sound(worker) && idle(state, worker);
+    let idle = |worker: &AttachedWorker| state.is_sound(worker) && idle(state, worker);
     let idle: Vec<WorkerId> =
         state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
     for worker in idle {

@@ -14,19 +14,19 @@ use osteon_common::parameters::Point;
 use super::speculation::realizations;
 use super::{batches, eta, sizing};
 use crate::batch::{Assignment, Purpose};
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::fairness;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
 use crate::job::{Job, Stage};
 use crate::reactor::turn::Turn;
-use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
+use crate::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 
 /// ETA of the last batch of each evaluation that a search waits for.
 type Etas = BTreeMap<JobId, Duration>;
 
 /// Sends speculative batches to the workers with idle slots.
-pub(crate) fn hand_out(turn: &mut Turn) {
+pub(crate) fn dispatch(turn: &mut Turn) {
     if next(turn.state).is_none() {
         return;
     }
@@ -98,7 +98,7 @@ fn waits(
 /// Returns the number of realizations of a point that nobody computes yet.
 fn queued(job: &Job, point: &Point) -> u64 {
     let realizations = job.record.specification.monte_carlo.realizations;
-    job.speculation.at(point).map_or(realizations, Evaluation::queued)
+    job.speculation.at(point).map_or(realizations, PendingEvaluation::queued)
 }
 
 /// Returns the number of slots that jobs other than `but` will need before `until`, beyond those
@@ -156,14 +156,19 @@ fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, I
         // The lowest number that it may get. The number only decides which batches are audited.
         let number = job.search.evaluations() + 1;
         let realizations = job.record.specification.monte_carlo.realizations;
-        job.speculation.evaluations.push(Evaluation::new(number, attempt, point, realizations));
+        job.speculation.evaluations.push(PendingEvaluation::new(
+            number,
+            attempt,
+            point,
+            realizations,
+        ));
     }
     let evaluation = job.speculation.at_mut(&point)?;
     Some((evaluation.attempt, evaluation.take(size)?))
 }
 
 /// Returns the number of slots of a worker that no other work needs.
-fn spare(state: &State, worker: &Worker) -> u64 {
+fn spare(state: &State, worker: &AttachedWorker) -> u64 {
     let holds = |purpose| state.held_for(worker, purpose).next().is_some();
     let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
     let failing = state.is_failing(worker.name.host());

@@ -19,7 +19,7 @@ use crate::dispute::Dispute;
 use crate::fairness;
 use crate::ids::{BatchId, JobId, WorkerId};
 use crate::reactor::turn::Turn;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 use crate::worker_name::WorkerName;
 
 /// No batch is overdue before this time. A worker, a network or a machine may pause for a second or
@@ -132,7 +132,7 @@ fn give_up_audit(turn: &mut Turn, id: BatchId) {
 
 /// Sends duplicates of overdue batches, before any other work is sent. Adds workers to `kept` that
 /// must not receive further batches, so that they soon hold none.
-pub(crate) fn hand_out(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
+pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
     if turn.state.overdue.is_empty() {
         return;
     }
@@ -185,7 +185,7 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
 fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
-    let rank = |(worker, choose_worker): &(&Worker, WorkerId)| {
+    let rank = |(worker, choose_worker): &(&AttachedWorker, WorkerId)| {
         let doubtful = worker.missed.count > 0 || !worker.has_answered;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
@@ -207,7 +207,7 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
         return None;
     }
     let rank =
-        |(choose_worker, worker): &(&WorkerId, &Worker)| -> (Reputation, bool, usize, WorkerId) {
+        |(choose_worker, worker): &(&WorkerId, &AttachedWorker)| -> (Reputation, bool, usize, WorkerId) {
             let reputation = poison::reputation(state, worker, crashes);
             (
                 reputation,
@@ -216,15 +216,16 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
                 **choose_worker,
             )
         };
-    let fit =
-        |worker: &Worker| is_fit(state, id, worker, now) && !state.is_failing(worker.name.host());
+    let fit = |worker: &AttachedWorker| {
+        is_fit(state, id, worker, now) && !state.is_failing(worker.name.host())
+    };
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
     fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
 }
 
 /// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue
 /// batch itself.
-fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
+fn is_fit(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
     let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
     let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
     trusted && may_have(state, id, &worker.name) && !late()
@@ -232,7 +233,7 @@ fn is_fit(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
 
 /// Returns whether a worker on probation is tried with a duplicate of a batch. Audits are not used
 /// for that.
-fn is_tried(state: &State, id: BatchId, worker: &Worker, now: Duration) -> bool {
+fn is_tried(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
     let purpose = state.batches.get(&id).map(|batch| batch.purpose);
     !worker.draining
         && worker.in_flight.is_empty()
@@ -247,7 +248,7 @@ fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
     batches.filter_map(|batch| Some(&state.workers.get(&batch.worker)?.name))
 }
 
-fn is_of_holder(state: &State, id: BatchId, worker: &Worker) -> bool {
+fn is_of_holder(state: &State, id: BatchId, worker: &AttachedWorker) -> bool {
     holders(state, id).any(|holder| holder.host() == worker.name.host())
 }
 
@@ -268,7 +269,7 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
             evaluation.owner(batch.assignment.indices.first).is_none_or(|by| by == *name)
         }
         Purpose::TieBreak => {
-            evaluation.disputes.iter().find(about).is_none_or(|it| it.involves(name))
+            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name))
         }
     };
     !in_question && holders(state, id).all(|holder| holder != name)

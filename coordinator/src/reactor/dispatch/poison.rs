@@ -1,7 +1,7 @@
 //! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
 //! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
-//! A bad node that has just come back holds nothing, so being idle says nothing for a worker: a
+//! A bad node that has just come back holds nothing, so being idle is no evidence for a worker: a
 //! quarantined realization goes to the worker with the best reputation, and waits for it. One over
 //! which a worker was lost goes to the worker that has been attached longest among these, so that a
 //! node that comes and goes does not get it while another worker is there.
@@ -18,11 +18,11 @@ use osteon_common::realization::Ensemble;
 use super::{batches, schedule};
 use crate::batch::{Assignment, Purpose};
 use crate::crashes::Crashes;
-use crate::failure::Failure;
+use crate::failure::RunFailure;
 use crate::ids::{JobId, WorkerId};
 use crate::indices::Indices;
 use crate::reactor::turn::Turn;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 use crate::worker_name::WorkerName;
 
 /// Time for which the crashes of a host are remembered when no more come.
@@ -36,12 +36,12 @@ pub(crate) type Reputation = (bool, bool, bool, bool);
 
 /// Sends quarantined realizations, each alone to a worker that holds nothing. Returns the workers
 /// that are reserved: they receive no other work, so that they soon hold nothing.
-pub(crate) fn hand_out(turn: &mut Turn) -> BTreeSet<WorkerId> {
+pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
         while let Some((index, worker)) = next(turn.state, job, turn.now) {
-            let holds = |worker: &Worker| schedule::held(turn.state, worker) > 0;
+            let holds = |worker: &AttachedWorker| schedule::held(turn.state, worker) > 0;
             if turn.state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
@@ -69,7 +69,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// Chooses the worker of a realization over which `crashes` happened, if there is one. A worker
 /// that has not answered anything yet must first answer other work, if there is any.
 fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
-    let rank = |(id, worker): &(&WorkerId, &Worker)| {
+    let rank = |(id, worker): &(&WorkerId, &AttachedWorker)| {
         let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
     };
@@ -109,7 +109,7 @@ pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
 }
 
 /// Returns the failure of a job with a poison realization, if it has one.
-pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failure> {
+pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
     let waiting = evaluation.quarantine.iter().filter_map(over);
@@ -118,7 +118,7 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<Failur
     let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
     let specification = &state.jobs.get(&job)?.record.specification;
     let case = case_file(specification, &evaluation.point, index);
-    Some(Failure::PoisonRealization { index, workers: crashes.count(), hosts, case })
+    Some(RunFailure::PoisonRealization { index, workers: crashes.count(), hosts, case })
 }
 
 /// Returns a realization as a complete case file, or an empty text if its germs give no elasticity:
@@ -149,7 +149,7 @@ pub(crate) fn crash_limit_reached(
     crashes: &Crashes,
     of: impl Fn(&WorkerName) -> bool,
 ) -> bool {
-    let untried = |worker: &Worker| {
+    let untried = |worker: &AttachedWorker| {
         let (failing, silent, lost, _) = reputation(state, worker, crashes);
         let stayed = crashes.first().is_some_and(|first| worker.attached < first);
         !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
@@ -158,8 +158,8 @@ pub(crate) fn crash_limit_reached(
 }
 
 /// Returns the reputation of a worker for a task over which `crashes` happened.
-pub(crate) fn reputation(state: &State, worker: &Worker, crashes: &Crashes) -> Reputation {
+pub(crate) fn reputation(state: &State, worker: &AttachedWorker, crashes: &Crashes) -> Reputation {
     let host = worker.name.host();
     let silent = state.probation.has(&worker.name);
-    (state.is_failing(host), silent, crashes.are_of(host), !worker.has_answered)
+    (state.is_failing(host), silent, crashes.include_host(host), !worker.has_answered)
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::batch::Purpose;
 use crate::ids::{JobId, WorkerId};
 use crate::job::Job;
-use crate::state::{BATCHES_IN_FLIGHT_MAX, State, Worker};
+use crate::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 use crate::store::JobRecord;
 
 /// Returns whether anything besides quarantined realizations waits to be sent.
@@ -34,7 +34,7 @@ pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<Work
 }
 
 /// Returns the number of batches that a worker holds, without speculative ones.
-pub(crate) fn held(state: &State, worker: &Worker) -> usize {
+pub(crate) fn held(state: &State, worker: &AttachedWorker) -> usize {
     worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
 }
 

@@ -5,7 +5,7 @@
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
 use crate::ids::JobId;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 
 /// Realizations for each slot in a worker's first batch of a job: enough to measure its rate, few
 /// enough to be answered soon.
@@ -19,9 +19,9 @@ const SHARE_DIVISOR: f64 = 4.0;
 /// once: as many as it computes in the target time, at most a quarter of its share. Both limits
 /// give way to one realization for each slot (a realization may take longer than the target, and a
 /// share may hold fewer than four for each slot), but the share itself does not.
-pub(crate) fn batch_size(state: &State, attached: &Worker, job: JobId, queued: u64) -> u64 {
+pub(crate) fn batch_size(state: &State, attached: &AttachedWorker, job: JobId, queued: u64) -> u64 {
     let per_slot = mean_rate_per_slot(state, job);
-    let weight = |worker: &Worker| {
+    let weight = |worker: &AttachedWorker| {
         worker.rates.get(&job).copied().unwrap_or(f64::from(worker.hello.slots) * per_slot)
     };
     let total: f64 = state.workers.values().filter(|it| state.is_sound(it)).map(weight).sum();

@@ -19,7 +19,7 @@ use osteon_common::parameters::Point;
 use super::batches;
 use crate::batch::{Assignment, Purpose};
 use crate::config::Config;
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::ids::{BatchId, JobId};
 use crate::job::{Job, Speculation, Stage};
 use crate::reactor::turn::Turn;
@@ -51,11 +51,11 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
         }
         None => {
             let realizations = job.record.specification.monte_carlo.realizations;
-            Evaluation::new(number, attempt, point, realizations)
+            PendingEvaluation::new(number, attempt, point, realizations)
         }
     };
     let speculates = speculates(&turn.state.config, job);
-    let candidates = if speculates { job.search.likely(CANDIDATES_MAX) } else { Vec::new() };
+    let candidates = if speculates { job.search.candidates(CANDIDATES_MAX) } else { Vec::new() };
     let attempt = evaluation.attempt;
     job.stage = Stage::Computing(evaluation);
     adopt_batches(turn.state, id, attempt);
@@ -79,15 +79,15 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
 
 /// Drops the speculative evaluations of a job that contain answers of a banned worker.
 pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
-    let involves = |evaluation: &Evaluation| {
+    let contributed = |evaluation: &PendingEvaluation| {
         evaluation.workers.contains(name)
-            || evaluation.disputes.iter().any(|dispute| dispute.involves(name))
+            || evaluation.disputes.iter().any(|dispute| dispute.has_vote_of(name))
     };
-    retain(turn, id, |evaluation| !involves(evaluation));
+    retain(turn, id, |evaluation| !contributed(evaluation));
 }
 
 /// Drops the newest speculative evaluations until the limit on realizations in memory is kept.
-pub(crate) fn keep_bound(turn: &mut Turn) {
+pub(crate) fn drop_excess(turn: &mut Turn) {
     while realizations(turn.state) > turn.state.config.active_realizations_max {
         let newest = |id: &JobId| {
             let evaluations = &turn.state.jobs.get(id)?.speculation.evaluations;
@@ -125,8 +125,9 @@ fn adopt_batches(state: &mut State, job: JobId, attempt: u64) {
 
 /// Replaces the candidates of a job, and drops the evaluations of all other points.
 fn keep(turn: &mut Turn, id: JobId, candidates: Vec<Point>) {
-    let stays =
-        |evaluation: &Evaluation| candidates.iter().any(|at| same_point(at, &evaluation.point));
+    let stays = |evaluation: &PendingEvaluation| {
+        candidates.iter().any(|at| same_point(at, &evaluation.point))
+    };
     retain(turn, id, stays);
     if let Some(job) = turn.state.jobs.get_mut(&id) {
         job.speculation.candidates = candidates;
@@ -134,11 +135,11 @@ fn keep(turn: &mut Turn, id: JobId, candidates: Vec<Point>) {
 }
 
 /// Drops the speculative evaluations of a job for which `stays` is false.
-fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&Evaluation) -> bool) {
+fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&PendingEvaluation) -> bool) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    let goes = |evaluation: &Evaluation| !stays(evaluation);
+    let goes = |evaluation: &PendingEvaluation| !stays(evaluation);
     let gone: Vec<u64> = job
         .speculation
         .evaluations
@@ -170,12 +171,12 @@ pub(crate) fn realizations(state: &State) -> u64 {
 
 impl Speculation {
     /// Returns the speculative evaluation of a point.
-    pub(crate) fn at(&self, point: &Point) -> Option<&Evaluation> {
+    pub(crate) fn at(&self, point: &Point) -> Option<&PendingEvaluation> {
         self.evaluations.iter().find(|begun| same_point(&begun.point, point))
     }
 
     /// As [`Speculation::at`].
-    pub(crate) fn at_mut(&mut self, point: &Point) -> Option<&mut Evaluation> {
+    pub(crate) fn at_mut(&mut self, point: &Point) -> Option<&mut PendingEvaluation> {
         self.evaluations.iter_mut().find(|begun| same_point(&begun.point, point))
     }
 }

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use osteon_common::outcome::Solved;
+use osteon_common::outcome::RealizationResult;
 
 use super::checks;
 use crate::batch::{Assignment, Batch, Purpose};
@@ -29,7 +29,7 @@ pub(crate) fn answered(
     turn: &mut Turn,
     worker: WorkerId,
     batch: BatchId,
-    solved: Vec<Solved>,
+    solved: Vec<RealizationResult>,
     elapsed_s: f64,
 ) {
     let Some(attached) = turn.state.workers.get_mut(&worker) else {
@@ -91,7 +91,7 @@ fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
 fn fill(
     state: &mut State,
     assignment: &Assignment,
-    solved: &[Solved],
+    solved: &[RealizationResult],
     by: &WorkerName,
     now: Duration,
 ) {
@@ -112,9 +112,9 @@ fn fill(
 
 /// Updates the rate of a worker and the pace of its job with an answer.
 fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
-    let believed = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
+    let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
-    let rate = batch.assignment.indices.count as f64 / if believed { elapsed_s } else { waited_s };
+    let rate = batch.assignment.indices.count as f64 / if plausible { elapsed_s } else { waited_s };
     let Some(worker) = state.workers.get_mut(&batch.worker) else {
         return;
     };

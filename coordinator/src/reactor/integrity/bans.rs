@@ -3,7 +3,7 @@
 
 use crate::close_reason::CloseReason;
 use crate::effect::{Effect, Record};
-use crate::evaluation::Evaluation;
+use crate::evaluation::PendingEvaluation;
 use crate::ids::{JobId, WorkerId};
 use crate::job::Stage;
 use crate::reactor::dispatch::{batches, speculation};
@@ -18,7 +18,7 @@ pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String
     if turn.state.ban(name).is_some() {
         return;
     }
-    tracing::error!(worker = %name, %job, %reason, "a worker is expelled");
+    tracing::error!(worker = %name, %job, %reason, "a worker is banned");
     let number = turn.state.banned.last().map_or(1, |last| last.record.number + 1);
     let worker = name.clone();
     let record = BanRecord { number, worker, job, reason: reason.clone(), at: turn.now };
@@ -99,8 +99,9 @@ fn compute_again(turn: &mut Turn, id: JobId) {
     };
     let realizations = job.record.specification.monte_carlo.realizations;
     if let Stage::Computing(evaluation) = &mut job.stage {
-        let mut fresh = Evaluation::new(evaluation.number, attempt, evaluation.point, realizations);
-        fresh.before = std::mem::take(&mut evaluation.before);
+        let mut fresh =
+            PendingEvaluation::new(evaluation.number, attempt, evaluation.point, realizations);
+        fresh.stored = std::mem::take(&mut evaluation.stored);
         *evaluation = fresh;
     }
 }

@@ -3,14 +3,14 @@
 
 use std::time::Duration;
 
-use osteon_common::outcome::Solved;
+use osteon_common::outcome::RealizationResult;
 
 use super::bans;
 use crate::audit;
 use crate::batch::Assignment;
-use crate::dispute::{Contradiction, Dispute, Verdict, Vote};
-use crate::evaluation::{Audit, Evaluation};
-use crate::failure::{Failure, shown};
+use crate::dispute::{Contradiction, Dispute, Vote, VoteResult};
+use crate::evaluation::{Audit, PendingEvaluation};
+use crate::failure::{RunFailure, shown};
 use crate::ids::{BatchId, JobId};
 use crate::reactor::dispatch::{overdue, poison};
 use crate::reactor::lifecycle::jobs;
@@ -37,7 +37,7 @@ pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName)
 pub(crate) fn compare(
     turn: &mut Turn,
     assignment: &Assignment,
-    solved: &[Solved],
+    solved: &[RealizationResult],
     by: &WorkerName,
 ) {
     let Some(evaluation) = turn.state.evaluation_of_mut(assignment) else {
@@ -57,7 +57,8 @@ pub(crate) fn compare(
         bans::ban(turn, by, assignment.job, reason);
         return;
     }
-    let known = |dispute: &Dispute| dispute.involves(&earlier.by) && dispute.involves(&later.by);
+    let known =
+        |dispute: &Dispute| dispute.has_vote_of(&earlier.by) && dispute.has_vote_of(&later.by);
     if !evaluation.disputes.iter().any(known) {
         tracing::warn!(job = %assignment.job, one = %earlier.by, other = %later.by,
             first = indices.first, "two workers answer differently; a third decides");
@@ -70,34 +71,34 @@ pub(crate) fn tie_broken(
     turn: &mut Turn,
     batch: BatchId,
     assignment: &Assignment,
-    solved: Vec<Solved>,
+    solved: Vec<RealizationResult>,
     by: &WorkerName,
 ) {
     let of_batch = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
-    let found = |it: &mut Evaluation| it.disputes.iter().position(of_batch);
+    let found = |it: &mut PendingEvaluation| it.disputes.iter().position(of_batch);
     let at = turn.state.evaluation_of_mut(assignment).and_then(found);
     turn.state.settle(batch);
     let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
         return;
     };
     let dispute = &mut evaluation.disputes[at];
-    if let Some(verdict) = dispute.vote(Vote { by: by.clone(), solved }) {
+    if let Some(result) = dispute.vote(Vote { by: by.clone(), solved }) {
         evaluation.disputes.remove(at);
-        execute(turn, assignment.job, verdict);
+        ban_outvoted(turn, assignment.job, result);
     }
 }
 
-/// Bans the workers that a verdict finds wrong.
-fn execute(turn: &mut Turn, job: JobId, verdict: Verdict) {
-    let Verdict { believed: [one, other], liars } = verdict;
-    for Contradiction { index, answers: [(_, right), (liar, wrong)] } in liars {
+/// Bans the workers that were outvoted.
+fn ban_outvoted(turn: &mut Turn, job: JobId, result: VoteResult) {
+    let VoteResult { agreeing: [one, other], outvoted } = result;
+    for Contradiction { index, answers: [(_, right), (worker, wrong)] } in outvoted {
         let reason = format!(
             "answered realization {index} of job {job} with {}, while {one} and {other} agree on \
              {}",
             shown(wrong),
             shown(right)
         );
-        bans::ban(turn, &liar, job, reason);
+        bans::ban(turn, &worker, job, reason);
     }
 }
 
@@ -134,17 +135,17 @@ fn give_up_audits(state: &mut State, job: JobId) {
 }
 
 /// Returns the failure of a job with a dispute that cannot be decided, if there is one.
-fn undecided(state: &State, job: JobId, now: Duration) -> Option<Failure> {
+fn undecided(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
-        let nobody = !state.answers_batches(|name| !dispute.involves(name));
-        let others = |name: &WorkerName| !dispute.involves(name);
+        let nobody = !state.answers_batches(|name| !dispute.has_vote_of(name));
+        let others = |name: &WorkerName| !dispute.has_vote_of(name);
         let lethal = poison::is_poison(state, &dispute.crashes, others, now);
         let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
         !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.contradiction()?);
-    Some(Failure::Contradiction { contradiction, point: evaluation.point })
+    Some(RunFailure::Contradiction { contradiction, point: evaluation.point })
 }

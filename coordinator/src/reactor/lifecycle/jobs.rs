@@ -7,7 +7,7 @@ use osteon_common::results::Status;
 use osteon_common::version::Program;
 
 use crate::effect::{Effect, Record};
-use crate::failure::Failure;
+use crate::failure::RunFailure;
 use crate::ids::JobId;
 use crate::job::{Job, Stage};
 use crate::notice::Notice;
@@ -31,7 +31,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let (number, point) = (evaluation.number, evaluation.point);
     // Only an evaluation that was stored before, with the same outcomes, leaves those after it
     // valid.
-    let is_last = evaluation.changes(&outcomes);
+    let is_last = evaluation.diverges_from_store(&outcomes);
     let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
@@ -43,7 +43,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
 }
 
 /// Ends a job because of `failure`.
-pub(crate) fn fail(turn: &mut Turn, id: JobId, failure: &Failure) {
+pub(crate) fn fail(turn: &mut Turn, id: JobId, failure: &RunFailure) {
     let ending = Ending {
         status: Status::Failed,
         failure: Some(failure.kind()),
@@ -122,7 +122,7 @@ fn begin(turn: &mut Turn, id: JobId) {
         turn.state.shares.begin(&job.record.client);
         turn.state.active.insert(id);
         turn.effects.push(Effect::Note(Notice::JobStarted { job: id, stored: job.stored }));
-        speculation::keep_bound(turn);
+        speculation::drop_excess(turn);
         advance(turn, id);
     }
 }
@@ -158,7 +158,7 @@ pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
     let search = &job.search;
     // A grouped search has no best evaluation of the whole job.
     let best = search.best().filter(|_| !search.is_grouped());
-    let program = Program::this(turn.state.config.commit);
+    let program = Program::current(turn.state.config.commit);
     let record = EndRecord::new(id, ending, program, turn.now, search.evaluations(), best);
     let summary = Arc::new(search.summary());
     turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));

@@ -67,7 +67,7 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
             let answer = Answer::Refused(Refusal::Store { error: error.clone() });
             turn.effects.push(Effect::Answer { token, answer });
         }
-        if let Some(request) = RequestName::of(&job.record) {
+        if let Some(request) = RequestName::from_record(&job.record) {
             turn.state.requests.remove(&request);
         }
         turn.state.jobs.remove(&id);
@@ -130,7 +130,7 @@ fn ended(turn: &mut Turn, id: JobId) {
     }));
     turn.state.ended.insert(id, EndedJob::new(&record, end, sequence));
     turn.state.changed.remove(&id);
-    let Some(snapshot) = snapshot::of(turn.state, id, turn.now) else {
+    let Some(snapshot) = snapshot::job_snapshot(turn.state, id, turn.now) else {
         return;
     };
     for token in tokens {

@@ -5,9 +5,9 @@
 
 use super::{jobs, records};
 use crate::effect::Effect;
-use crate::evaluation::{Before, Evaluation};
+use crate::evaluation::{PendingEvaluation, StoredRecord};
 use crate::event::ReadFailure;
-use crate::failure::Failure;
+use crate::failure::RunFailure;
 use crate::ids::JobId;
 use crate::job::{Stage, StoreRetry};
 use crate::reactor::turn::Turn;
@@ -47,7 +47,7 @@ pub(crate) fn read(
             job.store_trouble = None;
             replay(turn, id, record);
         }
-        Ok(None) => jobs::fail(turn, id, &Failure::Missing { number }),
+        Ok(None) => jobs::fail(turn, id, &RunFailure::Missing { number }),
         Err(ReadFailure::Refused { error }) => read_failed(turn, id, error),
         Err(ReadFailure::Damaged) => recompute(turn, id),
     }
@@ -71,8 +71,8 @@ fn recompute(turn: &mut Turn, id: JobId) {
         Step::Evaluate(point) => {
             let realizations = job.record.specification.monte_carlo.realizations;
             let number = job.search.evaluations();
-            let mut evaluation = Evaluation::new(number, attempt, point, realizations);
-            evaluation.before = Before::Damaged;
+            let mut evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+            evaluation.stored = StoredRecord::Damaged;
             job.stage = Stage::Computing(evaluation);
             job.recomputed = true;
         }
@@ -117,8 +117,8 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
         let realizations = job.record.specification.monte_carlo.realizations;
         match job.search.expects(point) {
             Ok(()) => {
-                let mut evaluation = Evaluation::new(number, attempt, point, realizations);
-                evaluation.before = Before::Stored(outcomes);
+                let mut evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+                evaluation.stored = StoredRecord::Outcomes(outcomes);
                 job.stage = Stage::Computing(evaluation);
             }
             Err(error) => jobs::fail(turn, id, &error.into()),

@@ -25,7 +25,7 @@ const BANNED_SHOWN_MAX: usize = 1000;
 pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
     let answer = match request {
         Request::Submit { specification, request_id, client, priority, name } => {
-            let submission = Submission { specification, request_id, client, priority, name };
+            let submission = SubmittedJob { specification, request_id, client, priority, name };
             match submit(turn, token, submission) {
                 Ok(answer) => answer,
                 Err(refusal) => Some(Answer::Refused(refusal)),
@@ -49,7 +49,7 @@ pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
 }
 
 /// A submitted job.
-struct Submission {
+struct SubmittedJob {
     specification: Arc<JobSpecification>,
     request_id: String,
     client: String,
@@ -61,9 +61,9 @@ struct Submission {
 fn submit(
     turn: &mut Turn,
     token: Token,
-    submission: Submission,
+    submission: SubmittedJob,
 ) -> Result<Option<Answer>, Refusal> {
-    let Submission { specification, request_id, client, priority, name } = submission;
+    let SubmittedJob { specification, request_id, client, priority, name } = submission;
     if turn.state.draining {
         return Err(Refusal::Draining);
     }
@@ -151,7 +151,8 @@ fn resubmit(
 }
 
 fn get(state: &State, job: JobId, now: Duration) -> Answer {
-    snapshot::of(state, job, now).map_or(Answer::Refused(Refusal::NoJob { job }), Answer::Snapshot)
+    snapshot::job_snapshot(state, job, now)
+        .map_or(Answer::Refused(Refusal::NoJob { job }), Answer::Snapshot)
 }
 
 fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Answer {
@@ -160,7 +161,8 @@ fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Ans
     let mut ids: Vec<JobId> = state.ended.range(range).map(|(id, _)| *id).take(limit + 1).collect();
     ids.extend(state.jobs.range(range).map(|(id, _)| *id));
     ids.sort_unstable();
-    let mut listed = ids.into_iter().filter_map(|id| Some((id, snapshot::of(state, id, now)?)));
+    let mut listed =
+        ids.into_iter().filter_map(|id| Some((id, snapshot::job_snapshot(state, id, now)?)));
     let page: Vec<_> = listed.by_ref().take(limit).collect();
     let more_after = listed.next().and_then(|_| page.last().map(|(id, _)| *id));
     Answer::Page { snapshots: page.into_iter().map(|(_, snapshot)| snapshot).collect(), more_after }
@@ -191,7 +193,7 @@ fn fetch(state: &State, id: JobId) -> Answer {
 /// Drains a worker, and returns its snapshot.
 fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
     match workers::send_away(turn, worker) {
-        Ok(()) => worker_list::of(turn.state, worker, turn.now)
+        Ok(()) => worker_list::worker_snapshot(turn.state, worker, turn.now)
             .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
         Err(refusal) => Answer::Refused(refusal),
     }

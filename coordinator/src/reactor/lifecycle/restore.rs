@@ -21,7 +21,7 @@ pub struct Restored {
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
     banned: Vec<BanRecord>,
-    last_forgotten: Option<JobId>,
+    last_deleted_job: Option<JobId>,
 }
 
 impl Restored {
@@ -45,10 +45,10 @@ impl Restored {
             keep_numerics(store, record, evaluations)?;
         }
         if restored.unfinished.is_empty() {
-            store.forget_bans()?;
+            store.delete_bans()?;
         }
         restored.banned = store.bans()?;
-        restored.last_forgotten = store.last_forgotten()?;
+        restored.last_deleted_job = store.last_deleted_job()?;
         Ok(restored)
     }
 }
@@ -95,8 +95,8 @@ impl State {
     /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let Restored { ended, unfinished, banned, last_forgotten } = restored;
-        state.next_job = last_forgotten.map_or(1, |job| job.0 + 1);
+        let Restored { ended, unfinished, banned, last_deleted_job } = restored;
+        state.next_job = last_deleted_job.map_or(1, |job| job.0 + 1);
         let durable = |record| Banned { record, store_at: None, refused: false };
         state.banned = banned.into_iter().map(durable).collect();
         for (id, mut job) in ended {
@@ -107,7 +107,7 @@ impl State {
         }
         for (record, evaluations) in unfinished {
             let id = record.job;
-            state.know(id, RequestName::of(&record));
+            state.know(id, RequestName::from_record(&record));
             state.waiting.push_back(id);
             state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
         }

@@ -10,7 +10,7 @@ use crate::job::sequence;
 use crate::reactor::dispatch::poison;
 use crate::reactor::turn::Turn;
 use crate::snapshot;
-use crate::state::{State, Worker};
+use crate::state::{AttachedWorker, State};
 
 /// Interval at which unfinished jobs are published even if nothing but the time has changed.
 const PUBLISH_EVERY: Duration = Duration::from_secs(1);
@@ -58,7 +58,7 @@ pub(crate) fn expire(turn: &mut Turn) {
 }
 
 /// Returns the reason why the lease of a worker has ended, if it has.
-fn expired(state: &State, worker: &Worker, now: Duration) -> Option<CloseReason> {
+fn expired(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
     let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
         return Some(CloseReason::Expired { silent });
@@ -115,7 +115,7 @@ pub(crate) fn publish(turn: &mut Turn) {
         if let Some(job) = turn.state.jobs.get_mut(&job) {
             job.sequence = sequence(job.sequence, turn.now);
         }
-        if let Some(snapshot) = snapshot::of(turn.state, job, turn.now) {
+        if let Some(snapshot) = snapshot::job_snapshot(turn.state, job, turn.now) {
             turn.effects.push(Effect::Publish { job, snapshot });
         }
     }

@@ -15,7 +15,7 @@ use crate::notice::{Departure, Notice};
 use crate::rate::Rate;
 use crate::reactor::dispatch::{batches, departures, overdue, poison};
 use crate::reactor::turn::Turn;
-use crate::state::{MissedBatches, State, Worker};
+use crate::state::{AttachedWorker, MissedBatches, State};
 use crate::worker_name::WorkerName;
 
 pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
@@ -45,7 +45,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     }));
     turn.state.workers.insert(
         worker,
-        Worker {
+        AttachedWorker {
             lease,
             name,
             hello,

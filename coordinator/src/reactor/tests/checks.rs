@@ -15,15 +15,15 @@ fn rig(realizations: u64, workers: u32) -> Rig {
 }
 
 /// Returns an answer of one realization that differs by `off` from the right one.
-pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: Solved) -> Event {
+pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: RealizationResult) -> Event {
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
     let outcome = Ok(f64::from_bits(right.to_bits() + off_by as u64));
-    let solved = vec![Solved { outcome, estimated_error: off.estimated_error }];
+    let solved = vec![RealizationResult { outcome, estimated_error: off.estimated_error }];
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s: 0.1 }
 }
 
-pub(super) const ONE_BIT: Solved = Solved { outcome: Ok(1.0), estimated_error: 0.0 };
+pub(super) const ONE_BIT: RealizationResult = RealizationResult { outcome: Ok(1.0), estimated_error: 0.0 };
 
 #[test]
 fn an_audited_batch_is_computed_by_another_worker() {
@@ -90,14 +90,14 @@ fn a_third_worker_decides_against_the_first() {
     let effects = rig.event(answer(3, 3, 0, 1));
     // The wrong answer filled the result: the evaluation begins again.
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let banned = format!("store expulsion 1: node (process 1) {JUDGED}");
+    let banned = format!("store ban 1: node (process 1) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
-    assert!(effects[1].starts_with("close 1: this worker is expelled"), "{effects:?}");
+    assert!(effects[1].starts_with("close 1: this worker is banned"), "{effects:?}");
     assert_eq!(effects[2], "send 2: batch 4 = 0+1");
     // The worker stays banned, and its later answers are ignored.
     rig.check(answer(1, 1, 0, 1), &[]);
     let refused = rig.event(hello_of(9, 1, 1));
-    assert!(refused[0].starts_with("close 9: this worker is expelled"), "{refused:?}");
+    assert!(refused[0].starts_with("close 9: this worker is banned"), "{refused:?}");
     rig.check(answer(2, 4, 0, 1), &["send 3: batch 5 = 0+1"]);
     rig.check(answer(3, 5, 0, 1), &["store job 1 evaluation 0"]);
 }
@@ -109,9 +109,9 @@ fn a_third_worker_decides_against_the_second() {
     rig.check(wrong(2, 2, 0, ONE_BIT), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let banned = format!("store expulsion 1: node (process 2) {JUDGED}");
+    let banned = format!("store ban 1: node (process 2) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
-    assert!(effects[1].starts_with("close 2: this worker is expelled"), "{effects:?}");
+    assert!(effects[1].starts_with("close 2: this worker is banned"), "{effects:?}");
     // Its answer filled no result: nothing is computed again.
     assert_eq!(effects[2], "store job 1 evaluation 0");
 }
@@ -120,10 +120,10 @@ fn a_third_worker_decides_against_the_second() {
 fn an_estimated_error_is_an_answer_too() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    let off = Solved { outcome: Ok(0.0), estimated_error: 1e-9 };
+    let off = RealizationResult { outcome: Ok(0.0), estimated_error: 1e-9 };
     rig.check(wrong(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
-    assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
+    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
 }
 
 #[test]
@@ -132,14 +132,14 @@ fn of_two_workers_none_is_believed() {
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     rig.check(wrong(2, 2, 0, ONE_BIT), &[]);
     for worker in [1, 2] {
-        rig.hear(worker);
+        rig.heartbeat(worker);
     }
     rig.check_after(Duration::from_secs(10), &[]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     let waits = "a third worker, which decides between two whose answers differ (since 10 s)";
     assert_eq!(snapshot.waiting_for, waits);
     for worker in [1, 2] {
-        rig.hear(worker);
+        rig.heartbeat(worker);
     }
     rig.now += Duration::from_millis(1);
     let mut effects = rig.event(Event::Tick);
@@ -162,7 +162,7 @@ fn a_third_worker_that_comes_in_time_decides() {
     rig.check(hello_of(3, 2, 1), &["welcome 3, lease 3"]);
     rig.check(hello_of(4, 4, 1), &["welcome 4, lease 4", "send 4: batch 3 = 0+1"]);
     let effects = rig.event(answer(4, 3, 0, 1));
-    let closed = effects.iter().filter(|effect| effect.contains("this worker is expelled"));
+    let closed = effects.iter().filter(|effect| effect.contains("this worker is banned"));
     assert_eq!(closed.count(), 2, "{effects:?}");
 }
 
@@ -177,7 +177,7 @@ fn a_copy_that_answers_differently_is_judged() {
     // The answer of worker 1 had been sent already.
     rig.check(answer(1, 1, 0, 1), &["send 3: batch 5 = 0+1"]);
     let effects = rig.event(answer(3, 5, 0, 1));
-    assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
+    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
 }
 
 #[test]
@@ -186,7 +186,7 @@ fn who_contradicts_itself_needs_no_judge() {
     rig.check(answer(1, 1, 0, 2), &["send 1: batch 3 = 4+1"]);
     rig.check(answer(1, 1, 0, 2), &[]);
     let effects = rig.event(answer(1, 1, 1, 2));
-    let banned = "store expulsion 1: node (process 1) answered realization 0 as 3900 m/s";
+    let banned = "store ban 1: node (process 1) answered realization 0 as 3900 m/s";
     assert!(effects[0].starts_with(banned), "{effects:?}");
-    assert!(effects[3].starts_with("close 1: this worker is expelled"), "{effects:?}");
+    assert!(effects[3].starts_with("close 1: this worker is banned"), "{effects:?}");
 }

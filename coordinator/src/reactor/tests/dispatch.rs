@@ -122,7 +122,7 @@ fn a_sign_of_life_hands_out_nothing() {
     // With thousands of workers heartbeats are frequent; a duplicate is due, but waits for the next
     // tick.
     for worker in [1, 2] {
-        rig.hear(worker);
+        rig.heartbeat(worker);
     }
     rig.check_after(Duration::ZERO, &["send 2: batch 3 = 0+1"]);
 }

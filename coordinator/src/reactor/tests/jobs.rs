@@ -96,7 +96,7 @@ fn another_record_is_written_again_until_it_is_durable() {
     let (failed, retry) = (|| store_failed(1, RecordKey::Evaluation(0)), Duration::from_secs(2));
     rig.check(failed(), &[]);
     rig.check_after(retry / 2, &[]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(
         snapshot.waiting_for,
         "the store cannot write a record; retrying: the disk is full (since 1 s)"
@@ -104,7 +104,7 @@ fn another_record_is_written_again_until_it_is_durable() {
     rig.check_after(retry / 2, &["store job 1 evaluation 0"]);
     rig.check_after(Duration::ZERO, &[]);
     for _ in 0..1000 {
-        rig.hear(1);
+        rig.heartbeat(1);
         rig.check(failed(), &[]);
         rig.check_after(retry, &["store job 1 evaluation 0"]);
     }
@@ -161,7 +161,7 @@ fn a_job_cancelled_while_an_evaluation_is_stored_keeps_the_evaluation() {
     rig.check(request(7, Request::Cancel(JobId(1))), &[]);
     rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: cancelled "]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 1);
 }
 
@@ -171,8 +171,9 @@ fn jobs_beyond_the_active_ones_wait_their_turn() {
     for _ in 0..4 {
         rig.accept(propagation(1));
     }
-    let waiting =
-        |rig: &Rig, job| crate::snapshot::of(&rig.state, JobId(job), rig.now).unwrap().waiting_for;
+    let waiting = |rig: &Rig, job| {
+        crate::snapshot::job_snapshot(&rig.state, JobId(job), rig.now).unwrap().waiting_for
+    };
     assert_eq!(waiting(&rig, 1), "no worker is attached (since 0 s)");
     assert_eq!(waiting(&rig, 4), "its turn: 2 jobs run and 2 wait (since 0 s)");
     rig.check(request(1, Request::Get(JobId(3))), &["answer 1: Waiting Unspecified"]);
@@ -230,14 +231,14 @@ fn a_snapshot_tells_what_is_done() {
     rig.now = Duration::from_secs(2);
     rig.event(answer(1, 1, 0, 4));
     rig.now = Duration::from_secs(4);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!((snapshot.realizations_done, snapshot.realizations), (4, 100));
     assert_eq!((snapshot.evaluations, snapshot.max_evaluations), (0, 1));
     assert_eq!((snapshot.workers, snapshot.elapsed_s), (2, 4.0));
     assert_eq!(snapshot.realizations_per_second, 2.0);
     assert_eq!((snapshot.best_cost, snapshot.waiting_for.as_str()), (None, ""));
     rig.now = Duration::from_secs(8);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(
         snapshot.waiting_for,
         "the answer of node (process 42) to 4 realizations (since 8 s)"

@@ -63,7 +63,7 @@ fn die(rig: &mut Rig, host: &str, worker: u64) {
 fn wait(rig: &mut Rig, time: Duration) -> Vec<String> {
     let workers: Vec<u64> = rig.state.workers.keys().map(|worker| worker.0).collect();
     for worker in workers {
-        rig.hear(worker);
+        rig.heartbeat(worker);
     }
     let mut effects = rig.pass(time);
     effects.retain(|effect| effect.starts_with("store job 1 "));
@@ -89,10 +89,10 @@ fn check_deaths(hosts: &[&str], expected: Option<&str>) {
 #[test]
 fn a_realization_that_was_alone_on_three_lost_workers_fails_its_job() {
     check_deaths(&["a", "b", "c"], None);
-    let expected = "realization 0 was alone on 3 workers that were lost (b, c, d)";
+    let expected = "3 workers (b, c, d) were lost while they computed only realization 0";
     check_deaths(&["a", "b", "c", "d"], Some(expected));
     // With one host only, three processes that had answered something are enough.
-    let expected = "realization 0 was alone on 3 workers that were lost (a)";
+    let expected = "3 workers (a) were lost while they computed only realization 0";
     check_deaths(&["a"; 4], Some(expected));
 }
 
@@ -209,7 +209,8 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
         rig.event(hello_on("bad", worker, process, 1));
         let effects = [wait(&mut rig, Duration::from_secs(1)), rig.event(end_of_stream(worker))];
         if process == 5 {
-            let waits = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap().waiting_for;
+            let waits =
+                crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap().waiting_for;
             let expected = "a reliable worker for 1 realizations over which others were lost; \
                             the last 3 workers of bad were lost with their batches";
             assert_eq!(waits, expected);
@@ -219,7 +220,7 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
             break reason;
         }
     };
-    assert!(reason.contains("was alone on 10 workers that were lost (bad)"), "{reason}");
+    assert!(reason.contains("10 workers (bad) were lost while they computed only"), "{reason}");
     // Ten losses in a row take longer than a few seconds.
     assert!(rig.now > 5 * EXPIRY, "{:?}", rig.now);
     // The case file is complete, and has the realization to the bit.

@@ -50,7 +50,7 @@ impl Rig {
     }
 
     fn waits_for(&self) -> String {
-        crate::snapshot::of(&self.state, JobId(1), self.now).unwrap().waiting_for
+        crate::snapshot::job_snapshot(&self.state, JobId(1), self.now).unwrap().waiting_for
     }
 
     fn batch(&self, batch: u64) -> &crate::batch::Batch {
@@ -144,7 +144,7 @@ fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
     assert_eq!(rig.batch(4).purpose, Purpose::TieBreak);
     let effects = rig.event(answer(4, 4, 0, 1));
     assert_eq!(effects[0], "revoke 3: batch 3");
-    assert!(effects[1].starts_with("store expulsion 1: host 1 (process 1)"), "{effects:?}");
+    assert!(effects[1].starts_with("store ban 1: host 1 (process 1)"), "{effects:?}");
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
     rig.live(OVERDUE);
     rig.check(end_of_stream(3), &[]);
     let evaluation = rig.state.jobs[&JobId(1)].evaluation().unwrap();
-    assert!(evaluation.crashes[&0].are_of("host 3"), "{:?}", evaluation.crashes);
+    assert!(evaluation.crashes[&0].include_host("host 3"), "{:?}", evaluation.crashes);
     assert!(evaluation.quarantine.is_empty());
 }
 
@@ -341,7 +341,7 @@ fn who_does_not_answer_gets_one_realization_at_a_time_and_less_and_less_often() 
     let waiting = |rig: &mut Rig| {
         rig.accept(propagation(4));
         let job = JobId(rig.state.next_job - 1);
-        crate::snapshot::of(&rig.state, job, rig.now).unwrap().waiting_for
+        crate::snapshot::job_snapshot(&rig.state, job, rig.now).unwrap().waiting_for
     };
     // While it gets no work, no job waits for it.
     assert_eq!(waiting(&mut rig), "");

@@ -64,7 +64,7 @@ fn a_restarted_job_reads_one_evaluation_after_another() {
     let started = Effect::Note(Notice::JobStarted { job: JobId(1), stored: 3 });
     assert_eq!(effects, [started, Effect::Read { job: JobId(1), number: 0 }]);
     rig.check(hello(1, 1), &["welcome 1, lease 1"]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 3);
     assert_eq!(snapshot.waiting_for, "its stored evaluations, 0 of 3 are read again");
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
@@ -81,7 +81,7 @@ fn a_store_that_cannot_be_read_is_asked_again() {
     let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
     let mut rig = Rig { state, now: Duration::ZERO };
     rig.check(refused(0), &[]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     let waits = "the store cannot read a record; retrying: the cable is out (since 0 s)";
     assert_eq!(snapshot.waiting_for, waits);
     rig.check_after(Duration::from_secs(2), &["read job 1 evaluation 0"]);
@@ -175,7 +175,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), ["store job 1 end: cancelled "]);
     rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 2);
 }
 
@@ -183,7 +183,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
 fn the_evaluations_of_a_banned_worker_are_computed_again() {
     let (mut rig, store) = rig(&[1, 2], 3);
     let effects = expose(&mut rig, 2);
-    assert!(effects[0].starts_with("store expulsion 1: node (process 2)"), "{effects:?}");
+    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
     // Nothing is read before the ban is durable.
     assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
     rig.check_after(Duration::from_secs(2), &[]);

@@ -59,7 +59,7 @@ fn a_second_hello_ends_the_stream() {
 fn a_silent_worker_loses_its_lease() {
     let mut rig = Rig::with(8, &[1]);
     rig.check_after(Duration::from_secs(9), &[]);
-    rig.hear(1);
+    rig.heartbeat(1);
     rig.check_after(Duration::from_secs(10), &[]);
     let expired = "close 1: no message came from this worker for 10.001s; its lease has ended, \
                    attach again";
@@ -103,10 +103,10 @@ fn signs_of_life_are_given_in_time() {
 fn a_worker_that_lives_but_never_answers_loses_its_lease() {
     let mut rig = Rig::with(8, &[1]);
     for _ in 0..100 {
-        rig.hear(1);
+        rig.heartbeat(1);
         rig.check_after(Duration::from_secs(6), &[]);
     }
-    rig.hear(1);
+    rig.heartbeat(1);
     let closed = "close 1: this worker has not answered any of its batches for 600.1s; its lease \
                   has ended, attach again";
     rig.check_after(Duration::from_millis(100), &[closed]);
@@ -145,7 +145,7 @@ fn answers_to_unknown_batches_mean_nothing() {
     // An unknown batch, and one that another worker holds.
     rig.check(answer(1, 99, 0, 4), &[]);
     rig.check(answer(1, 3, 8, 4), &[]);
-    let snapshot = crate::snapshot::of(&rig.state, JobId(1), rig.now).unwrap();
+    let snapshot = crate::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.realizations_done, 0);
 }
 
@@ -153,14 +153,14 @@ fn answers_to_unknown_batches_mean_nothing() {
 fn the_list_of_workers_says_who_is_there_what_they_hold_and_who_went() {
     let mut rig = Rig::with(1000, &[1, 2]);
     rig.now += Duration::from_secs(3);
-    rig.hear(2);
+    rig.heartbeat(2);
     let list = crate::worker_list::all(&rig.state, rig.now + Duration::from_secs(1));
     let shown: Vec<_> = list
         .workers
         .iter()
-        .map(|it| (it.worker, it.slots, it.silent_s, it.batches, it.oldest_batch_s, it.standing()))
+        .map(|it| (it.worker, it.slots, it.silent_s, it.batches, it.oldest_batch_s, it.state()))
         .collect();
-    let ok = osteon_proto::v1::WorkerStanding::Ok;
+    let ok = osteon_proto::v1::WorkerState::Ok;
     assert_eq!(shown, [(1, 1, 4.0, 2, Some(4.0), ok), (2, 2, 1.0, 2, Some(4.0), ok)]);
     assert_eq!(list.workers[0].realizations_per_second, 0.0);
     assert_eq!(list.departed, []);

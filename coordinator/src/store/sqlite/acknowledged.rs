@@ -51,7 +51,7 @@ pub(super) struct Mark {
 
 /// Contents of a mark file.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Found {
+pub(super) enum MarkFile {
     /// The file does not exist.
     Nothing,
     /// The file is not a valid mark.
@@ -65,12 +65,12 @@ impl Mark {
     ///
     /// # Errors
     /// When it cannot be read.
-    pub(super) fn find(directory: &Path) -> Result<Found, StoreError> {
+    pub(super) fn find(directory: &Path) -> Result<MarkFile, StoreError> {
         let path = directory.join(MARK);
         match user_file::read(&path, LENGTH) {
             Ok(Some(bytes)) => Ok(found(&bytes)),
-            Ok(None) => Ok(Found::Damaged),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Found::Nothing),
+            Ok(None) => Ok(MarkFile::Damaged),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(MarkFile::Nothing),
             Err(error) => Err(StoreError::Mark { path, error }),
         }
     }
@@ -80,11 +80,11 @@ impl Mark {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(super) fn open(directory: &Path, found: &Found, last: u64) -> Result<Self, StoreError> {
+    pub(super) fn open(directory: &Path, found: &MarkFile, last: u64) -> Result<Self, StoreError> {
         let path = directory.join(MARK);
         let open = || -> io::Result<(File, u64)> {
             let slot = match *found {
-                Found::Job { last: said, slot } if said == last => slot,
+                MarkFile::Job { last: said, slot } if said == last => slot,
                 _ => {
                     make(directory, &path, last)?;
                     0
@@ -131,7 +131,7 @@ impl Mark {
 /// # Errors
 /// When the mark `found` shows that jobs are missing, or is damaged, unless that is accepted.
 pub(super) fn checked(
-    found: &Found,
+    found: &MarkFile,
     known: u64,
     store: &Path,
     lost: LostJobs,
@@ -139,17 +139,20 @@ pub(super) fn checked(
     let path = store.to_owned();
     let (refusal, last) = match *found {
         // A new store, or a copy of the database alone.
-        Found::Nothing => return Ok(known),
-        Found::Job { last, .. } if last <= known => return Ok(known),
-        Found::Job { last, .. } => {
+        MarkFile::Nothing => return Ok(known),
+        MarkFile::Job { last, .. } if last <= known => return Ok(known),
+        MarkFile::Job { last, .. } => {
             (StoreError::LostJobs { path, first: JobId(known + 1), last: JobId(last) }, last)
         }
-        Found::Damaged => (StoreError::MarkDamaged { path: store.with_file_name(MARK) }, known),
+        MarkFile::Damaged => (StoreError::MarkDamaged { path: store.with_file_name(MARK) }, known),
     };
     match lost {
         LostJobs::Refuse => Err(refusal),
         LostJobs::Accept => {
-            tracing::error!("{refusal}: that is accepted, the coordinator goes on");
+            tracing::error!(
+                "{refusal}: accepted, because of --accept-lost-jobs; the coordinator \
+                             continues"
+            );
             Ok(last)
         }
     }
@@ -181,7 +184,7 @@ fn text(last: u64) -> Vec<u8> {
 }
 
 /// Returns the highest job of the intact slots.
-fn found(bytes: &[u8]) -> Found {
+fn found(bytes: &[u8]) -> MarkFile {
     let slots = bytes.chunks(SLOT_BYTES).zip(0_u64..);
     let whole = slots.filter_map(|(bytes, slot)| {
         let line = str::from_utf8(bytes).ok()?.lines().next()?;
@@ -190,8 +193,8 @@ fn found(bytes: &[u8]) -> Found {
         (text(last) == bytes).then_some((last, slot))
     });
     match whole.max() {
-        Some((last, slot)) if bytes.len() as u64 == LENGTH => Found::Job { last, slot },
-        _ => Found::Damaged,
+        Some((last, slot)) if bytes.len() as u64 == LENGTH => MarkFile::Job { last, slot },
+        _ => MarkFile::Damaged,
     }
 }
 
@@ -199,7 +202,7 @@ fn found(bytes: &[u8]) -> Found {
 mod tests {
     use super::*;
 
-    fn said(directory: &Path) -> Found {
+    fn read_mark(directory: &Path) -> MarkFile {
         Mark::find(directory).unwrap()
     }
 
@@ -207,14 +210,14 @@ mod tests {
     fn a_mark_says_the_last_job_whatever_a_torn_write_leaves() {
         let directory = tempfile::tempdir().unwrap();
         let directory = directory.path();
-        assert_eq!(said(directory), Found::Nothing);
-        let mut mark = Mark::open(directory, &Found::Nothing, 0).unwrap();
-        assert_eq!(said(directory), Found::Job { last: 0, slot: 1 });
+        assert_eq!(read_mark(directory), MarkFile::Nothing);
+        let mut mark = Mark::open(directory, &MarkFile::Nothing, 0).unwrap();
+        assert_eq!(read_mark(directory), MarkFile::Job { last: 0, slot: 1 });
         let path = directory.join(MARK);
         for job in 1..5 {
             let before = fs::read(&path).unwrap();
             mark.acknowledge(JobId(job)).unwrap();
-            let Found::Job { last, slot } = said(directory) else { panic!("damaged") };
+            let MarkFile::Job { last, slot } = read_mark(directory) else { panic!("damaged") };
             assert_eq!(last, job);
             let after = fs::read(&path).unwrap();
             // Any part of the slot may have reached the disk.
@@ -223,31 +226,31 @@ mod tests {
                 let mut bytes = before.clone();
                 let begin = usize::try_from(slot).unwrap() * SLOT_BYTES;
                 bytes[begin..torn].copy_from_slice(&after[begin..torn]);
-                let Found::Job { last, .. } = found(&bytes) else { panic!("{cut}") };
+                let MarkFile::Job { last, .. } = found(&bytes) else { panic!("{cut}") };
                 assert!(last == job || last == job - 1, "{cut}: {last}");
             }
         }
         drop(mark);
         // The next run continues in the other slot.
-        let found = said(directory);
+        let found = read_mark(directory);
         let mut mark = Mark::open(directory, &found, 4).unwrap();
         mark.acknowledge(JobId(3)).unwrap();
-        assert_eq!(said(directory), found);
+        assert_eq!(read_mark(directory), found);
         mark.acknowledge(JobId(5)).unwrap();
-        assert!(matches!(said(directory), Found::Job { last: 5, .. }));
+        assert!(matches!(read_mark(directory), MarkFile::Job { last: 5, .. }));
     }
 
     #[test]
     fn what_is_no_mark_is_damaged() {
         let whole = [text(7), text(8)].concat();
-        assert_eq!(found(&whole), Found::Job { last: 8, slot: 1 });
+        assert_eq!(found(&whole), MarkFile::Job { last: 8, slot: 1 });
         let mut other = whole.clone();
         other[23] = b'9';
-        assert_eq!(found(&other), Found::Job { last: 8, slot: 1 });
+        assert_eq!(found(&other), MarkFile::Job { last: 8, slot: 1 });
         let mut neither = other.clone();
         neither[SLOT_BYTES + 23] = b'9';
         for bytes in [&neither[..], b"", &whole[..SLOT_BYTES], &[b'\0'; 2 * SLOT_BYTES]] {
-            assert_eq!(found(bytes), Found::Damaged);
+            assert_eq!(found(bytes), MarkFile::Damaged);
         }
     }
 }

@@ -105,7 +105,7 @@ mod tests {
         copy.read_to_end(&mut bytes).unwrap();
         fs::write(directory.path().join(opening::FILE), bytes).unwrap();
         let mut store = SqliteStore::open(directory.path()).unwrap();
-        (store.jobs().unwrap(), store.last_forgotten().unwrap())
+        (store.jobs().unwrap(), store.last_deleted_job().unwrap())
     }
 
     #[test]
@@ -129,11 +129,11 @@ mod tests {
             .unwrap();
         assert!(pieces > 2, "{pieces} pieces");
         assert!(!directory.path().join(COPY).exists());
-        let (jobs, last_forgotten) = restored(copy.unwrap());
+        let (jobs, last_deleted_job) = restored(copy.unwrap());
         assert_eq!(jobs, store.jobs().unwrap());
         assert_eq!(jobs.len(), 2);
         assert_eq!((jobs[0].evaluations, &jobs[1].record), (101, &job(2)));
-        assert_eq!(last_forgotten, Some(crate::ids::JobId(7)));
+        assert_eq!(last_deleted_job, Some(crate::ids::JobId(7)));
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::schema::SCHEMA;
 use crate::store::StoreError;
 
 /// The only format that this program reads and writes.
-pub(super) const FORMAT: i64 = 6;
+pub(super) const FORMAT: i64 = 7;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the lock file, which names the process that has the store open.
@@ -57,9 +57,8 @@ pub(super) fn open<T>(
     let journal = if network.is_some() { Journal::Rollback } else { Journal::WriteAhead };
     if let Some(kind) = network {
         tracing::warn!(directory = %directory.display(), kind,
-            "the store lies on a network file system, where locks cannot always be relied on: \
-             make sure that no coordinator of another machine uses it; a local disk is safer and \
-             faster");
+            "the store is on a network file system, where locks are not always reliable: make \
+             sure that no coordinator on another machine uses it; a local disk is safer and faster");
     }
     let (connection, accepted) = open_file(&path, journal, accept)?;
     Ok((connection, lock, path, accepted))

@@ -10,7 +10,7 @@ pub(super) const SCHEMA: &str = "
         fingerprint TEXT NOT NULL,       -- of the numerics of its evaluations
         client TEXT NOT NULL,
         priority INTEGER NOT NULL,
-        name TEXT NOT NULL,              -- what people call it
+        name TEXT NOT NULL,              -- for display
         checksum BLOB NOT NULL
     );
     CREATE TABLE evaluation (
@@ -38,14 +38,14 @@ pub(super) const SCHEMA: &str = "
         best_coefficient_of_variation REAL,
         checksum BLOB NOT NULL
     );
-    CREATE TABLE summary (               -- what an ended job's path came to
+    CREATE TABLE summary (               -- results of an ended job
         job INTEGER PRIMARY KEY REFERENCES job(id),
         digest TEXT NOT NULL,
         best INTEGER,                    -- number of the best evaluation
         history BLOB NOT NULL,           -- osteon.v1.HistoryBlock
         checksum BLOB NOT NULL
     );
-    CREATE TABLE expulsion (             -- workers that were found to compute wrongly
+    CREATE TABLE ban (                    -- workers that were found to compute wrongly
         number INTEGER PRIMARY KEY,
         host TEXT NOT NULL,
         process INTEGER NOT NULL,

@@ -7,9 +7,9 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
-use osteon_common::results::{EstimatedError, GroupEnding, Role, Status};
+use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status};
 
-use super::acknowledged::Found;
+use super::acknowledged::MarkFile;
 use super::opening::{FILE, Journal, open_file};
 use super::*;
 
@@ -87,11 +87,11 @@ fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord
 pub(super) fn summary(job: u64) -> Summary {
     let row = |number| osteon_common::results::Evaluation {
         number,
-        role: Role { group: 1, start: 2, varied: None },
+        role: EvaluationRole { group: 1, start: 2, varied: None },
         point: evaluation(job, number).point,
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
-        failures: FailureCounts::of(&evaluation(job, number).outcomes),
+        failures: FailureCounts::from_outcomes(&evaluation(job, number).outcomes),
         estimated_error: evaluation(job, number).estimated_error,
     };
     let ending = |best| GroupEnding { status: Status::Converged, reason: None, best };
@@ -133,14 +133,14 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.job(JobId(3)).unwrap(), None);
     assert_eq!(store.bans().unwrap(), [ban(1)]);
     // Only process 0 has computed evaluation 1 of job 1, which has ended.
-    let ended_with = |store: &mut SqliteStore, host, process| {
-        store.ended_with(&WorkerName::new(host, process, 0)).unwrap()
+    let ended_jobs_of = |store: &mut SqliteStore, host, process| {
+        store.ended_jobs_of(&WorkerName::new(host, process, 0)).unwrap()
     };
-    assert_eq!(ended_with(&mut store, "a node", 0), [JobId(1)]);
+    assert_eq!(ended_jobs_of(&mut store, "a node", 0), [JobId(1)]);
     for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
-        assert_eq!(ended_with(&mut store, host, process), [], "{process} {host}");
+        assert_eq!(ended_jobs_of(&mut store, host, process), [], "{process} {host}");
     }
-    store.forget_bans().unwrap();
+    store.delete_bans().unwrap();
     assert_eq!(store.bans().unwrap(), []);
 }
 
@@ -332,7 +332,7 @@ fn with_a_rollback_journal_everything_is_the_same() {
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
-    let mark = Mark::open(directory.path(), &Found::Nothing, 0).unwrap();
+    let mark = Mark::open(directory.path(), &MarkFile::Nothing, 0).unwrap();
     let mut store = SqliteStore { connection, path, lock, mark: mark.into() };
     store.put_evaluation(&evaluation(1, 0), true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
@@ -353,7 +353,7 @@ fn a_job_whose_mark_fails_is_refused_and_does_not_keep_the_store_from_opening() 
     store.mark.borrow_mut().acknowledge(JobId(2)).unwrap();
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
-    assert_eq!(store.last_forgotten().unwrap(), Some(JobId(2)));
+    assert_eq!(store.last_deleted_job().unwrap(), Some(JobId(2)));
 }
 
 #[test]
@@ -417,7 +417,7 @@ fn every_damaged_record_is_named() {
         ("UPDATE job SET priority = 1", DamagedRecord::Specification),
         ("UPDATE evaluation SET workers = '1 a'", DamagedRecord::Evaluation(7)),
         ("UPDATE evaluation SET workers = ''", DamagedRecord::Evaluation(7)),
-        ("UPDATE expulsion SET host = 'other'", DamagedRecord::Ban),
+        ("UPDATE ban SET host = 'other'", DamagedRecord::Ban),
         ("UPDATE ending SET status = 'done'", DamagedRecord::End),
         ("UPDATE ending SET status = 'converged'", DamagedRecord::End),
         ("UPDATE ending SET failure = NULL", DamagedRecord::End),

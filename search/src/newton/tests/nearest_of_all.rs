@@ -97,7 +97,7 @@ impl Solutions {
 fn distances(start: &[f64; 7], seed: u64) -> (f64, f64) {
     let space = all_free(start);
     let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
-    assert_eq!(found.stop, Stop::CostReached, "{start:?}: {found:?}");
+    assert_eq!(found.stop, StopReason::CostReached, "{start:?}: {found:?}");
     let distance = norm(&subtract(&found.at, &space.start()));
     (distance, Solutions::of(space).least(&found.at, seed))
 }
@@ -177,7 +177,7 @@ fn only_what_is_clearly_nearer_is_taken() {
         let space = all_free(&start);
         let start = space.start();
         let mut model = Model::new(space, start.clone(), [0.0; 2]);
-        model.settle_on(&start, logarithms(rule(&space.point(&start))));
+        model.make_exact_at(&start, logarithms(rule(&space.point(&start))));
         let (alone, all) = (model.nearest_from_here(&start, data), model.nearest(&start, data));
         if alone != all {
             taken += 1;

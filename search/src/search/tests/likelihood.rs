@@ -49,7 +49,7 @@ fn a_likelihood_finds_what_made_the_data() {
         let moments = JobSpecification { objective: Objective::Moments, ..job.clone() };
         for (job, sums) in [(job, &mut found), (moments, &mut by_moments)] {
             let search = run_on_speeds(&job);
-            assert_eq!(ending(&search), Ending::of_search(Status::Converged, None));
+            assert_eq!(ending(&search), Ending::from_search(Status::Converged, None));
             assert!(search.evaluations() < 250, "{}", search.evaluations());
             let best = search.best().unwrap().point;
             sums[0] += (best.0[1] / truth.0[1] - 1.0) / 30.0;
@@ -66,7 +66,7 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
     let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let job = by_likelihood(&truth, 5, 100);
     let search = run_on_speeds(&job);
-    let best = search.result(&ending(&search), &Program::this(None)).best.unwrap();
+    let best = search.result(&ending(&search), &Program::current(None)).best.unwrap();
     // ln(107 √(2πe)) = 6.09, by a sample of 100.
     assert!((5.9..6.3).contains(&best.cost.unwrap()), "{:?}", best.cost);
     assert!((1e-5..0.05).contains(&best.cost_error.unwrap()), "{:?}", best.cost_error);
@@ -80,8 +80,8 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
         again.replay(row.point, speeds(&job.monte_carlo, &row.point), ERRORS).unwrap();
     }
     assert_eq!(
-        again.result(&ending(&again), &Program::this(None)),
-        search.result(&ending(&search), &Program::this(None))
+        again.result(&ending(&again), &Program::current(None)),
+        search.result(&ending(&search), &Program::current(None))
     );
 }
 
@@ -127,5 +127,5 @@ fn velocities_that_are_all_the_same_have_no_likelihood() {
     }
     let Ending { status, reason, .. } = ending(&search);
     assert_eq!(status, Status::Failed);
-    assert!(reason.unwrap().contains("every velocity of the first point is the same"));
+    assert!(reason.unwrap().contains("all velocities at the first point are equal"));
 }

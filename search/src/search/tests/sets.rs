@@ -56,7 +56,7 @@ fn without_derivatives_the_search_ends_with_the_method() {
     specification.search.sensitivities = false;
     let (search, _) = run(&specification);
     assert_eq!(
-        search.result(&ending(&search), &Program::this(None)).evaluations,
+        search.result(&ending(&search), &Program::current(None)).evaluations,
         search.history().len() as u64
     );
 }
@@ -118,18 +118,21 @@ fn grouped(means: &[f64]) -> JobSpecification {
 fn each_group_is_identified_by_itself() {
     let means = [3800.0, 3900.0, 4000.0];
     let (search, told) = run(&grouped(&means));
-    assert_eq!(ending(&search), Ending::of_search(Status::Converged, None));
+    assert_eq!(ending(&search), Ending::from_search(Status::Converged, None));
     let summary = search.summary();
     assert_eq!((summary.best, summary.groups.len()), (None, 3));
     for (k, (group, mean)) in summary.groups.iter().zip(means).enumerate() {
         let row = &summary.history[usize::try_from(group.best.unwrap()).unwrap()];
-        assert_eq!(row.role, Role { group: u32::try_from(k).unwrap(), ..Role::default() });
+        assert_eq!(
+            row.role,
+            EvaluationRole { group: u32::try_from(k).unwrap(), ..EvaluationRole::default() }
+        );
         assert!((row.point.0[1] / (17.7e9 * mean / 3900.0) - 1.0).abs() < 1e-5, "{row:?}");
     }
     // All begin at the start of the job.
     let firsts = (0..3).map(|k| summary.history.iter().find(|row| row.role.group == k).unwrap());
     assert!(firsts.into_iter().all(|row| row.point == told[0].0));
-    assert_eq!(search.result(&ending(&search), &Program::this(None)).best, None);
+    assert_eq!(search.result(&ending(&search), &Program::current(None)).best, None);
 }
 
 #[test]
@@ -178,7 +181,8 @@ fn several_starts_give_several_answers() {
 fn more_starts_go_on_after_those_of_another_job() {
     let started_at = |first_start, starts: u32| -> Vec<Point> {
         let mut specification = by_newton(60);
-        specification.search = Search { first_start, starts: starts.into(), ..specification.search };
+        specification.search.first_start = first_start;
+        specification.search.starts = starts.into();
         let (search, _) = run(&specification);
         let first = |start| search.history().iter().find(|row| row.role.start == start);
         (0..starts).map(|start| first(start).unwrap().point).collect()
@@ -202,7 +206,7 @@ fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
     let (left, right): (&[f64], &[f64]) = (&[3850.0, 3900.0, 3990.0], &[3800.0, 3900.0, 3950.0]);
     let whole = job_of(&[("left", left), ("right", right)]);
     let (known, _) = run(&whole);
-    let known = known.result(&ending(&known), &Program::this(None));
+    let known = known.result(&ending(&known), &Program::current(None));
     let one: &[f64] = &[3900.0];
     let same: &[f64] = &[3950.0, 3950.0, 3950.0];
     for (place, unsearched, expected) in [
@@ -216,7 +220,7 @@ fn a_group_that_cannot_be_searched_takes_nothing_from_the_others() {
         let specification = job_of(&groups);
         let (search, _) = run(&specification);
         let summary = search.summary();
-        let found = search.result(&ending(&search), &Program::this(None));
+        let found = search.result(&ending(&search), &Program::current(None));
         assert_eq!((&found.digest, found.evaluations), (&known.digest, known.evaluations));
         assert_eq!(specification.evaluations_max(), whole.evaluations_max());
         // Each evaluation is for the group whose number it has.

@@ -26,7 +26,7 @@ use crate::vector::Vector;
 /// Real numbers per node: real parts, then imaginary parts, of three displacements.
 pub(in crate::hybrid) const SOLID: usize = 6;
 /// A node.
-pub(super) type Node = [Lanes; SOLID];
+pub(super) type ElementNode = [Lanes; SOLID];
 
 /// The bone between its fluids.
 #[derive(Debug, Clone)]
@@ -64,8 +64,8 @@ struct Coefficients {
 /// Scratch memory of one element: even and odd parts of u, of its slope and of its bend.
 #[derive(Debug, Clone)]
 pub(in crate::hybrid) struct Scratch {
-    even: [[Node; 3]; HALF],
-    odd: [[Node; 3]; HALF],
+    even: [[ElementNode; 3]; HALF],
+    odd: [[ElementNode; 3]; HALF],
 }
 
 impl Default for Scratch {
@@ -166,7 +166,7 @@ impl SolidLayer {
     #[inline(always)]
     fn derivatives<const N: usize, V: Vector>(
         &self,
-        u: &[Node],
+        u: &[ElementNode],
         scratch: &mut Scratch,
         (c, part): (usize, usize),
     ) {
@@ -215,7 +215,7 @@ impl SolidLayer {
         &self,
         coefficients: &Coefficients,
         scratch: &Scratch,
-        out: &mut [Node],
+        out: &mut [ElementNode],
         part: usize,
     ) {
         let n = if N == 0 { self.count } else { N };
@@ -240,10 +240,10 @@ impl SolidLayer {
     fn force<V: Vector>(
         &self,
         coefficients: &Coefficients,
-        [u, y, z]: &[Node; 3],
+        [u, y, z]: &[ElementNode; 3],
         part: usize,
     ) -> [V; SOLID] {
-        let at = |node: &Node, c: usize| V::load(&node[c], part);
+        let at = |node: &ElementNode, c: usize| V::load(&node[c], part);
         let mut force = [V::splat(0.0); SOLID];
         for i in 0..3 {
             let a33 = V::splat(self.a33[i]);
@@ -266,7 +266,7 @@ impl SolidLayer {
     /// Adds ik A31 u / (ρ w J), the boundary term of the summation by parts at the lower face; with
     /// -k, at the upper.
     #[inline(always)]
-    fn edge(&self, k: Lanes, u: &Node, out: &mut Node) {
+    fn edge(&self, k: Lanes, u: &ElementNode, out: &mut ElementNode) {
         for i in 0..3 {
             for m in 0..3 {
                 let edge = k * Lanes::splat(self.edge[i][m]);

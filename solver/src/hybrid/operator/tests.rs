@@ -5,7 +5,7 @@ use osteon_common::realization::Ensemble;
 use super::*;
 use crate::hybrid::mesh::LayerMesh;
 use crate::hybrid::scope::Scope;
-use crate::hybrid::stepping::{State, stability_limit};
+use crate::hybrid::stepping::{WaveState, stability_limit};
 use crate::lanes::LANES;
 use crate::vector::Scalar;
 
@@ -24,7 +24,12 @@ fn setup() -> Setup {
 }
 
 fn mesh() -> Mesh {
-    Mesh::with_sizes(&setup(), &Scope::whole(&setup(), 4500.0), 6, [0.7e-3, 0.9e-3, 0.8e-3])
+    Mesh::with_sizes(
+        &setup(),
+        &Scope::until_direct_wave(&setup(), 4500.0),
+        6,
+        [0.7e-3, 0.9e-3, 0.8e-3],
+    )
 }
 
 fn wavenumbers() -> Lanes {
@@ -123,14 +128,14 @@ fn the_operator_is_self_adjoint_and_not_positive() {
 fn energy_without_source_is_conserved() {
     let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
-    let mut state = State::default();
+    let mut state = WaveState::default();
     let step = 0.9 * stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
     state.rest(&operator);
     state.now = noise(&operator, 3);
     state.before = noise(&operator, 4);
     // The scheme is x⁺ - 2x + x⁻ = step² B x with B = A + step²/12 A², and keeps
     // |x⁺ - x|² - step² (x⁺, B x).
-    let energy = |state: &State| {
+    let energy = |state: &WaveState| {
         let once = applied(&operator, k, &state.before);
         let twice = applied(&operator, k, &once);
         let bent: Vec<Lanes> = once
@@ -159,7 +164,7 @@ fn energy_without_source_is_conserved() {
 fn driven<const C: usize>() -> Vec<Lanes> {
     let operator = Operator::<C>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
-    let mut state = State::default();
+    let mut state = WaveState::default();
     let step = stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
     let load = |n: usize| {
         let t = n as f64 * step / 0.3e-6 - 6.1;
@@ -192,7 +197,7 @@ fn the_pressure_in_fluid_1_is_real_for_a_triclinic_bone() {
 fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
     let operator = Operator::<1>::new(&setup(), &bone(), &mesh());
     let k = Lanes::splat(4900.0);
-    let mut state = State::default();
+    let mut state = WaveState::default();
     let limit = stability_limit::<Scalar, _>(&operator, 4900.0, &mut state);
     for (share, stable) in [(1.0, true), (1.05, false)] {
         state.rest(&operator);

@@ -59,7 +59,7 @@ fn known(name: &str, modulus: f64) -> Value {
 #[test]
 fn a_table_of_groups_shows_intervals_and_reasons() {
     let mut outlier = known("P02", 2.5e10);
-    outlier["reason"] = json!("settled at a cost of 7.644e-1, above cost_tolerance 1e-12");
+    outlier["reason"] = json!("converged at a cost of 7.644e-1, above cost_tolerance 1e-12");
     let unknown = |value: f64| json!({ "value": value, "interval": null });
     let nothing = json!({
         "matched": false,

@@ -6,7 +6,7 @@ use crate::client::ClientError;
 
 /// Outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ending {
+pub(crate) enum ExitStatus {
     /// The command succeeded: exit code 0.
     Done,
     /// There is a result, which says that the run failed or was cancelled: exit code 1.
@@ -15,7 +15,7 @@ pub(crate) enum Ending {
 
 /// Reason why a command did not run to its end.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub(crate) enum CommandFailure {
     /// Bad usage or bad input; nothing was started. Exit code 2.
     BadInput(anyhow::Error),
     /// Any other error. Exit code 1.
@@ -46,7 +46,7 @@ impl Interruption {
     }
 }
 
-impl Failure {
+impl CommandFailure {
     /// Creates the failure of bad usage or bad input.
     pub(crate) fn bad_input(error: impl Into<anyhow::Error>) -> Self {
         Self::BadInput(error.into())
@@ -87,7 +87,7 @@ impl Failure {
     }
 }
 
-impl fmt::Display for Failure {
+impl fmt::Display for CommandFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::BadInput(error) | Self::Failed(error) => {
@@ -110,18 +110,18 @@ impl fmt::Display for Failure {
     }
 }
 
-impl From<ClientError> for Failure {
+impl From<ClientError> for CommandFailure {
     fn from(error: ClientError) -> Self {
         if error.is_bad_input() { Self::bad_input(error) } else { Self::failed(error) }
     }
 }
 
 /// Converts an error of writing to stdout.
-pub(crate) fn stdout_failure(error: std::io::Error) -> Failure {
+pub(crate) fn stdout_failure(error: std::io::Error) -> CommandFailure {
     if error.kind() == std::io::ErrorKind::BrokenPipe {
-        return Failure::ClosedPipe;
+        return CommandFailure::ClosedPipe;
     }
-    Failure::failed(anyhow::Error::new(error).context("cannot write to stdout"))
+    CommandFailure::failed(anyhow::Error::new(error).context("cannot write to stdout"))
 }
 
 #[cfg(test)]
@@ -131,11 +131,12 @@ mod tests {
     #[test]
     fn causes_are_told_once() {
         let cause = std::io::Error::other("disk full");
-        let failure = Failure::failed(anyhow::Error::new(cause).context("cannot write DIR"));
+        let failure = CommandFailure::failed(anyhow::Error::new(cause).context("cannot write DIR"));
         assert_eq!(failure.to_string(), "cannot write DIR: disk full");
         assert_eq!(failure.exit_code(), 1);
         let cause = std::io::Error::other("disk full");
-        let failure = Failure::bad_input(anyhow::Error::new(cause).context("refused: disk full"));
+        let failure =
+            CommandFailure::bad_input(anyhow::Error::new(cause).context("refused: disk full"));
         assert_eq!(failure.to_string(), "refused: disk full");
         assert_eq!(failure.exit_code(), 2);
     }
@@ -144,7 +145,7 @@ mod tests {
     fn a_path_is_bad_input_where_another_would_do() {
         let code = |kind| {
             let error = std::io::Error::from(kind);
-            let failure = Failure::unusable_path(error, "cannot write DIR".to_owned());
+            let failure = CommandFailure::unusable_path(error, "cannot write DIR".to_owned());
             assert!(failure.to_string().starts_with("cannot write DIR: "), "{failure}");
             failure.exit_code()
         };
@@ -162,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_signal_has_the_code_that_shells_give_it() {
-        let failure = |interruption| Failure::Interrupted(interruption, "nothing was saved");
+        let failure = |interruption| CommandFailure::Interrupted(interruption, "nothing was saved");
         let (interrupted, terminated) =
             (failure(Interruption::Interrupted), failure(Interruption::Terminated));
         assert_eq!(interrupted.to_string(), "interrupted; nothing was saved");

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 
-use super::{Plan, Search, Step};
+use super::{Search, SearchPlan, Step};
 
 impl Search {
     /// Returns at most `most` points that the search may ask for after the pending one, the most
     /// probable first.
-    pub fn likely(&self, most: usize) -> Vec<Point> {
+    pub fn candidates(&self, most: usize) -> Vec<Point> {
         match (&self.plan, self.ask()) {
-            (Plan::Identification(identification), Step::Evaluate(point)) => {
-                distinct(identification.likely(most), Some(point))
+            (SearchPlan::Identification(identification), Step::Evaluate(point)) => {
+                distinct(identification.candidates(most), Some(point))
             }
             _ => Vec::new(),
         }
@@ -24,20 +24,20 @@ impl Search {
     /// pending point, followed by candidates after that one; at most `most` points, the most
     /// probable first. The assessment of the outcomes is cached until they are passed to `tell`.
     pub fn candidates_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
-        let (Plan::Identification(identification), Step::Evaluate(point)) =
+        let (SearchPlan::Identification(identification), Step::Evaluate(point)) =
             (&self.plan, self.ask())
         else {
             return Vec::new();
         };
-        let judged = self.judge(&point, outcomes);
-        let row = self.row(point, &judged);
-        let mut told = identification.clone();
-        told.tell(&self.specification, row, judged.verdict, Arc::clone(outcomes));
-        self.judged = Some(judged);
-        let Some(next) = told.point() else {
+        let assessment = self.assess(&point, outcomes);
+        let row = self.row(point, &assessment);
+        let mut after = identification.clone();
+        after.tell(&self.specification, row, assessment.statistics, Arc::clone(outcomes));
+        self.assessment = Some(assessment);
+        let Some(next) = after.point() else {
             return Vec::new();
         };
-        let others = told.likely(most.saturating_sub(1));
+        let others = after.candidates(most.saturating_sub(1));
         distinct([next].into_iter().chain(others), None)
     }
 }

@@ -1,5 +1,5 @@
-//! `Store` for the owner of a `SqliteStore`. Each method calls that of the shared reference, so
-//! that others may use the store between two pieces of a copy.
+//! The trait `Store` of a `SqliteStore`. Each method calls the one of the same name that takes a
+//! shared reference, because a copy of the store uses it while other commands run in between.
 
 use std::fs::File;
 
@@ -8,7 +8,7 @@ use osteon_search::Summary;
 use super::SqliteStore;
 use crate::ids::JobId;
 use crate::store::{
-    BanRecord, Between, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use crate::worker_name::WorkerName;
 
@@ -57,8 +57,8 @@ impl Store for SqliteStore {
         (&*self).delete_jobs(jobs)
     }
 
-    fn last_forgotten(&mut self) -> Result<Option<JobId>, StoreError> {
-        (&*self).last_forgotten()
+    fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError> {
+        (&*self).last_deleted_job()
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
@@ -69,15 +69,15 @@ impl Store for SqliteStore {
         (&*self).bans()
     }
 
-    fn ended_with(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        (&*self).ended_with(worker)
+    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
+        (&*self).ended_jobs_of(worker)
     }
 
-    fn forget_bans(&mut self) -> Result<(), StoreError> {
-        (&*self).forget_bans()
+    fn delete_bans(&mut self) -> Result<(), StoreError> {
+        (&*self).delete_bans()
     }
 
-    fn copy(&mut self, between: &mut Between<'_>) -> Result<Option<File>, StoreError> {
+    fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {
         (&*self).copy(between)
     }
 }

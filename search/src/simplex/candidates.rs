@@ -17,7 +17,7 @@ impl Simplex {
     /// Returns at most `most` points, other than the pending one, that the search may ask for after
     /// it, the most probable first. Each is bit for bit what [`Simplex::ask`] returns if the costs
     /// turn out accordingly. Does not change the state.
-    pub fn likely(&self, most: usize) -> Vec<Vec<f64>> {
+    pub fn candidates(&self, most: usize) -> Vec<Vec<f64>> {
         let mut found: Vec<Vec<f64>> = Vec::new();
         let mut ahead = self.outcomes(1.0);
         // Each turn finds a new point or one that was already found by another path.

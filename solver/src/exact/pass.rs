@@ -1,19 +1,19 @@
-//! One look (pass) at the first arrival: extrema of the signals in one band, the pick, and the
+//! One pass (pass) at the first arrival: extrema of the signals in one band, the pick, and the
 //! estimate of its error.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{self, RUN, Sampling, velocity_taper};
+use osteon_common::sampling::{self, RUN, WaveSampling, velocity_taper};
 
 use crate::Failure;
 use crate::exact::Exact;
 use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::response::Spectra;
-use crate::exact::signal::{Grid, Signal, Slopes};
+use crate::exact::signal::{Signal, Slopes, TimeGrid};
 use crate::exact::tables::Tables;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
-use crate::solver::{Arrival, Looks, Sampled, pressure_not_finite};
+use crate::solver::{Arrival, PassSummary, Sampled, pressure_not_finite};
 use crate::vector::Vector;
 
 /// The tapers with which the error estimate compares: start and end, as multiples of the band. They
@@ -32,20 +32,20 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
 /// Ratio of the estimated error to the root mean square change of the velocity by the other tapers.
 const ESTIMATE_FACTOR: f64 = 1.3;
 
-/// Tables of one rung of the speed ladder, shared by all bones.
+/// Tables of one speed bin, shared by all bones.
 #[derive(Debug)]
-pub(crate) struct Rung {
+pub(crate) struct BinTables {
     pub(crate) tables: Tables,
-    grid: Grid,
-    /// The band of a first look.
-    pub(crate) first: Look,
+    grid: TimeGrid,
+    /// The band of a first pass.
+    pub(crate) first: Band,
     /// The whole band.
-    pub(crate) whole: Look,
+    pub(crate) whole: Band,
 }
 
-/// One band of a rung.
+/// One band of a bin.
 #[derive(Debug)]
-pub(crate) struct Look {
+pub(crate) struct Band {
     pub(crate) sampled: Sampled,
     /// Number of lines that it needs, from the first on.
     pub(crate) lines: usize,
@@ -59,7 +59,7 @@ pub(crate) struct Look {
 #[derive(Debug, Default)]
 pub(crate) struct ExactWorkspace {
     pub(crate) fast: FastPlate,
-    /// The plate of thorough looks.
+    /// The plate of thorough passes.
     pub(crate) accurate: AccuratePlate,
     pub(crate) spectra: Spectra,
     windows: Vec<Window>,
@@ -76,39 +76,39 @@ pub(crate) struct Estimated {
 }
 
 impl Estimated {
-    /// Returns the arrival, found in `count` looks with this total number of pairs.
+    /// Returns the arrival, found in `count` passes with this total number of pairs.
     pub(crate) fn arrival(self, count: u32, pairs_computed: u64) -> Arrival {
         let Self { pick, error, sampled: last } = self;
         Arrival {
             velocity: pick.velocity,
             times: pick.times,
             estimated_error: error,
-            looks: Some(Looks { count, pairs_computed, last }),
+            passes: Some(PassSummary { count, pairs_computed, last }),
         }
     }
 }
 
-impl Rung {
-    /// Returns the memory of a rung with this many pairs that keeps its tables, bytes.
-    pub(crate) fn bytes(setup: &Setup, sampling: &Sampling, pairs: f64) -> u64 {
+impl BinTables {
+    /// Returns the memory of a bin with this many pairs that keeps its tables, bytes.
+    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling, pairs: f64) -> u64 {
         let lines = sampling.runs().len() * RUN;
-        (Tables::bytes(setup, sampling, pairs) + Grid::bytes(setup, lines)) as u64
+        (Tables::bytes(setup, sampling, pairs) + TimeGrid::bytes(setup, lines)) as u64
     }
 
-    /// Creates the tables of a rung. `keep`: whether they are kept, or recomputed whenever they are
+    /// Creates the tables of a bin. `keep`: whether they are kept, or recomputed whenever they are
     /// needed.
-    pub(crate) fn new(setup: &Setup, sampling: Sampling, keep: bool) -> Self {
+    pub(crate) fn new(setup: &Setup, sampling: WaveSampling, keep: bool) -> Self {
         let whole = velocity_taper(sampling.band);
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let tables = Tables::new(setup, sampling, 1.0, whole, keep);
-        let grid = Grid::new(setup, &tables, keep);
-        let first = Look::new(&tables, sampling.first_band);
-        let whole = Look::new(&tables, sampling.band);
+        let grid = TimeGrid::new(setup, &tables, keep);
+        let first = Band::new(&tables, sampling.first_band);
+        let whole = Band::new(&tables, sampling.band);
         Self { tables, grid, first, whole }
     }
 }
 
-impl Look {
+impl Band {
     fn new(tables: &Tables, band: f64) -> Self {
         let cut = velocity_taper(band);
         let lines = tables.lines_within(cut);
@@ -137,15 +137,15 @@ impl Exact {
     pub(super) fn observe(
         &self,
         speed: f64,
-        rung: &Rung,
-        look: &Look,
+        bin: &BinTables,
+        band: &Band,
         workspace: &mut ExactWorkspace,
     ) -> Result<(), Failure> {
         if !workspace.spectra.is_finite() {
             return Err(pressure_not_finite());
         }
         let Self { setup, distances, isa, .. } = self;
-        isa.run(Observe { setup, distances, rung, look, speed, workspace });
+        isa.run(Observe { setup, distances, bin, band, speed, workspace });
         Ok(())
     }
 
@@ -155,13 +155,13 @@ impl Exact {
     /// If there is no acceptable pick.
     pub(super) fn picked(
         &self,
-        rung: &Rung,
-        look: &Look,
+        bin: &BinTables,
+        band: &Band,
         workspace: &ExactWorkspace,
     ) -> Result<Estimated, Failure> {
         let fc = self.setup.probe.center_frequency;
         let pick = pick(&self.setup.picking, fc, &self.distances, &workspace.windows)?;
-        let moved = self.isa.run(Repick { rung, look, times: &pick.times, workspace });
+        let moved = self.isa.run(Repick { bin, band, times: &pick.times, workspace });
         let mut square = 0.0;
         for taper in 0..LANES {
             let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
@@ -171,7 +171,7 @@ impl Exact {
         let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
         // A signal that changes beyond recognition gives the largest error, not a failure.
         let error = if error <= 1.0 { error } else { 1.0 };
-        Ok(Estimated { pick, error, sampled: look.sampled })
+        Ok(Estimated { pick, error, sampled: band.sampled })
     }
 }
 
@@ -179,8 +179,8 @@ impl Exact {
 struct Observe<'a> {
     setup: &'a Setup,
     distances: &'a [f64],
-    rung: &'a Rung,
-    look: &'a Look,
+    bin: &'a BinTables,
+    band: &'a Band,
     /// Upper bound of every wave's speed, m/s.
     speed: f64,
     workspace: &'a mut ExactWorkspace,
@@ -192,17 +192,17 @@ impl Kernel for Observe<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let ExactWorkspace { spectra, windows, slopes, tapered, .. } = self.workspace;
-        let Tables { sampling, runs, .. } = &self.rung.tables;
+        let Tables { sampling, runs, .. } = &self.bin.tables;
         windows.resize_with(self.distances.len(), Window::default);
         for (r, (window, &x)) in windows.iter_mut().zip(self.distances).enumerate() {
             tapered.clear();
-            for (run, &weights) in spectra.receiver(r).iter().zip(&self.look.taper) {
+            for (run, &weights) in spectra.receiver(r).iter().zip(&self.band.taper) {
                 tapered.push(ComplexLanes { re: run.re * weights, im: run.im * weights });
             }
             let signal = Signal { sampling, runs, spectrum: tapered };
             let from = sampling::earliest_arrival(self.setup, x, self.speed);
             let to = sampling::direct_arrival(self.setup, x);
-            let last = signal.extrema::<V>(&self.rung.grid, from, to, slopes, &mut window.extrema);
+            let last = signal.extrema::<V>(&self.bin.grid, from, to, slopes, &mut window.extrema);
             window.last = last.abs();
             window.drop_noise();
         }
@@ -212,8 +212,8 @@ impl Kernel for Observe<'_> {
 /// Kernel that finds the times of the same extrema, s, with the spectra cut by each of the other
 /// tapers.
 struct Repick<'a> {
-    rung: &'a Rung,
-    look: &'a Look,
+    bin: &'a BinTables,
+    band: &'a Band,
     times: &'a [f64],
     workspace: &'a ExactWorkspace,
 }
@@ -223,12 +223,12 @@ impl Kernel for Repick<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Vec<Lanes> {
-        let Tables { sampling, runs, .. } = &self.rung.tables;
+        let Tables { sampling, runs, .. } = &self.bin.tables;
         let mut moved = Vec::with_capacity(self.times.len());
         for (r, &time) in self.times.iter().enumerate() {
-            let spectrum = &self.workspace.spectra.receiver(r)[..self.look.others.len()];
+            let spectrum = &self.workspace.spectra.receiver(r)[..self.band.others.len()];
             let signal = Signal { sampling, runs, spectrum };
-            moved.push(signal.moved_extrema::<V>(time, &self.look.others));
+            moved.push(signal.moved_extrema::<V>(time, &self.band.others));
         }
         moved
     }

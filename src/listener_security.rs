@@ -9,33 +9,33 @@ use osteon_coordinator::tls::TlsFiles;
 use osteon_coordinator::{BindError, ListenAddress, Listener, Tls, Tokens};
 
 use crate::arguments::CoordinatorArguments;
-use crate::ending::Failure;
+use crate::exit_status::CommandFailure;
 
 /// Credentials that a listener requires of clients and workers.
-pub(crate) enum Door {
+pub(crate) enum ListenerSecurity {
     /// None.
-    Open,
+    None,
     /// A token, without TLS.
     Tokens(Tokens),
     /// Certificates, and tokens.
     Tls(Tls, Tokens),
 }
 
-impl Door {
+impl ListenerSecurity {
     /// Reads the files named by the options.
     ///
     /// # Errors
     /// If one cannot be used, or if the options do not fit the address.
-    pub(crate) fn open(
+    pub(crate) fn from_arguments(
         arguments: &CoordinatorArguments,
         address: &ListenAddress,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, CommandFailure> {
         let CoordinatorArguments { tls_ca, tls_cert, tls_key, .. } = arguments;
         let tokens = tokens(arguments)?;
         let (Some(ca), Some(certificate), Some(key)) = (tls_ca, tls_cert, tls_key) else {
             return match tokens {
-                None => Ok(Self::Open),
-                Some(_) if !address.is_local() => Err(Failure::bad_input(anyhow!(
+                None => Ok(Self::None),
+                Some(_) if !address.is_local() => Err(CommandFailure::bad_input(anyhow!(
                     "tokens would be readable on their way to {}; give --tls-cert, --tls-key and \
                      --tls-ca, or listen on a loopback address or unix:PATH",
                     arguments.listen
@@ -44,22 +44,23 @@ impl Door {
             };
         };
         if matches!(address, ListenAddress::Unix(_)) {
-            return Err(Failure::bad_input(anyhow!(
-                "a Unix socket has no TLS; leave out --tls-ca, --tls-cert and --tls-key"
+            return Err(CommandFailure::bad_input(anyhow!(
+                "a Unix socket does not use TLS; leave out --tls-ca, --tls-cert and --tls-key"
             )));
         }
         let files = TlsFiles { ca: ca.clone(), certificate: certificate.clone(), key: key.clone() };
-        let tls = Tls::load(&files).map_err(Failure::bad_input)?;
+        let tls = Tls::load(&files).map_err(CommandFailure::bad_input)?;
         let tokens = tokens.ok_or_else(|| {
-            Failure::bad_input(anyhow!(
-                "without --tokens FILE no client can do anything; `osteon token` makes one"
+            CommandFailure::bad_input(anyhow!(
+                "with TLS, --tokens FILE is required, because every client needs a token; \
+                 `osteon token` makes one"
             ))
         })?;
         Ok(Self::Tls(tls, tokens))
     }
 
     /// The first of the files that is a pipe, if one is: it cannot be read again.
-    pub(crate) fn pipe(arguments: &CoordinatorArguments) -> Option<&Path> {
+    pub(crate) fn first_pipe(arguments: &CoordinatorArguments) -> Option<&Path> {
         let CoordinatorArguments { tls_ca, tls_cert, tls_key, tokens, token_file, .. } = arguments;
         let files = [tls_ca, tls_cert, tls_key, tokens, token_file].into_iter().flatten();
         let is_pipe = |path: &Path| path.metadata().is_ok_and(|file| file.file_type().is_fifo());
@@ -82,19 +83,20 @@ impl Door {
             (Self::Tokens(tokens) | Self::Tls(_, tokens), _) => {
                 Ok(Listener::bind(address, insecure).await?.with_tokens(tokens))
             }
-            (Self::Open, _) => Listener::bind(address, insecure).await,
+            (Self::None, _) => Listener::bind(address, insecure).await,
         }
     }
 }
 
-fn tokens(arguments: &CoordinatorArguments) -> Result<Option<Tokens>, Failure> {
+fn tokens(arguments: &CoordinatorArguments) -> Result<Option<Tokens>, CommandFailure> {
     let CoordinatorArguments { tokens, token_file, .. } = arguments;
-    let listed = tokens.as_deref().map(Tokens::read).transpose().map_err(Failure::bad_input)?;
+    let listed =
+        tokens.as_deref().map(Tokens::read).transpose().map_err(CommandFailure::bad_input)?;
     match token_file {
         None => Ok(listed),
         Some(file) => {
             let listed = listed.unwrap_or_default();
-            listed.with_admin(file).map(Some).map_err(Failure::bad_input)
+            listed.with_admin(file).map(Some).map_err(CommandFailure::bad_input)
         }
     }
 }

@@ -6,17 +6,17 @@ use osteon_common::report::{Propagation, ResultFile};
 use osteon_common::results::Status;
 
 use crate::client::Fetched;
-use crate::ending::Ending;
+use crate::exit_status::ExitStatus;
 
 /// Returns the ending of a command, and thus the exit code, for this result.
-pub(crate) fn ending(specification: &JobSpecification, result: &ResultFile) -> Ending {
+pub(crate) fn exit_status(specification: &JobSpecification, result: &ResultFile) -> ExitStatus {
     let done = match result {
         ResultFile::Identification(found) => {
             matches!(found.status, Status::Converged | Status::MaxEvaluations)
         }
         ResultFile::Propagation(found) => propagation_failure(specification, found).is_none(),
     };
-    if done { Ending::Done } else { Ending::RunFailed }
+    if done { ExitStatus::Done } else { ExitStatus::RunFailed }
 }
 
 /// Returns whether the run was cancelled, in which case running it again continues it.

@@ -1,21 +1,21 @@
-//! The answers of a search method: the next point, or the reason why it stopped.
+//! The next point of a search method, or the reason why it stopped.
 
 /// Answer of a search method when it is asked for its next point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ask<'a> {
+pub enum Proposal<'a> {
     /// Evaluate this point; its coordinates are in `[0, 1]`.
-    At(&'a [f64]),
+    Evaluate(&'a [f64]),
     /// The search has ended.
-    Stopped(Stop),
+    Stopped(StopReason),
 }
 
 /// Reason why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
+pub enum StopReason {
     /// The best cost is at most the tolerance.
     CostReached,
     /// The method can do no more and finds nothing better. Also used when no parameter is free.
-    Settled,
+    Converged,
     /// The maximum number of evaluations was reached.
     EvaluationsUsedUp,
     /// Every restart found something better, and the maximum number of restarts was reached.

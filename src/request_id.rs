@@ -5,14 +5,14 @@ use osteon_proto::identity::{self, NoRandomness};
 
 /// Identifies a submission. A coordinator keeps the ids of different clients apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Request {
+pub(crate) struct RequestId {
     /// Id chosen by the submitter; never empty.
     pub(crate) id: String,
     /// Name of the submitting client.
     pub(crate) client: String,
 }
 
-impl Request {
+impl RequestId {
     /// Creates a request with a new random id.
     ///
     /// # Errors

@@ -29,29 +29,29 @@ fn specification(max_failed_fraction: f64) -> JobSpecification {
 fn an_identification_ends_as_its_status_says() {
     let check = |status: &str, expected| {
         let result = identification(&format!("{{\"status\": \"{status}\"}}"));
-        assert_eq!(ending(&specification(0.01), &result), expected, "{status}");
+        assert_eq!(exit_status(&specification(0.01), &result), expected, "{status}");
     };
-    check("converged", Ending::Done);
-    check("max_evaluations", Ending::Done);
-    check("cancelled", Ending::RunFailed);
-    check("failed", Ending::RunFailed);
+    check("converged", ExitStatus::Done);
+    check("max_evaluations", ExitStatus::Done);
+    check("cancelled", ExitStatus::RunFailed);
+    check("failed", ExitStatus::RunFailed);
 }
 
 #[test]
 fn a_propagation_fails_above_the_accepted_fraction() {
     let check = |json: &str, expected| {
-        assert_eq!(ending(&specification(0.02), &propagation(json)), expected, "{json}");
+        assert_eq!(exit_status(&specification(0.02), &propagation(json)), expected, "{json}");
     };
-    check(r#"{"failures": {}, "velocity": {"mean": 3900.0}}"#, Ending::Done);
+    check(r#"{"failures": {}, "velocity": {"mean": 3900.0}}"#, ExitStatus::Done);
     check(
         r#"{"failures": {"no_arrival": 1, "not_finite": 1}, "velocity": {"mean": 3900.0}}"#,
-        Ending::Done,
+        ExitStatus::Done,
     );
     check(
         r#"{"failures": {"no_arrival": 2, "not_finite": 1}, "velocity": {"mean": 3900.0}}"#,
-        Ending::RunFailed,
+        ExitStatus::RunFailed,
     );
-    check(r#"{"failures": {}, "velocity": {"mean": null}}"#, Ending::RunFailed);
+    check(r#"{"failures": {}, "velocity": {"mean": null}}"#, ExitStatus::RunFailed);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn what_lay_in_the_machines_may_end_otherwise() {
     let reason = "integrity error: stored evaluation 3 was alone on workers that were lost";
     for (status, failure, expected) in [
         ("failed", "\"integrity_error\"", true),
-        ("failed", "\"lost_realization\"", true),
+        ("failed", "\"poison_realization\"", true),
         ("failed", "\"store\"", true),
         ("failed", "\"no_feasible_point\"", false),
         ("cancelled", "null", true),

@@ -1,0 +1,140 @@
+//! Caches of the tables of one solver. Speeds are divided into bins, a geometric grid; each bin has
+//! a sampling for waves up to its upper edge, and its tables are made when a bone first needs them.
+
+use std::ops::Deref;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use osteon_common::case::Setup;
+use osteon_common::limits::SAMPLING_PAIRS_MAX;
+use osteon_common::sampling::{Grade, SPEED_BINS, WaveSampling};
+
+use crate::exact::pass::BinTables;
+
+/// A bone may need this many times the maximum number of pairs of the setup's usual sampling before
+/// it fails.
+pub(crate) const PAIRS_MARGIN: f64 = 8.0;
+/// Memory for tables that one solver keeps, bytes; those of further bins are recomputed when
+/// needed.
+const CACHE_BYTES_MAX: u64 = 24_000_000;
+
+/// Samplings of one grade, by speed.
+#[derive(Debug)]
+pub(crate) struct TableCache {
+    setup: Setup,
+    grade: Grade,
+    /// Each slot is filled when a bone first needs it.
+    slots: [OnceLock<Slot>; SPEED_BINS],
+}
+
+/// Memory of the tables that all caches of a solver keep, bytes.
+#[derive(Debug, Default)]
+pub(crate) struct CacheBytes(AtomicU64);
+
+/// Tables that are cached, or that were made for one pass.
+#[derive(Debug)]
+pub(crate) enum TablesRef<'a> {
+    Cached(&'a BinTables),
+    Temporary(Box<BinTables>),
+}
+
+/// The cached data of a speed bin.
+#[derive(Debug)]
+enum Slot {
+    Tables(Box<BinTables>),
+    /// Only the sampling; its tables are recomputed whenever they are needed.
+    SamplingOnly(Box<WaveSampling>),
+    /// The bin is too large to be computed.
+    TooLarge,
+}
+
+impl TableCache {
+    pub(crate) fn new(setup: &Setup, grade: Grade) -> Self {
+        Self { setup: *setup, grade, slots: [const { OnceLock::new() }; SPEED_BINS] }
+    }
+
+    /// Returns the tables of the speed bin at `index`, unless it is too large.
+    pub(crate) fn tables(&self, index: usize, bytes: &CacheBytes) -> Option<TablesRef<'_>> {
+        match self.slots.get(index)?.get_or_init(|| self.slot(index, bytes)) {
+            Slot::Tables(bin) => Some(TablesRef::Cached(bin)),
+            Slot::SamplingOnly(sampling) => {
+                Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, false))))
+            }
+            Slot::TooLarge => None,
+        }
+    }
+
+    fn slot(&self, index: usize, bytes: &CacheBytes) -> Slot {
+        let sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade);
+        let pairs = sampling.pairs(sampling.band);
+        if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
+            return Slot::TooLarge;
+        }
+        if bytes.reserve(BinTables::bytes(&self.setup, &sampling, pairs)) {
+            Slot::Tables(Box::new(BinTables::new(&self.setup, sampling, true)))
+        } else {
+            Slot::SamplingOnly(Box::new(sampling))
+        }
+    }
+}
+
+impl CacheBytes {
+    /// Reserves this much memory; returns whether the limit allows it.
+    fn reserve(&self, bytes: u64) -> bool {
+        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= CACHE_BYTES_MAX;
+        if !may {
+            self.0.fetch_sub(bytes, Ordering::Relaxed);
+        }
+        may
+    }
+}
+
+impl Deref for TablesRef<'_> {
+    type Target = BinTables;
+
+    fn deref(&self) -> &BinTables {
+        match self {
+            Self::Cached(bin) => bin,
+            Self::Temporary(bin) => bin,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::case::Bone;
+    use osteon_common::parameters::Point;
+    use osteon_common::realization::Ensemble;
+
+    use super::*;
+    use crate::exact::Exact;
+    use crate::exact::pass::ExactWorkspace;
+    use crate::isa::Isa;
+
+    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+
+    fn bits(exact: &Exact, bones: &[Bone]) -> Vec<u64> {
+        let mut workspace = ExactWorkspace::default();
+        let velocity = |bone| exact.arrival(bone, &mut workspace).map(|found| found.velocity);
+        bones.iter().map(velocity).map(|v| v.map_or(0, f64::to_bits)).collect()
+    }
+
+    #[test]
+    fn tables_that_are_not_kept_give_the_same_bits() {
+        let setup = Setup::default();
+        let ensemble = Ensemble::new(&OPTIMUM, 7).unwrap();
+        let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
+        let (keeps, keeps_none) =
+            (Exact::new(&setup, Isa::fastest()), Exact::new(&setup, Isa::fastest()));
+        assert!(keeps_none.cache_bytes.reserve(CACHE_BYTES_MAX));
+        assert_eq!(bits(&keeps_none, &bones), bits(&keeps, &bones));
+        let kept = |exact: &Exact| {
+            let slots = exact.quick.slots.iter().filter_map(OnceLock::get);
+            slots.filter(|slot| matches!(slot, Slot::Tables(_))).count()
+        };
+        assert_eq!((kept(&keeps_none), kept(&keeps) > 0), (0, true));
+        let held = |exact: &Exact| exact.cache_bytes.0.load(Ordering::Relaxed);
+        assert_eq!(held(&keeps_none), CACHE_BYTES_MAX);
+        assert!(held(&keeps) < CACHE_BYTES_MAX, "{}", held(&keeps));
+    }
+}
