@@ -5,7 +5,7 @@ use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use osteon_coordinator::tls::TlsFiles;
+use osteon_coordinator::access::tls::TlsFiles;
 use osteon_coordinator::{BindError, ListenAddress, Listener, Tls, Tokens};
 
 use crate::arguments::CoordinatorArguments;

@@ -42,7 +42,7 @@ fn no_files_of_a_crate_form_a_circle() {
 
 #[test]
 fn layers_of_the_reactor_call_downwards_only() {
-    let layers = ["reactor/dispatch", "reactor/lifecycle", "reactor/integrity"];
+    let layers = ["core/reactor/dispatch", "core/reactor/lifecycle", "core/reactor/integrity"];
     let layer = |file: &str| layers.iter().position(|layer| file.starts_with(layer));
     let mut count = 0;
     for (from, targets) in arrows(&sources("coordinator/src")) {

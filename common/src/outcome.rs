@@ -167,7 +167,8 @@ mod tests {
 
     #[test]
     fn an_estimate_is_finite_and_a_failure_has_none() {
-        let sound = |outcome, estimated_error| RealizationResult { outcome, estimated_error }.is_sound();
+        let sound =
+            |outcome, estimated_error| RealizationResult { outcome, estimated_error }.is_sound();
         assert!(sound(Ok(3900.0), 0.0) && sound(Ok(3900.0), 2e-5));
         assert!(RealizationResult::failed(FailureKind::NoArrival).is_sound());
         for estimate in [-1e-9, f64::NAN, f64::INFINITY] {

@@ -1,10 +1,16 @@
 //! Access control: decides which caller may call which method, from the listener's policy and the
 //! caller's certificate and token. It uses no socket and never waits.
 
+pub(crate) mod layer;
+pub(crate) mod limiter;
+pub(crate) mod message_body;
+pub mod tls;
+pub mod tokens;
+
 use osteon_proto::token::Token;
 use thiserror::Error;
 
-use crate::tokens::{Role, Tokens};
+use crate::access::tokens::{Role, Tokens};
 
 /// Name of the token's holder, stored in the extensions of a call.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX};
 
-use crate::audit::AuditKey;
+use crate::core::audit::AuditKey;
 
 /// Default fraction of the batches that are computed by a second worker too.
 pub const AUDIT_FRACTION: f64 = 0.01;

@@ -4,6 +4,9 @@
 //! the record is durable, and putting the same record again is not an error, so that a write whose
 //! answer was lost can be repeated.
 
+pub mod job_output;
+pub(crate) mod thread;
+
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::ops::ControlFlow;
@@ -19,8 +22,8 @@ use osteon_common::version::Program;
 use osteon_search::{Ending, Summary};
 use thiserror::Error;
 
-use crate::ids::JobId;
-use crate::worker_name::WorkerName;
+use crate::core::ids::JobId;
+use crate::core::worker_name::WorkerName;
 
 pub mod memory;
 pub mod sqlite;

@@ -12,13 +12,13 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Answer, Effect};
-use osteon_coordinator::event::{Event, Request};
-use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::job_output;
-use osteon_coordinator::reactor::{Restored, react};
-use osteon_coordinator::state::State;
+use osteon_coordinator::core::effect::{Answer, Effect};
+use osteon_coordinator::core::event::{Event, Request};
+use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::reactor::{Restored, react};
+use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::Store as _;
+use osteon_coordinator::store::job_output;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_proto::v1::{JobSnapshot, JobState};
 

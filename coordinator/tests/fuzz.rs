@@ -6,9 +6,9 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
+use osteon_coordinator::access::tokens::{self, Role, TokensError};
 use osteon_coordinator::access::{self, Presented, Requirement};
-use osteon_coordinator::ids::JobId;
-use osteon_coordinator::tokens::{self, Role, TokensError};
+use osteon_coordinator::core::ids::JobId;
 use osteon_coordinator::{ListenAddress, Tokens};
 use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties};
 use osteon_proto::token::TokenHash;

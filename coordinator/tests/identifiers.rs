@@ -10,11 +10,11 @@ mod fake;
 use std::time::Duration;
 
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Effect, Record};
-use osteon_coordinator::event::Event;
-use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::reactor::{Restored, react};
-use osteon_coordinator::state::State;
+use osteon_coordinator::core::effect::{Effect, Record};
+use osteon_coordinator::core::event::Event;
+use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::reactor::{Restored, react};
+use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;

@@ -11,11 +11,11 @@ use std::time::Duration;
 
 use osteon_common::job::Data;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::Effect;
-use osteon_coordinator::event::{Event, Request};
-use osteon_coordinator::ids::Token;
-use osteon_coordinator::reactor::react;
-use osteon_coordinator::state::State;
+use osteon_coordinator::core::effect::Effect;
+use osteon_coordinator::core::event::{Event, Request};
+use osteon_coordinator::core::ids::Token;
+use osteon_coordinator::core::reactor::react;
+use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::sqlite::SqliteStore;
 
 /// Returns the resident memory of this process, bytes.

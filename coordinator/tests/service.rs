@@ -9,13 +9,13 @@ mod wire;
 use std::time::Duration;
 
 use osteon_common::version;
-use osteon_coordinator::ids::JobId;
+use osteon_coordinator::core::ids::JobId;
+use osteon_coordinator::core::worker_name::WorkerName;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
     BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
-use osteon_coordinator::worker_name::WorkerName;
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};

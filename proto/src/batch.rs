@@ -49,7 +49,11 @@ pub fn from_message(message: &v1::Batch, received: &Received) -> Result<Work, Ma
 
 /// Returns the answer to batch number `batch`: its realizations in index order, and the wall time
 /// in seconds that they took.
-pub fn answer_to_message(batch: u64, solved: &[RealizationResult], elapsed_s: f64) -> v1::BatchResult {
+pub fn answer_to_message(
+    batch: u64,
+    solved: &[RealizationResult],
+    elapsed_s: f64,
+) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
     v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }

@@ -6,7 +6,8 @@ use std::pin::pin;
 use anyhow::Context as _;
 use osteon_common::visible;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, open_files};
+use osteon_coordinator::service::open_files;
+use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress};
 
 use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};

@@ -1,7 +1,7 @@
 //! `token`: creates a token for a client, and its line for the coordinator's list.
 
 use anyhow::anyhow;
-use osteon_coordinator::tokens::{self, Role};
+use osteon_coordinator::access::tokens::{self, Role};
 use osteon_proto::token::Token;
 
 use crate::arguments::TokenArguments;

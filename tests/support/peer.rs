@@ -102,9 +102,10 @@ pub(crate) fn solve(work: &Work) -> Vec<RealizationResult> {
             return RealizationResult::failed(FailureKind::NotFinite);
         };
         match solver.arrival(&bone, &mut workspace) {
-            Ok(arrival) => {
-                RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
-            }
+            Ok(arrival) => RealizationResult {
+                outcome: Ok(arrival.velocity),
+                estimated_error: arrival.estimated_error,
+            },
             Err(failure) => RealizationResult::failed(failure.kind),
         }
     };

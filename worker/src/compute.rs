@@ -110,7 +110,11 @@ enum Interrupted {
 }
 
 /// Computes the realizations of a batch, in index order.
-fn compute(work: &Work, solvers: &Solvers, stop: &StopFlag) -> Result<Vec<RealizationResult>, Interrupted> {
+fn compute(
+    work: &Work,
+    solvers: &Solvers,
+    stop: &StopFlag,
+) -> Result<Vec<RealizationResult>, Interrupted> {
     if stop.is_raised() {
         return Err(Interrupted::Stopped);
     }
@@ -144,9 +148,10 @@ fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> RealizationR
         return RealizationResult::failed(FailureKind::NotFinite);
     };
     match WORKSPACE.with_borrow_mut(|workspace| solver.arrival(&bone, workspace)) {
-        Ok(arrival) => {
-            RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
-        }
+        Ok(arrival) => RealizationResult {
+            outcome: Ok(arrival.velocity),
+            estimated_error: arrival.estimated_error,
+        },
         Err(failure) => RealizationResult::failed(failure.kind),
     }
 }

@@ -69,7 +69,8 @@ fn tokens() -> (Tokens, [Token; 3]) {
     let made = roles.map(|_| Token::generate().unwrap());
     let mut text = String::new();
     for (role, token) in roles.iter().zip(&made) {
-        text += &(crate::tokens::line(&format!("{}er", role.name()), *role, &token.hash()) + "\n");
+        text += &(crate::access::tokens::line(&format!("{}er", role.name()), *role, &token.hash())
+            + "\n");
     }
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("tokens");

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use osteon_search::Summary;
 
 use super::{BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
-use crate::ids::JobId;
-use crate::worker_name::WorkerName;
+use crate::core::ids::JobId;
+use crate::core::worker_name::WorkerName;
 
 /// A store in memory. Clones share their contents, as if one file were opened twice.
 #[derive(Debug, Clone, Default)]

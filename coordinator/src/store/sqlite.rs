@@ -22,8 +22,8 @@ use super::{
     BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store,
     StoreError, StoredJob,
 };
-use crate::ids::JobId;
-use crate::worker_name::WorkerName;
+use crate::core::ids::JobId;
+use crate::core::worker_name::WorkerName;
 
 mod acknowledged;
 mod backup;

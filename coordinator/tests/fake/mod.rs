@@ -11,9 +11,9 @@ use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, JobResult};
 use osteon_common::version::{self, Program, VERSION};
-use osteon_coordinator::effect::Record;
-use osteon_coordinator::event::{Event, Hello, Request};
-use osteon_coordinator::ids::{JobId, WorkerId};
+use osteon_coordinator::core::effect::Record;
+use osteon_coordinator::core::event::{Event, Hello, Request};
+use osteon_coordinator::core::ids::{JobId, WorkerId};
 use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
 use osteon_proto::evaluation::Evaluation;
@@ -132,7 +132,10 @@ fn realization(work: &Work, index: u64) -> RealizationResult {
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
     let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
-    RealizationResult { outcome: Ok(velocity), estimated_error: 1e-5 * (noise % 1000) as f64 / velocity }
+    RealizationResult {
+        outcome: Ok(velocity),
+        estimated_error: 1e-5 * (noise % 1000) as f64 / velocity,
+    }
 }
 
 /// Returns a well mixed function of one number (splitmix64).

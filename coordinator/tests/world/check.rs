@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
-use osteon_coordinator::effect::Answer;
-use osteon_coordinator::ids::{JobId, Token};
-use osteon_coordinator::job_output;
+use osteon_coordinator::core::effect::Answer;
+use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::store::job_output;
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
 use osteon_search::{Ending, Search, Step};

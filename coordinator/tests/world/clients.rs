@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
-use osteon_coordinator::ids::JobId;
+use osteon_coordinator::core::ids::JobId;
 
 use crate::fake;
 

@@ -1,8 +1,8 @@
 //! The store: writes that are late, fail, or are lost with the coordinator.
 
-use osteon_coordinator::effect::Record;
-use osteon_coordinator::event::{Event, ReadFailure, Request, Retention};
-use osteon_coordinator::ids::{JobId, Token};
+use osteon_coordinator::core::effect::Record;
+use osteon_coordinator::core::event::{Event, ReadFailure, Request, Retention};
+use osteon_coordinator::core::ids::{JobId, Token};
 use osteon_coordinator::store::Store as _;
 
 use super::{Occurrence, World};

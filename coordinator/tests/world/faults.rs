@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use osteon_coordinator::event::{Event, Hello};
-use osteon_coordinator::ids::{BatchId, WorkerId};
+use osteon_coordinator::core::event::{Event, Hello};
+use osteon_coordinator::core::ids::{BatchId, WorkerId};
 
 use super::{HOUR, Occurrence, Worker, World};
 use crate::fake;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use osteon_coordinator::event::Event;
-use osteon_coordinator::ids::{BatchId, WorkerId};
+use osteon_coordinator::core::event::Event;
+use osteon_coordinator::core::ids::{BatchId, WorkerId};
 use osteon_proto::batch::Work;
 
 use super::World;

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::effect::{Effect, Record};
-use osteon_coordinator::event::{Event, Hello, Request};
-use osteon_coordinator::ids::{BatchId, JobId, Token, WorkerId};
-use osteon_coordinator::reactor::{Restored, react};
-use osteon_coordinator::sanity::sanity_check;
-use osteon_coordinator::state::{BATCHES_IN_FLIGHT_MAX, State};
+use osteon_coordinator::core::effect::{Effect, Record};
+use osteon_coordinator::core::event::{Event, Hello, Request};
+use osteon_coordinator::core::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::core::reactor::{Restored, react};
+use osteon_coordinator::core::sanity::sanity_check;
+use osteon_coordinator::core::state::{BATCHES_IN_FLIGHT_MAX, State};
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::{EndRecord, Store};
 use osteon_proto::batch::Work;

@@ -103,7 +103,9 @@ fn a_propagation_is_one_evaluation() {
 }
 
 /// Returns the error after `change` to the realizations of evaluation 2.
-fn refused(change: impl Fn(Vec<RealizationResult>) -> Result<Vec<RealizationResult>, &'static str>) -> String {
+fn refused(
+    change: impl Fn(Vec<RealizationResult>) -> Result<Vec<RealizationResult>, &'static str>,
+) -> String {
     let mut number = 0;
     let evaluate = |realizations: &Realizations| {
         number += 1;

@@ -51,7 +51,10 @@ fn outcomes_are_those_of_the_solver_alone() {
             .map(|index| {
                 let bone = ensemble.bone(index).unwrap();
                 let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
-                RealizationResult { outcome: Ok(arrival.velocity), estimated_error: arrival.estimated_error }
+                RealizationResult {
+                    outcome: Ok(arrival.velocity),
+                    estimated_error: arrival.estimated_error,
+                }
             })
             .collect();
         assert_eq!(solved(2, drawn(POINT, germs, 3, 4)), expected, "{scheme:?}");
@@ -62,7 +65,10 @@ fn outcomes_are_those_of_the_solver_alone() {
 fn a_point_without_an_ensemble_fails_at_every_index() {
     let mut inadmissible = POINT;
     inadmissible.0[5] = 1.2;
-    assert_eq!(solved(2, work(inadmissible, 0, 3)), [RealizationResult::failed(FailureKind::NotFinite); 3]);
+    assert_eq!(
+        solved(2, work(inadmissible, 0, 3)),
+        [RealizationResult::failed(FailureKind::NotFinite); 3]
+    );
 }
 
 #[test]

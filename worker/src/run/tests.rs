@@ -170,7 +170,9 @@ impl Backend for FakeBackend {
 
 fn outcomes(work: &Work) -> Vec<RealizationResult> {
     let indices = work.first..work.first + u64::from(work.count);
-    indices.map(|index| RealizationResult { outcome: Ok(index as f64), estimated_error: 0.0 }).collect()
+    indices
+        .map(|index| RealizationResult { outcome: Ok(index as f64), estimated_error: 0.0 })
+        .collect()
 }
 
 #[tokio::test]

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use osteon_common::user_file;
 
 use super::opening::FILE_MODE;
-use crate::ids::JobId;
+use crate::core::ids::JobId;
 use crate::store::StoreError;
 
 /// Name of the file in the store's directory.

@@ -98,7 +98,7 @@ mod tests {
     }
 
     /// Returns the contents that a coordinator finds when it starts on the copy.
-    fn restored(mut copy: File) -> (Vec<StoredJob>, Option<crate::ids::JobId>) {
+    fn restored(mut copy: File) -> (Vec<StoredJob>, Option<crate::core::ids::JobId>) {
         let directory = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
         copy.rewind().unwrap();
@@ -119,7 +119,7 @@ mod tests {
                 pieces += 1;
                 if pieces == 1 {
                     // Into pages that have been copied already, and after the last one.
-                    store.delete_jobs(&[crate::ids::JobId(7)]).unwrap();
+                    store.delete_jobs(&[crate::core::ids::JobId(7)]).unwrap();
                     store.put_job(&job(2)).unwrap();
                     store.put_evaluation(&evaluation(1, 0), false).unwrap();
                     store.put_evaluation(&evaluation(1, 100), false).unwrap();
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(jobs, store.jobs().unwrap());
         assert_eq!(jobs.len(), 2);
         assert_eq!((jobs[0].evaluations, &jobs[1].record), (101, &job(2)));
-        assert_eq!(last_deleted_job, Some(crate::ids::JobId(7)));
+        assert_eq!(last_deleted_job, Some(crate::core::ids::JobId(7)));
     }
 
     #[test]

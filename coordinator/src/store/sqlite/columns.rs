@@ -10,9 +10,9 @@ use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
 use rusqlite::Row;
 
-use crate::ids::JobId;
+use crate::core::ids::JobId;
+use crate::core::worker_name::WorkerName;
 use crate::store::{BanRecord, EndRecord, EvaluationRecord};
-use crate::worker_name::WorkerName;
 
 /// Size of an outcome in a blob, bytes: its code, and its velocity as little-endian f64.
 const OUTCOME_BYTES: usize = 9;

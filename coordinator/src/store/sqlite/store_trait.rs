@@ -6,11 +6,11 @@ use std::fs::File;
 use osteon_search::Summary;
 
 use super::SqliteStore;
-use crate::ids::JobId;
+use crate::core::ids::JobId;
+use crate::core::worker_name::WorkerName;
 use crate::store::{
     BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
-use crate::worker_name::WorkerName;
 
 impl Store for SqliteStore {
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {

@@ -7,7 +7,7 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, params};
 
 use super::columns::checksum;
-use crate::ids::JobId;
+use crate::core::ids::JobId;
 
 /// Writes a summary.
 pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {

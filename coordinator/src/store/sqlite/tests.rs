@@ -375,7 +375,7 @@ fn another_format_is_refused() {
         drop(store);
         let error = SqliteStore::open(directory.path()).unwrap_err();
         let expected = format!(
-            "osteon.sqlite: this store has format {version}; this version writes 6: run the version \
+            "osteon.sqlite: this store has format {version}; this version writes 7: run the version \
              that wrote it, or choose another directory"
         );
         assert!(error.to_string().ends_with(&expected), "{error}");

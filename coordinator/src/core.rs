@@ -1,0 +1,26 @@
+//! The pure state machine of a coordinator: jobs, searches, batches and leases. It is given events
+//! and the time, and returns effects; it knows no clock, no socket and no future.
+
+pub mod audit;
+pub(crate) mod batch;
+pub mod close_reason;
+pub(crate) mod crashes;
+pub mod dispute;
+pub mod effect;
+pub mod evaluation;
+pub mod event;
+pub mod failure;
+pub(crate) mod fairness;
+pub mod ids;
+pub mod indices;
+pub(crate) mod job;
+pub mod notice;
+pub(crate) mod probation;
+pub(crate) mod rate;
+pub mod reactor;
+pub(crate) mod realization_time;
+pub mod sanity;
+pub(crate) mod snapshot;
+pub mod state;
+pub(crate) mod worker_list;
+pub mod worker_name;

@@ -1,0 +1,67 @@
+//! A batch that a worker holds, and the purpose for which it is computed.
+
+use std::time::Duration;
+
+use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::indices::Indices;
+
+/// A batch that a worker holds.
+#[derive(Debug)]
+pub(crate) struct Batch {
+    pub(crate) assignment: Assignment,
+    pub(crate) purpose: Purpose,
+    pub(crate) worker: WorkerId,
+    pub(crate) sent: Duration,
+    /// Time when its worker could begin it: when it was sent, or when the worker answered the batch
+    /// that it had been sent before, whichever was later.
+    pub(crate) begun: Duration,
+    /// Computing time that was charged to its client.
+    pub(crate) charged: Duration,
+    /// The other batches with the same indices and purpose, held by other workers.
+    pub(crate) duplicates: Vec<BatchId>,
+    /// Number of duplicates that were sent before this one, each because its predecessor was
+    /// overdue.
+    pub(crate) retries: u32,
+}
+
+impl Batch {
+    /// Returns whether an idle worker may receive a duplicate of it before it is overdue.
+    pub(crate) fn may_be_duplicated(&self) -> bool {
+        self.purpose == Purpose::Fill && self.duplicates.is_empty()
+    }
+}
+
+/// Why a batch is computed. Duplicates have the same purpose. Being a duplicate is a relation
+/// between batches, not a purpose, because the order in which they were sent decides nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// It fills indices of the evaluation that the search asked for.
+    Fill,
+    /// It fills an index over which workers crashed. Its worker holds no other batch meanwhile.
+    Exclusive,
+    /// It fills indices of a point that the search has not asked for yet.
+    Speculative,
+    /// Its answer is compared with the answer of another worker.
+    Audit {
+        /// Number of workers that were lost over it.
+        lost: u32,
+    },
+    /// Its answer decides between answers that differ.
+    TieBreak,
+}
+
+impl Purpose {
+    /// Returns whether the answer fills indices of an evaluation.
+    pub(crate) fn fills(self) -> bool {
+        matches!(self, Self::Fill | Self::Exclusive | Self::Speculative)
+    }
+}
+
+/// The indices that a batch computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Assignment {
+    pub(crate) job: JobId,
+    /// Number of the attempt at an evaluation.
+    pub(crate) attempt: u64,
+    pub(crate) indices: Indices,
+}

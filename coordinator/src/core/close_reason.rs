@@ -1,0 +1,96 @@
+//! Reasons for closing a worker's stream.
+
+use std::time::Duration;
+
+use osteon_proto::malformed::Malformed;
+use thiserror::Error;
+
+use crate::core::ids::BatchId;
+
+/// Reason for closing a worker's stream.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CloseReason {
+    /// Its numerics differ from the coordinator's.
+    #[error(
+        "this worker's numerics are `{}`, the coordinator's are `{coordinator}`; \
+         results would not be reproducible: run the same version of osteon on both",
+        worker.escape_debug()
+    )]
+    FingerprintDiffers {
+        /// Fingerprint of the worker.
+        worker: String,
+        /// Fingerprint of the coordinator.
+        coordinator: String,
+    },
+    /// It was banned for wrong answers.
+    #[error(
+        "this worker is banned: it {reason}; check its machine, and start it again when it is \
+         repaired"
+    )]
+    Banned {
+        /// The finding, which completes "it …".
+        reason: String,
+    },
+    /// It announced an invalid number of slots.
+    #[error("this worker announces {slots} slots; 1 to {max} are allowed")]
+    Slots {
+        /// Announced number of slots.
+        slots: u32,
+        /// Maximum number of slots.
+        max: u32,
+    },
+    /// A text in its hello message is too long.
+    #[error("a name in this worker's hello has {bytes} bytes; at most {max} are allowed")]
+    NameTooLong {
+        /// Length of the text, bytes.
+        bytes: usize,
+        /// Maximum length, bytes.
+        max: usize,
+    },
+    /// Too many workers are attached.
+    #[error("{limit} workers are attached already, the most allowed; attach again later")]
+    TooManyWorkers {
+        /// Maximum number of workers.
+        limit: usize,
+    },
+    /// It sent nothing until its lease expired.
+    #[error("no message came from this worker for {silent:?}; its lease has ended, attach again")]
+    Expired {
+        /// Time since its last message.
+        silent: Duration,
+    },
+    /// It is alive, but does not answer its batches.
+    #[error(
+        "this worker has not answered any of its batches for {waited:?}; its lease has ended, \
+         attach again"
+    )]
+    Unanswering {
+        /// Time without an answer.
+        waited: Duration,
+    },
+    /// It does not read the messages sent to it.
+    #[error("this worker does not read its stream; its lease has ended, attach again")]
+    NotReading,
+    /// A message that no worker of this version sends.
+    #[error("a message of this worker is malformed: {0}")]
+    Malformed(#[from] Malformed),
+    /// An answer has the wrong number of realizations.
+    #[error("the answer to batch {batch} has {found} realizations, expected {expected}")]
+    WrongCount {
+        /// The batch.
+        batch: BatchId,
+        /// Number of realizations in the answer.
+        found: usize,
+        /// Number of realizations in the batch.
+        expected: u64,
+    },
+    /// It sent a second hello message.
+    #[error("this worker sent a second hello on one stream")]
+    SecondHello,
+    /// It was draining and has answered everything.
+    #[error("this worker has drained")]
+    Drained,
+    /// The coordinator is stopping.
+    #[error("the coordinator is shutting down; attach again when it is back")]
+    Draining,
+}

@@ -1,0 +1,249 @@
+//! All effects of a coordinator on the outside world, as one closed list.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_proto::batch::Work;
+use osteon_proto::v1::{JobSnapshot, ListWorkersResponse, WorkerSnapshot};
+use osteon_search::Summary;
+use thiserror::Error;
+
+use crate::core::close_reason::CloseReason;
+use crate::core::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::core::notice::Notice;
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
+
+/// An action for the shell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Confirm to a worker that it is attached.
+    Welcome {
+        /// The worker.
+        worker: WorkerId,
+        /// Its lease.
+        lease: LeaseId,
+    },
+    /// Send a batch.
+    Send {
+        /// The worker.
+        worker: WorkerId,
+        /// Number of the batch.
+        batch: BatchId,
+        /// The work.
+        work: Work,
+    },
+    /// Revoke a batch.
+    Revoke {
+        /// The worker.
+        worker: WorkerId,
+        /// The batch.
+        batch: BatchId,
+    },
+    /// Send a heartbeat to a worker.
+    Heartbeat {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// Drain a worker: it leaves when it has answered the batches that it holds.
+    Drain {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// End a worker's stream.
+    Close {
+        /// The worker.
+        worker: WorkerId,
+        /// The reason.
+        reason: CloseReason,
+    },
+    /// Make a record durable, then report it with an event.
+    Store(Record),
+    /// Read an evaluation of a job, then report it with an event.
+    Read {
+        /// The job.
+        job: JobId,
+        /// Number of the evaluation.
+        number: u64,
+    },
+    /// Delete ended jobs, then report it with an event.
+    Prune {
+        /// The request, if a client sent one.
+        token: Option<Token>,
+        /// The jobs.
+        jobs: Vec<JobId>,
+    },
+    /// Answer a request.
+    Answer {
+        /// The request.
+        token: Token,
+        /// The answer.
+        answer: Answer,
+    },
+    /// Send a snapshot of a job to those who watch it.
+    Publish {
+        /// The job.
+        job: JobId,
+        /// The snapshot.
+        snapshot: JobSnapshot,
+    },
+    /// Write a notice for the operator into the log.
+    Note(Notice),
+    /// Give up because the store no longer accepts records.
+    GiveUp {
+        /// Its last error.
+        error: String,
+        /// Time for which it has refused a record.
+        waited: Duration,
+    },
+    /// Stop: everything is stored and every stream is closed.
+    Stop,
+}
+
+/// A record to store.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// An accepted job.
+    Job(JobRecord),
+    /// A complete evaluation.
+    Evaluation {
+        /// The evaluation.
+        record: EvaluationRecord,
+        /// Delete the evaluations stored after it: they belong to another path of the search.
+        is_last: bool,
+    },
+    /// The end of a job.
+    End {
+        /// The end.
+        end: EndRecord,
+        /// Summary of the path of its search.
+        summary: Arc<Summary>,
+    },
+    /// A worker is banned.
+    Ban(BanRecord),
+}
+
+impl Record {
+    /// Returns the job and the key of the record.
+    pub fn key(&self) -> (JobId, RecordKey) {
+        match self {
+            Self::Job(record) => (record.job, RecordKey::Job),
+            Self::Evaluation { record, .. } => (record.job, RecordKey::Evaluation(record.number)),
+            Self::End { end, .. } => (end.job, RecordKey::End),
+            Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
+        }
+    }
+}
+
+/// Key of a record of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordKey {
+    /// The job itself.
+    Job,
+    /// The evaluation with this number.
+    Evaluation(u64),
+    /// The end of the job.
+    End,
+    /// The ban with this number, of a worker that was found in this job.
+    Ban(u64),
+}
+
+/// Answer to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// The job is accepted and durable.
+    Submitted(JobId),
+    /// Snapshot of a job.
+    Snapshot(JobSnapshot),
+    /// A page of jobs.
+    Page {
+        /// Oldest first.
+        snapshots: Vec<JobSnapshot>,
+        /// Last job of the page, if there are more.
+        more_after: Option<JobId>,
+    },
+    /// The job has ended; its output is in the store.
+    Ended(EndRecord),
+    /// These ended jobs were deleted.
+    Pruned(Vec<JobId>),
+    /// The banned workers, with the time since their bans.
+    Banned(Vec<(BanRecord, Duration)>),
+    /// The attached workers, and those that departed last.
+    Workers(ListWorkersResponse),
+    /// Snapshot of a worker.
+    Worker(WorkerSnapshot),
+    /// The request is refused.
+    Refused(Refusal),
+}
+
+/// Why a request is refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Refusal {
+    /// There is no such job.
+    #[error("no such job: {job}")]
+    NoJob {
+        /// The job asked for.
+        job: JobId,
+    },
+    /// There is no such worker.
+    #[error("no worker with number {worker} is attached")]
+    NoWorker {
+        /// The worker asked for.
+        worker: WorkerId,
+    },
+    /// The request id belongs to a job with another specification.
+    #[error(
+        "request id `{request_id}` belongs to job {job}, which has another specification; \
+         choose another request id"
+    )]
+    RequestIdTaken {
+        /// The request id.
+        request_id: String,
+        /// The job it belongs to.
+        job: JobId,
+    },
+    /// Too many jobs are waiting or running.
+    #[error(
+        "{limit} jobs wait or run already, the most allowed; submit again when some have ended"
+    )]
+    TooManyJobs {
+        /// Maximum number of jobs.
+        limit: usize,
+    },
+    /// The specifications of the jobs that are waiting or running are too large together.
+    #[error(
+        "the specifications of {whose} jobs that wait or run take {held} bytes, with this one's \
+         {more} more than the {limit} allowed; submit again when some have ended, or with fewer \
+         measured velocities"
+    )]
+    TooMuchQueued {
+        /// `this client's` or `all`.
+        whose: &'static str,
+        /// Size of the specifications held already, bytes.
+        held: u64,
+        /// Size of the refused specification, bytes.
+        more: u64,
+        /// Maximum total size, bytes.
+        limit: u64,
+    },
+    /// The job has not ended.
+    #[error("job {job} has not ended")]
+    NotEnded {
+        /// The job.
+        job: JobId,
+    },
+    /// The coordinator is stopping.
+    #[error("the coordinator is shutting down; try again when it is back")]
+    Draining,
+    /// The store could not delete the jobs.
+    #[error("the store cannot delete the ended jobs; none was deleted: {error}")]
+    NotPruned {
+        /// Error of the store.
+        error: String,
+    },
+    /// The store refused the job.
+    #[error("the job could not be stored and is not accepted: {error}")]
+    Store {
+        /// Error of the store.
+        error: String,
+    },
+}

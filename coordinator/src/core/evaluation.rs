@@ -1,0 +1,249 @@
+//! An evaluation under way: a result for each index, and the indices that nobody computes yet.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use osteon_common::outcome::{Outcome, RealizationResult, encode};
+use osteon_common::parameters::Point;
+use osteon_common::quantile;
+use osteon_common::results::EstimatedError;
+
+use crate::core::crashes::{Crashes, LostWorker};
+use crate::core::dispute::{self, Dispute, Vote};
+use crate::core::indices::Indices;
+use crate::core::worker_name::WorkerName;
+
+/// A batch that is to be computed a second time by another worker.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Audit {
+    /// Its indices, all filled.
+    pub(crate) indices: Indices,
+    /// The worker that computed them first.
+    pub(crate) by: WorkerName,
+    /// Number of workers that were lost over the audit.
+    pub(crate) lost: u32,
+}
+
+/// Contents of the store for an evaluation that is being computed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) enum StoredRecord {
+    /// No record.
+    #[default]
+    Missing,
+    /// A record that cannot be read.
+    Damaged,
+    /// Outcomes, some of them from a worker that was banned.
+    Outcomes(Arc<[Outcome]>),
+}
+
+/// The realizations of one point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PendingEvaluation {
+    /// Number of the evaluation, from 0.
+    pub number: u64,
+    /// Number of this attempt: batches of earlier attempts do not count in this one.
+    pub(crate) attempt: u64,
+    /// The point.
+    pub point: Point,
+    /// Contents of the store for it.
+    pub(crate) stored: StoredRecord,
+    /// Result of each index.
+    pub(crate) results: Vec<Option<RealizationResult>>,
+    /// Number of results that are filled.
+    pub(crate) filled: u64,
+    /// Indices to be sent, from the front.
+    pub(crate) queue: VecDeque<Indices>,
+    /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
+    /// they held nothing else. Those that wait for another attempt are in `quarantine`.
+    pub(crate) crashes: BTreeMap<u64, Crashes>,
+    /// Quarantined indices that wait to be sent, each alone to a worker that holds nothing else.
+    pub(crate) quarantine: VecDeque<u64>,
+    /// All workers whose answers are among the results.
+    pub(crate) workers: Vec<WorkerName>,
+    /// Position in `workers` of the worker that gave each result; meaningless while the result is
+    /// empty.
+    owners: Vec<u32>,
+    /// Audits that have not been sent yet.
+    pub(crate) audits: VecDeque<Audit>,
+    /// Number of audits that are being computed.
+    pub(crate) audits_out: usize,
+    /// Undecided disputes.
+    pub(crate) disputes: Vec<Dispute>,
+    /// A worker was lost over it. While it is speculative, no further worker is risked for it until
+    /// the search asks for it.
+    pub(crate) has_crashed_worker: bool,
+}
+
+impl PendingEvaluation {
+    /// Returns attempt `attempt` at an evaluation without any results.
+    pub fn new(number: u64, attempt: u64, point: Point, realizations: u64) -> Self {
+        let length = usize::try_from(realizations).unwrap_or(usize::MAX);
+        Self {
+            number,
+            attempt,
+            point,
+            stored: StoredRecord::Missing,
+            results: vec![None; length],
+            filled: 0,
+            queue: VecDeque::from([Indices { first: 0, count: realizations }]),
+            crashes: BTreeMap::new(),
+            quarantine: VecDeque::new(),
+            workers: Vec::new(),
+            owners: vec![0; length],
+            audits: VecDeque::new(),
+            audits_out: 0,
+            disputes: Vec::new(),
+            has_crashed_worker: false,
+        }
+    }
+
+    /// Returns the number of realizations that have an outcome.
+    pub fn filled(&self) -> u64 {
+        self.filled
+    }
+
+    /// Returns the number of realizations that wait to be sent, without the quarantined ones.
+    pub fn queued(&self) -> u64 {
+        self.queue.iter().map(|indices| indices.count).sum()
+    }
+
+    /// Takes at most `most` indices from the front of the queue.
+    pub fn take(&mut self, most: u64) -> Option<Indices> {
+        let front = self.queue.front_mut()?;
+        let taken = Indices { first: front.first, count: front.count.min(most.max(1)) };
+        front.first += taken.count;
+        front.count -= taken.count;
+        if front.count == 0 {
+            self.queue.pop_front();
+        }
+        Some(taken)
+    }
+
+    /// Puts the indices of a revoked batch back at the front of the queue.
+    pub fn put_back(&mut self, indices: Indices) {
+        match self.queue.front_mut() {
+            Some(front) if front.first == indices.end() => {
+                front.first = indices.first;
+                front.count += indices.count;
+            }
+            _ => self.queue.push_front(indices),
+        }
+    }
+
+    /// Puts the indices of a lost worker back at the front of the queue, in halves.
+    pub fn put_back_in_halves(&mut self, indices: Indices) {
+        let half = indices.count.div_ceil(2);
+        let rest = Indices { first: indices.first + half, count: indices.count - half };
+        if rest.count > 0 {
+            self.queue.push_front(rest);
+        }
+        self.queue.push_front(Indices { first: indices.first, count: half });
+    }
+
+    /// Puts an index that was alone in a batch of a lost worker into quarantine.
+    pub(crate) fn quarantine(&mut self, index: u64, loss: &LostWorker) {
+        self.count_crash(index, loss);
+        self.quarantine.push_back(index);
+    }
+
+    /// Counts the loss of a worker over one index of which another worker holds a duplicate.
+    pub(crate) fn count_crash(&mut self, index: u64, loss: &LostWorker) {
+        self.crashes.entry(index).or_default().add(loss);
+    }
+
+    /// Forgets the crashes of a worker that is back: nothing that it held is to blame.
+    pub(crate) fn forget_crashes(&mut self, name: &WorkerName) {
+        let judged = self.disputes.iter_mut().map(|dispute| &mut dispute.crashes);
+        for crashes in self.crashes.values_mut().chain(judged) {
+            crashes.forget(name);
+        }
+    }
+
+    /// Fills the empty results of `indices` with the answer of `by`.
+    pub fn fill(&mut self, indices: Indices, solved: &[RealizationResult], by: &WorkerName) {
+        let known = self.workers.iter().position(|worker| worker == by);
+        let place = known.unwrap_or_else(|| {
+            self.workers.push(by.clone());
+            self.workers.len() - 1
+        });
+        let owner = u32::try_from(place).unwrap_or(u32::MAX);
+        let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
+        let results = self.results.iter_mut().zip(&mut self.owners).skip(first);
+        for ((result, owned), solved) in results.zip(solved) {
+            if result.is_none() {
+                *result = Some(*solved);
+                *owned = owner;
+                self.filled += 1;
+            }
+        }
+    }
+
+    /// Compares an answer of `by` with the results of `indices`. Returns the difference, from the
+    /// first differing index to the last consecutive one that the same worker filled. Empty results
+    /// count as agreement.
+    pub(crate) fn compare(
+        &self,
+        indices: Indices,
+        solved: &[RealizationResult],
+        by: &WorkerName,
+    ) -> Option<(Indices, [Vote; 2])> {
+        let first = usize::try_from(indices.first).ok()?;
+        let results = self.results.get(first..)?;
+        let differs = |(result, later): (&Option<RealizationResult>, &RealizationResult)| {
+            result.is_some_and(|earlier| !dispute::same(earlier, *later))
+        };
+        let at = results.iter().zip(solved).position(differs)?;
+        let owner = self.owners.get(first + at)?;
+        let whose = self.owners.get(first + at..)?.iter().zip(results.get(at..)?);
+        let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, result)| *result);
+        let earlier: Vec<RealizationResult> = run.take(solved.len() - at).collect();
+        let later = solved.get(at..at + earlier.len())?.to_vec();
+        let indices = Indices { first: indices.first + at as u64, count: earlier.len() as u64 };
+        let owner = self.workers.get(usize::try_from(*owner).ok()?)?.clone();
+        let later = Vote { by: by.clone(), solved: later };
+        Some((indices, [Vote { by: owner, solved: earlier }, later]))
+    }
+
+    /// Returns the worker that filled the result of an index.
+    pub(crate) fn owner(&self, index: u64) -> Option<WorkerName> {
+        let owner = self.owners.get(usize::try_from(index).ok()?)?;
+        self.workers.get(usize::try_from(*owner).ok()?).cloned()
+    }
+
+    /// Returns whether every index has an outcome and no check of them is pending.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.filled >= self.results.len() as u64
+            && self.audits.is_empty()
+            && self.audits_out == 0
+            && self.disputes.is_empty()
+    }
+
+    /// Returns whether the evaluations stored after this one cannot be on its path, because the
+    /// store has outcomes other than `outcomes` for it, or none.
+    pub(crate) fn diverges_from_store(&self, outcomes: &[Outcome]) -> bool {
+        let bits = |outcome: &Outcome| {
+            let (code, velocity) = encode(*outcome);
+            (code, velocity.to_bits())
+        };
+        match &self.stored {
+            StoredRecord::Missing => true,
+            StoredRecord::Damaged => false,
+            StoredRecord::Outcomes(before) => {
+                !before.iter().map(bits).eq(outcomes.iter().map(bits))
+            }
+        }
+    }
+
+    /// Returns all outcomes in index order and the estimated errors of the successes, once it is
+    /// settled.
+    pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
+        if !self.is_settled() {
+            return None;
+        }
+        let outcomes: Option<_> =
+            self.results.iter().map(|result| result.map(|it| it.outcome)).collect();
+        let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
+        let errors = successes.map(|solved| solved.estimated_error).collect();
+        Some((outcomes?, quantile::estimated_error(errors)))
+    }
+}

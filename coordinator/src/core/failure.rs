@@ -1,0 +1,78 @@
+//! Failures of a job that are not caused by its search.
+
+use osteon_common::outcome::{RealizationResult, encode};
+use osteon_common::parameters::Point;
+use osteon_common::results::JobFailure;
+use osteon_search::ReplayError;
+use thiserror::Error;
+
+use crate::core::dispute::Contradiction;
+
+/// A failure of a job.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RunFailure {
+    /// Two answers for one index differ, and no third worker can decide between them.
+    #[error(
+        "integrity error: realization {} at the point {:?} is {} by {} and {} by {}; one of them \
+         computes wrongly, and there was no third worker to decide: attach three workers and \
+         submit the job again, or run it on each machine alone and compare the digests",
+        contradiction.index, point.0,
+        shown(contradiction.answers[0].1), contradiction.answers[0].0,
+        shown(contradiction.answers[1].1), contradiction.answers[1].0
+    )]
+    Contradiction {
+        /// The answers.
+        contradiction: Box<Contradiction>,
+        /// The point.
+        point: Point,
+    },
+    /// Workers are lost over one realization.
+    #[error(
+        "{workers} workers ({hosts}) were lost while they computed only realization {index}; to \
+         reproduce \
+         it, save the case file that follows as CASE.toml and run `osteon simulate CASE.toml`\n\
+         {case}"
+    )]
+    PoisonRealization {
+        /// Index of the realization.
+        index: u64,
+        /// Number of lost workers.
+        workers: usize,
+        /// Their hosts.
+        hosts: String,
+        /// The realization, as a case file.
+        case: String,
+    },
+    /// The stored evaluations are not those of the job's search.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// A stored evaluation is missing.
+    #[error("the store no longer has evaluation {number} of this job; submit the job again")]
+    Missing {
+        /// Number of the evaluation.
+        number: u64,
+    },
+}
+
+impl RunFailure {
+    /// Returns the kind of the failure.
+    pub fn kind(&self) -> JobFailure {
+        match self {
+            Self::Contradiction { .. } => JobFailure::IntegrityError,
+            Self::PoisonRealization { .. } => JobFailure::PoisonRealization,
+            Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
+        }
+    }
+}
+
+/// Describes an answer, for people.
+pub(crate) fn shown(solved: RealizationResult) -> String {
+    match solved.outcome {
+        Ok(velocity) => format!(
+            "{velocity} m/s (bits {:016x}, estimated error {:?})",
+            encode(solved.outcome).1.to_bits(),
+            solved.estimated_error
+        ),
+        Err(kind) => kind.name().to_owned(),
+    }
+}

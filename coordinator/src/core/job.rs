@@ -1,0 +1,230 @@
+//! A job in the coordinator: its progress, and the summary that remains when it has ended.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::parameters::Point;
+use osteon_proto::specification;
+use prost::Message as _;
+
+use crate::core::evaluation::PendingEvaluation;
+use crate::core::ids::{BatchId, Token};
+use crate::core::rate::Rate;
+use crate::core::realization_time::RealizationTime;
+use crate::core::worker_name::WorkerName;
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+use osteon_search::Search;
+
+/// A job that has not ended.
+#[derive(Debug)]
+pub(crate) struct Job {
+    pub(crate) record: JobRecord,
+    /// Digest of its specification, to compare two submissions with the same request id.
+    pub(crate) identity: SpecificationDigest,
+    pub(crate) stage: Stage,
+    pub(crate) search: Search,
+    /// Speculative evaluations of points that its search may ask for next.
+    pub(crate) speculation: Speculation,
+    /// Number of its evaluations in the store. Those that the search has not received yet are read
+    /// before it continues.
+    pub(crate) stored: u64,
+    /// All workers whose answers are in evaluations that the search has received.
+    pub(crate) workers: BTreeSet<WorkerName>,
+    /// Its search is restarted as soon as the record that is being stored is durable.
+    pub(crate) restart_pending: bool,
+    /// An evaluation was damaged in the store and has been computed again.
+    pub(crate) recomputed: bool,
+    /// A client has cancelled it; it ends as soon as the record that is being stored is durable.
+    pub(crate) cancelled: bool,
+    pub(crate) rate: Rate,
+    /// Duration of its realizations.
+    pub(crate) pace: RealizationTime,
+    /// The newest duplicate of one of its overdue batches.
+    pub(crate) newest_overdue_duplicate: Option<BatchId>,
+    /// Sequence number of its last published snapshot.
+    pub(crate) sequence: u64,
+    /// Time of its last answer, its beginning or its acceptance, whichever was last.
+    pub(crate) progressed: Duration,
+    /// Requests that are answered when the current record is durable: submissions at first,
+    /// cancellations at the end.
+    pub(crate) tokens: Vec<Token>,
+    /// The store's refusal of the current record.
+    pub(crate) store_trouble: Option<StoreRetry>,
+}
+
+impl Job {
+    /// Returns a job without computed results in this process, with `stored` evaluations in the
+    /// store.
+    pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
+        Self {
+            identity: identity(&record.specification),
+            search: Search::new(record.specification.clone()),
+            speculation: Speculation::default(),
+            record,
+            stage,
+            stored,
+            workers: BTreeSet::new(),
+            restart_pending: false,
+            recomputed: false,
+            cancelled: false,
+            rate: Rate::default(),
+            pace: RealizationTime::default(),
+            newest_overdue_duplicate: None,
+            sequence: sequence(0, now),
+            progressed: now,
+            tokens: Vec::new(),
+            store_trouble: None,
+        }
+    }
+
+    /// Returns the evaluation that the search asked for, while it is under way.
+    pub(crate) fn evaluation(&self) -> Option<&PendingEvaluation> {
+        match &self.stage {
+            Stage::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        }
+    }
+
+    /// Returns all evaluations under way; the one that the search asked for comes first.
+    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
+        self.evaluation().into_iter().chain(&self.speculation.evaluations)
+    }
+
+    /// As [`Job::evaluations`].
+    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
+        let asked_for = match &mut self.stage {
+            Stage::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        };
+        asked_for.into_iter().chain(&mut self.speculation.evaluations)
+    }
+}
+
+/// Progress of a job.
+#[derive(Debug)]
+pub(crate) enum Stage {
+    /// Its record is being stored; no client has had an answer.
+    Accepting,
+    /// It waits for its turn.
+    Waiting,
+    /// A stored evaluation is being read for its search.
+    Replaying {
+        /// The store has received the request to read it.
+        asked: bool,
+    },
+    /// Batches of its evaluation are sent to workers.
+    Computing(PendingEvaluation),
+    /// A complete evaluation is being stored.
+    Storing {
+        /// The evaluation.
+        record: EvaluationRecord,
+        /// Evaluations stored after it belong to another path of the search and are deleted.
+        is_last: bool,
+    },
+    /// Its end is being stored.
+    Finishing(EndRecord),
+}
+
+impl Stage {
+    /// Whether a record of the job is not durable yet.
+    pub(crate) fn is_storing(&self) -> bool {
+        matches!(self, Self::Accepting | Self::Storing { .. } | Self::Finishing(_))
+    }
+}
+
+/// Points that a search may ask for next. They are neither stored nor shown.
+#[derive(Debug, Default)]
+pub(crate) struct Speculation {
+    /// Candidate points, most likely first.
+    pub(crate) candidates: Vec<Point>,
+    /// Evaluations of candidates that have begun, in the order of their beginning.
+    pub(crate) evaluations: Vec<PendingEvaluation>,
+}
+
+/// A refusal of the store.
+#[derive(Debug)]
+pub(crate) struct StoreRetry {
+    pub(crate) since: Duration,
+    pub(crate) retry_at: Duration,
+    pub(crate) error: String,
+    /// The record is on its way to the store again.
+    pub(crate) on_its_way: bool,
+}
+
+/// A job whose end is durable, as far as lists show it.
+#[derive(Debug)]
+pub(crate) struct EndedJob {
+    pub(crate) request: Option<RequestName>,
+    pub(crate) identity: SpecificationDigest,
+    pub(crate) kind: JobKind,
+    /// The client that submitted it.
+    pub(crate) client: String,
+    /// Display name; may be empty.
+    pub(crate) name: String,
+    /// Priority among the jobs of its client.
+    pub(crate) priority: u32,
+    pub(crate) max_evaluations: u64,
+    /// Number of realizations of each evaluation.
+    pub(crate) realizations: u64,
+    /// Time of acceptance, since the Unix epoch.
+    pub(crate) accepted: Duration,
+    /// Sequence number of its last snapshot.
+    pub(crate) sequence: u64,
+    pub(crate) end: EndRecord,
+}
+
+impl EndedJob {
+    /// Returns the summary of an ended job whose last snapshot has number `sequence`.
+    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
+        let specification = &record.specification;
+        Self {
+            request: RequestName::from_record(record),
+            identity: identity(specification),
+            kind: specification.kind,
+            client: record.client.clone(),
+            name: record.name.clone(),
+            priority: record.priority,
+            max_evaluations: specification.evaluations_max(),
+            realizations: specification.monte_carlo.realizations,
+            accepted: record.accepted,
+            sequence: self::sequence(sequence, end.ended),
+            end,
+        }
+    }
+}
+
+/// Name of the request that submitted a job: ids of different clients are independent.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct RequestName {
+    client: String,
+    id: String,
+}
+
+impl RequestName {
+    /// Returns the name of request `id` of `client`; `None` without an id, since such a request is
+    /// never repeated.
+    pub(crate) fn new(client: &str, id: &str) -> Option<Self> {
+        (!id.is_empty()).then(|| Self { client: client.to_owned(), id: id.to_owned() })
+    }
+
+    /// Returns the name of the request that submitted a job.
+    pub(crate) fn from_record(record: &JobRecord) -> Option<Self> {
+        Self::new(&record.client, &record.request_id)
+    }
+}
+
+/// Digest of a specification.
+pub(crate) type SpecificationDigest = [u8; 32];
+
+/// Returns the digest of a specification; different specifications have different digests.
+pub(crate) fn identity(specification: &JobSpecification) -> SpecificationDigest {
+    let encoded = specification::to_message(specification).encode_to_vec();
+    *blake3::hash(&encoded).as_bytes()
+}
+
+/// Returns the sequence number of a snapshot at `now` after one with number `last`. It always
+/// increases, and since it follows the clock it increases across restarts too.
+pub(crate) fn sequence(last: u64, now: Duration) -> u64 {
+    u64::try_from(now.as_millis()).unwrap_or(u64::MAX).max(last.saturating_add(1))
+}

@@ -1,0 +1,91 @@
+//! Synchronous functions from state, event and time to effects: the coordinator's reaction to each
+//! event. They use no socket, clock or task; a run is a function of its events and their times.
+//!
+//! There are three layers, each of which calls only those below it:
+//!
+//! - `integrity` decides which answers count: it takes in answers, compares them, settles disputes
+//!   and bans workers;
+//! - `lifecycle` manages jobs, their records, client requests, and the arrival and departure of
+//!   workers;
+//! - `dispatch` decides which worker computes what: it sends batches, duplicates, audits and
+//!   speculative batches.
+//!
+//! No two files call each other in a circle (`tests/circles.rs`). A lower layer returns what an
+//! upper one must act on: the failure of a job, or an evaluation that may be complete.
+
+use std::time::Duration;
+
+use crate::core::effect::{Effect, RecordKey};
+use crate::core::event::Event;
+use crate::core::state::State;
+
+use self::integrity::{answers, bans, checks};
+use self::lifecycle::{prune, records, replay, requests, ticks, workers};
+use self::turn::Turn;
+
+mod dispatch;
+mod integrity;
+mod lifecycle;
+mod turn;
+
+pub(crate) use dispatch::overdue::DUPLICATES_MAX;
+pub(crate) use dispatch::speculation::CANDIDATES_MAX;
+pub use lifecycle::restore::Restored;
+
+#[cfg(test)]
+mod tests;
+
+/// Changes `state` by one event at `now`, and returns the effects to be carried out.
+pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
+    let mut turn = Turn::new(state, now);
+    // A heartbeat makes no worker free, and heartbeats are frequent.
+    let frees = !matches!(event, Event::Heartbeat { .. });
+    apply(&mut turn, event);
+    if frees {
+        dispatch::dispatch(&mut turn);
+    }
+    if turn.state.draining && turn.state.unstored() == 0 {
+        turn.effects.push(Effect::Stop);
+    }
+    turn.effects
+}
+
+fn apply(turn: &mut Turn, event: Event) {
+    match event {
+        Event::Tick => tick(turn),
+        Event::Requested { token, request } => requests::requested(turn, token, request),
+        Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
+        Event::Answered { worker, batch, solved, elapsed_s } => {
+            answers::answered(turn, worker, batch, solved, elapsed_s);
+        }
+        Event::Heartbeat { worker } => workers::seen(turn.state, worker, turn.now),
+        Event::WorkerDrains { worker } => workers::drains(turn, worker),
+        Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
+        Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
+        Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
+        Event::Stored { job, key } => records::stored(turn, job, key),
+        Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
+            bans::store_failed(turn, number, error);
+        }
+        Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
+        Event::Read { job, number, found } => replay::read(turn, job, number, found),
+        Event::Pruned { token, jobs, outcome } => prune::pruned(turn, token, jobs, outcome),
+        Event::Drain => workers::drain_all(turn),
+    }
+}
+
+/// Reacts to the passing of time.
+fn tick(turn: &mut Turn) {
+    ticks::compensate_gap(turn.state, turn.now);
+    ticks::expire(turn);
+    ticks::send_heartbeats(turn);
+    dispatch::overdue::tick(turn);
+    checks::give_up(turn);
+    if !turn.state.draining {
+        ticks::fail_poisoned(turn);
+        ticks::store_again(turn);
+        bans::store_again(turn);
+        prune::tick(turn);
+    }
+    ticks::publish(turn);
+}

@@ -1,0 +1,97 @@
+//! Dispatch: decides which worker computes what next.
+//!
+//! Workers are served in ascending order of the batches they hold, clients in ascending order of
+//! the computing time they have received, and the jobs of a client by priority, then in turn, batch
+//! by batch. `sizing.rs` decides how large a batch is. The order of service is:
+//!
+//! 1. quarantined realizations, each alone on a worker (`poison.rs`). A worker that is reserved for
+//!    one gets no other new work;
+//! 2. duplicates of overdue batches (`overdue.rs`);
+//! 3. audits and tie-breakers (`audits.rs`), then the queues of the evaluations under way;
+//! 4. for idle workers: duplicates of late batches, speculative batches (`idle.rs`), and duplicates
+//!    of the batches that have been out longest (`duplicates.rs`).
+//!
+//! A worker on probation gets one realization at a time.
+
+use std::collections::BTreeSet;
+
+use crate::core::batch::{Assignment, Purpose};
+use crate::core::ids::WorkerId;
+use crate::core::job::Job;
+use crate::core::reactor::turn::Turn;
+
+mod audits;
+pub(super) mod batches;
+pub(super) mod departures;
+mod duplicates;
+mod eta;
+mod idle;
+pub(super) mod overdue;
+pub(super) mod poison;
+mod schedule;
+pub(super) mod sizing;
+pub(super) mod speculation;
+
+/// Sends batches while workers can accept more and work waits, then duplicates.
+pub(crate) fn dispatch(turn: &mut Turn) {
+    if turn.state.draining {
+        return;
+    }
+    let mut kept = poison::dispatch(turn);
+    overdue::dispatch(turn, &mut kept);
+    while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
+    duplicates::duplicate_late_batches(turn);
+    if kept.is_empty() && !schedule::work_waits(turn.state) {
+        idle::dispatch(turn);
+    }
+    duplicates::duplicate_slow_batches(turn);
+}
+
+/// Sends one check or batch to the first free worker that is eligible for it, and returns whether
+/// there was one. The workers in `kept` receive nothing.
+fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
+    let mut free = schedule::free_workers(turn.state, kept);
+    let first = free.first().and_then(|first| turn.state.workers.get(first));
+    if !schedule::checks_wait(turn.state) && first.is_some_and(|first| turn.state.is_sound(first)) {
+        // Without checks, all sound workers are eligible for the same batches, so the first is
+        // enough.
+        free.truncate(1);
+    }
+    free.into_iter().any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker))
+}
+
+/// Sends a worker a batch of the job that is next in turn.
+fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
+    let Some(job) = schedule::next_job(turn.state) else {
+        return false;
+    };
+    let Some(evaluation) = turn.state.jobs.get(&job).and_then(Job::evaluation) else {
+        return false;
+    };
+    let Some(attached) = turn.state.workers.get(&worker) else {
+        return false;
+    };
+    let size = if turn.state.is_sound(attached) {
+        sizing::batch_size(turn.state, attached, job, evaluation.queued())
+    } else if !turn.state.probation.is_paused(&attached.name, turn.now)
+        || !turn.state.answers_batches(|_| true)
+    {
+        1
+    } else {
+        return false;
+    };
+    let Some(evaluation) = turn.state.evaluation_mut(job) else {
+        return false;
+    };
+    let attempt = evaluation.attempt;
+    let Some(indices) = evaluation.take(size) else {
+        return false;
+    };
+    turn.state.last_served = Some(job);
+    let assignment = Assignment { job, attempt, indices };
+    let batch = batches::send(turn, worker, assignment, Purpose::Fill);
+    if let Some(batch) = batch {
+        batches::charge(turn.state, batch);
+    }
+    true
+}

@@ -1,0 +1,70 @@
+//! Chooses the workers for audits and tie-breakers.
+
+use super::{batches, poison};
+use crate::core::batch::{Assignment, Purpose};
+use crate::core::dispute::Dispute;
+use crate::core::evaluation::Audit;
+use crate::core::ids::{JobId, WorkerId};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{AttachedWorker, State};
+
+/// Sends a worker a tie-breaker or an audit that it is eligible for, if there is one; disputes come
+/// first.
+pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
+    let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone()) else {
+        return false;
+    };
+    let on_probation = turn.state.probation.has(&name);
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        if let Some(at) = dispute_for(turn.state, job, worker) {
+            return hand_dispute(turn, job, at, worker);
+        }
+        if on_probation {
+            continue;
+        }
+        let Some(evaluation) = turn.state.evaluation_mut(job) else {
+            continue;
+        };
+        let attempt = evaluation.attempt;
+        let of_others = |audit: &Audit| audit.by != name;
+        let at = evaluation.audits.iter().position(of_others);
+        if let Some(audit) = at.and_then(|at| evaluation.audits.remove(at)) {
+            evaluation.audits_out += 1;
+            let assignment = Assignment { job, attempt, indices: audit.indices };
+            let purpose = Purpose::Audit { lost: audit.lost };
+            batches::send(turn, worker, assignment, purpose);
+            return true;
+        }
+    }
+    false
+}
+
+/// Returns the first dispute of a job that this worker shall decide: one for which no eligible
+/// worker has a better reputation.
+fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
+    let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let worker = state.workers.get(&worker)?;
+    let is_for = |dispute: &Dispute| {
+        let reputation =
+            |worker: &AttachedWorker| poison::reputation(state, worker, &dispute.crashes);
+        let may = |worker: &&AttachedWorker| !worker.draining && !dispute.has_vote_of(&worker.name);
+        let best = state.workers.values().filter(may).map(reputation).min();
+        dispute.tie_breakers.is_empty() && may(&worker) && best == Some(reputation(worker))
+    };
+    evaluation.disputes.iter().position(is_for)
+}
+
+/// Sends a worker the tie-breaker of a dispute.
+fn hand_dispute(turn: &mut Turn, job: JobId, at: usize, worker: WorkerId) -> bool {
+    let Some(evaluation) = turn.state.evaluation_mut(job) else {
+        return false;
+    };
+    let (attempt, indices) = (evaluation.attempt, evaluation.disputes[at].indices);
+    let assignment = Assignment { job, attempt, indices };
+    let batch = batches::send(turn, worker, assignment, Purpose::TieBreak);
+    if let Some(evaluation) = turn.state.evaluation_mut(job) {
+        evaluation.disputes[at].tie_breakers.extend(batch);
+    }
+    batch.is_some()
+}

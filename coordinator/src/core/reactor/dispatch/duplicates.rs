@@ -1,0 +1,76 @@
+//! Duplicates of slow batches for idle workers: the first answer counts.
+
+use super::{batches, eta, schedule};
+use crate::core::batch::Batch;
+use crate::core::ids::{BatchId, WorkerId};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{AttachedWorker, State};
+
+/// A batch that has taken this many times its expected time is duplicated before anything is
+/// computed speculatively.
+const LATE: u32 = 2;
+
+/// Sends each otherwise idle worker a duplicate of a late batch, starting with the batch that has
+/// been out longest.
+pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
+    let now = turn.now;
+    let idle = |state: &State, worker: &AttachedWorker| schedule::held(state, worker) == 0;
+    let late = |state: &State, batch: &Batch| {
+        now.saturating_sub(batch.sent) >= LATE * eta::expected(state, batch)
+    };
+    duplicate(turn, idle, late);
+}
+
+/// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
+pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
+    duplicate(turn, |_, worker| worker.in_flight.is_empty(), |_, _| true);
+}
+
+/// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
+/// `worth` it. Batches younger than half the target time are about to be answered and are not
+/// duplicated.
+fn duplicate(
+    turn: &mut Turn,
+    idle: impl Fn(&State, &AttachedWorker) -> bool,
+    worth: impl Fn(&State, &Batch) -> bool,
+) {
+    let (state, now) = (&*turn.state, turn.now);
+    let patience = state.config.batch_target / 2;
+    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
+    if !open(state).next().is_some_and(|(_, oldest)| old(oldest)) {
+        return;
+    }
+    let idle = |worker: &AttachedWorker| state.is_sound(worker) && idle(state, worker);
+    let idle: Vec<WorkerId> =
+        state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
+    for worker in idle {
+        let state = &*turn.state;
+        let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch) && worth(state, batch);
+        let Some((slowest, _)) = open(state).find(is_worth) else {
+            return;
+        };
+        send(turn, slowest, worker);
+    }
+}
+
+/// Returns the batches that may be duplicated before they are overdue, in the order they were sent.
+fn open(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
+    let batches = state.batches.iter().map(|(id, batch)| (*id, batch));
+    batches.filter(|(_, batch)| batch.may_be_duplicated())
+}
+
+/// Sends a worker a duplicate of a batch and returns its number, if its evaluation is under way.
+pub(crate) fn send(turn: &mut Turn, of: BatchId, to: WorkerId) -> Option<BatchId> {
+    let Batch { assignment, purpose, .. } = *turn.state.batches.get(&of)?;
+    let duplicate = batches::send(turn, to, assignment, purpose)?;
+    let mut others = turn.state.batches.get(&of)?.duplicates.clone();
+    others.push(of);
+    for id in &others {
+        turn.state.overdue.remove(id);
+        if let Some(other) = turn.state.batches.get_mut(id) {
+            other.duplicates.push(duplicate);
+        }
+    }
+    turn.state.batches.get_mut(&duplicate)?.duplicates = others;
+    Some(duplicate)
+}

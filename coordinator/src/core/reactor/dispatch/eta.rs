@@ -1,0 +1,45 @@
+//! Expected completion times (ETAs) of batches, from the rates of their workers.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::core::batch::{Batch, Purpose};
+use crate::core::fairness;
+use crate::core::ids::JobId;
+use crate::core::state::State;
+
+/// Returns the ETA of the last batch of each evaluation that a search waits for.
+pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {
+    let mut etas = BTreeMap::new();
+    let asked_for = state.batches.values().filter(|it| it.purpose != Purpose::Speculative);
+    for batch in asked_for {
+        if let Some(answered) = of_batch(state, batch) {
+            let eta: &mut Duration = etas.entry(batch.assignment.job).or_default();
+            *eta = answered.max(*eta);
+        }
+    }
+    etas
+}
+
+/// Returns the ETA of a batch.
+fn of_batch(state: &State, batch: &Batch) -> Option<Duration> {
+    let worker = state.workers.get(&batch.worker)?;
+    // Two batches of more than half a worker's slots each are computed one after the other.
+    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.slots.into();
+    if !large(batch) {
+        return Some(batch.sent + expected(state, batch));
+    }
+    let held = worker.in_flight.iter().filter_map(|id| state.batches.get(id));
+    let before = held.filter(|held| held.sent < batch.sent && large(held));
+    let waits: Duration = before.map(|held| expected(state, held)).sum();
+    Some(batch.sent.max(worker.answered) + waits + expected(state, batch))
+}
+
+/// Returns the expected time of a batch, or zero if its rate is unknown.
+pub(crate) fn expected(state: &State, batch: &Batch) -> Duration {
+    let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
+    let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
+    rate.map_or(Duration::ZERO, |rate| {
+        fairness::slot_time(batch.assignment.indices.count as f64 / rate, 1)
+    })
+}

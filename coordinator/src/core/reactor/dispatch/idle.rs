@@ -1,0 +1,180 @@
+//! Speculative batches for idle slots, and the cases in which these slots stay idle instead.
+//!
+//! A realization that has begun is not interrupted, so a slot that will soon be needed stays idle
+//! until then: when the evaluation of the same job is about to be complete, since another point may
+//! be likelier afterwards, and when another job is about to need the slot.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_common::parameters::Point;
+
+use super::speculation::realizations;
+use super::{batches, eta, sizing};
+use crate::core::batch::{Assignment, Purpose};
+use crate::core::evaluation::PendingEvaluation;
+use crate::core::fairness;
+use crate::core::ids::{JobId, WorkerId};
+use crate::core::indices::Indices;
+use crate::core::job::{Job, Stage};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
+
+/// ETA of the last batch of each evaluation that a search waits for.
+type Etas = BTreeMap<JobId, Duration>;
+
+/// Sends speculative batches to the workers with idle slots.
+pub(crate) fn dispatch(turn: &mut Turn) {
+    if next(turn.state).is_none() {
+        return;
+    }
+    let idle = turn.state.workers.iter().map(|(id, worker)| (*id, spare(turn.state, worker)));
+    let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, slots)| *slots > 0).collect();
+    let mut slots: u64 = idle.iter().map(|(_, slots)| slots).sum();
+    let etas = eta::etas(turn.state);
+    let mut wanted = next(turn.state);
+    for (worker, spare) in idle {
+        let Some((job, point)) = wanted else {
+            return;
+        };
+        if !waits(turn.state, job, &point, worker, slots, &etas, turn.now) {
+            send(turn, job, point, worker);
+            slots -= spare;
+            wanted = next(turn.state);
+        }
+    }
+}
+
+/// Chooses the point to compute speculatively next, and its job. First come points that a search
+/// will certainly ask for, once a record is durable. Then come points by their rank among the
+/// candidates of their job; among equal ranks the order is that of other work.
+fn next(state: &State) -> Option<(JobId, Point)> {
+    let of_job = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let has_room = || {
+            let more = job.record.specification.monte_carlo.realizations;
+            realizations(state) + more <= state.config.active_realizations_max
+        };
+        let place =
+            job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
+                Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
+                None => has_room(),
+            })?;
+        let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });
+        let had = state.shares.used(&job.record.client);
+        Some((!certain, place, had, Reverse(job.record.priority), *id))
+    };
+    let (_, place, .., id) = state.active.iter().filter_map(of_job).min()?;
+    let point = state.jobs.get(&id)?.speculation.candidates.get(place)?;
+    Some((id, *point))
+}
+
+/// Returns whether the idle slots of a worker should stay idle; `slots` is the number of idle slots
+/// of all workers.
+fn waits(
+    state: &State,
+    id: JobId,
+    point: &Point,
+    worker: WorkerId,
+    slots: u64,
+    etas: &Etas,
+    now: Duration,
+) -> bool {
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return true;
+    };
+    let spare = spare(state, attached);
+    // A realization that has begun is not interrupted.
+    let begun = spare.min(queued(job, point)) as f64;
+    let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
+    let takes = fairness::slot_time(seconds, 1);
+    let soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
+    etas.get(&id).is_some_and(soon)
+        || slots < spare + wanted_by_others(state, id, now + takes, etas)
+}
+
+/// Returns the number of realizations of a point that nobody computes yet.
+fn queued(job: &Job, point: &Point) -> u64 {
+    let realizations = job.record.specification.monte_carlo.realizations;
+    job.speculation.at(point).map_or(realizations, PendingEvaluation::queued)
+}
+
+/// Returns the number of slots that jobs other than `but` will need before `until`, beyond those
+/// they have.
+fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
+    let wanted = |id: &JobId| {
+        let job = state.jobs.get(id)?;
+        let specification = &job.record.specification;
+        let realizations = specification.monte_carlo.realizations;
+        match &job.stage {
+            Stage::Storing { .. } if specification.kind == JobKind::Propagation => None,
+            Stage::Computing(evaluation) => {
+                let soon = etas.get(id).is_some_and(|eta| *eta < until);
+                soon.then_some(evaluation.filled())
+            }
+            Stage::Storing { .. } if has_next(job) => None,
+            Stage::Storing { .. } | Stage::Replaying { .. } => Some(realizations),
+            Stage::Accepting | Stage::Waiting | Stage::Finishing(_) => None,
+        }
+    };
+    state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
+}
+
+/// Returns whether every batch of the point that a job asks for next, when its record is durable,
+/// has been sent.
+fn has_next(job: &Job) -> bool {
+    let next = job.speculation.candidates.first().and_then(|next| job.speculation.at(next));
+    next.is_some_and(|next| next.queue.is_empty())
+}
+
+/// Sends a batch of a point to the idle slots of a worker.
+fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
+    let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
+    else {
+        return;
+    };
+    let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
+    let size = match batches::realizations_held(turn.state, attached) {
+        0 => sizing::batch_size(turn.state, attached, id, queued).max(spare.min(queued)),
+        _ => spare,
+    };
+    let Some((attempt, indices)) = take(turn.state, id, point, size) else {
+        return;
+    };
+    let assignment = Assignment { job: id, attempt, indices };
+    batches::send(turn, worker, assignment, Purpose::Speculative);
+}
+
+/// Takes indices of a point, beginning its evaluation if necessary; returns them with the number of
+/// the attempt.
+fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
+    let attempt = state.new_attempt();
+    let job = state.jobs.get_mut(&id)?;
+    if job.speculation.at(&point).is_none() {
+        // The lowest number that it may get. The number only decides which batches are audited.
+        let number = job.search.evaluations() + 1;
+        let realizations = job.record.specification.monte_carlo.realizations;
+        job.speculation.evaluations.push(PendingEvaluation::new(
+            number,
+            attempt,
+            point,
+            realizations,
+        ));
+    }
+    let evaluation = job.speculation.at_mut(&point)?;
+    Some((evaluation.attempt, evaluation.take(size)?))
+}
+
+/// Returns the number of slots of a worker that no other work needs.
+fn spare(state: &State, worker: &AttachedWorker) -> u64 {
+    let holds = |purpose| state.held_for(worker, purpose).next().is_some();
+    let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
+    let failing = state.is_failing(worker.name.host());
+    let taken = holds(Purpose::Speculative) || holds(Purpose::Exclusive);
+    if !state.is_sound(worker) || full || failing || taken {
+        return 0;
+    }
+    u64::from(worker.hello.slots).saturating_sub(batches::realizations_held(state, worker))
+}

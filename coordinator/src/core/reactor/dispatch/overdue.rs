@@ -1,0 +1,363 @@
+//! Batches of any purpose that are out much longer than expected, and the workers that hold them.
+//!
+//! A worker may send heartbeats and never answer. So another worker gets a duplicate of an overdue
+//! batch, and the first answer counts; if the duplicate becomes overdue too, a third worker gets
+//! one. Each duplicate may take twice as long as the one before, so that realizations that are slow
+//! everywhere are computed only a few times. Where other work waits, a job has one such duplicate
+//! out at a time: its answer shows how long the others should take.
+//!
+//! A worker that misses batches in a row is on probation until it answers one (`probation.rs`).
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use super::poison::{self, Reputation};
+use super::{batches, duplicates, schedule};
+use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::crashes::Crashes;
+use crate::core::dispute::Dispute;
+use crate::core::fairness;
+use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{AttachedWorker, State};
+use crate::core::worker_name::WorkerName;
+
+/// No batch is overdue before this time. A worker, a network or a machine may pause for a second or
+/// two without being faulty.
+const OVERDUE_MIN: Duration = Duration::from_secs(3);
+/// No batch is overdue before it has taken this many times its expected time: a machine may have
+/// other things to do, and one point may take several times as long as another.
+const OVERDUE_FACTOR: u32 = 4;
+/// Maximum number of batches with the same indices at a time. The last of them would be sent after
+/// six minutes at the earliest.
+pub(crate) const DUPLICATES_MAX: usize = 8;
+/// Maximum number of duplicates that are sent on one event; the others follow on the next.
+const SENT_AT_ONCE_MAX: usize = 64;
+/// A worker is on probation after this many consecutive batches that others answered, over at least
+/// [`OVERDUE_MIN`]. It holds two at a time, so a single pause is not enough.
+const MISSED_MAX: u32 = 3;
+/// A worker whose batch is overdue, and has been out for this long, is on probation too: there may
+/// be no other worker to answer the batch.
+const SILENT_MAX: Duration = Duration::from_secs(60);
+
+/// Finds batches that are overdue.
+pub(crate) fn tick(turn: &mut Turn) {
+    turn.state.probation.forget(turn.now);
+    let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
+    let late: Vec<BatchId> = late.copied().collect();
+    for id in &late {
+        suspect_silent(turn.state, *id, turn.now);
+    }
+    let waits = |id: &BatchId| {
+        turn.state.batches.get(id).is_some_and(|batch| {
+            let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
+            let asked_for = batch.purpose != Purpose::Speculative;
+            newest && asked_for && batch.duplicates.len() + 1 < DUPLICATES_MAX
+        })
+    };
+    turn.state.overdue = late.into_iter().filter(waits).collect();
+    for id in Vec::from_iter(turn.state.overdue.iter().copied()) {
+        give_up_audit(turn, id);
+    }
+}
+
+/// Returns whether a batch is overdue.
+fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
+    state.batches.get(&id).is_some_and(|batch| {
+        let waited = now.saturating_sub(batch.begun);
+        let factor = 2_u32.saturating_pow(batch.retries);
+        // Most batches are young; the expected time is computed only for the others.
+        waited >= OVERDUE_MIN * factor
+            && waited >= expected(state, id).unwrap_or_default() * OVERDUE_FACTOR * factor
+    })
+}
+
+/// Returns whether an answer to a batch may still be expected: the batch is not overdue, or its
+/// worker is not on probation.
+pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
+    let worker = state.batches.get(&id).and_then(|batch| state.workers.get(&batch.worker));
+    worker.is_some_and(|worker| !state.probation.has(&worker.name) || !is_overdue(state, id, now))
+}
+
+/// Returns the expected time of a batch, together with those that its worker was sent before it, by
+/// the rate of the worker or the pace of the job, whichever is slower; `None` if the pace of the
+/// job is unknown.
+fn expected(state: &State, id: BatchId) -> Option<Duration> {
+    let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
+    let alone = |id: &BatchId| {
+        let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
+        let pace = state.jobs.get(&job)?.pace.expected(indices.count, worker.hello.slots);
+        let rate = worker.rates.get(&job);
+        pace.max(rate.map(|rate| fairness::slot_time(indices.count as f64 / rate, 1)))
+    };
+    let before = worker.in_flight.iter().filter(|held| **held < id);
+    let before: Duration = before.filter_map(alone).sum();
+    Some(before + alone(&id)?)
+}
+
+/// Puts a worker on probation that has held an overdue batch for too long.
+fn suspect_silent(state: &mut State, id: BatchId, now: Duration) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    // Before the first answer of the job, its realizations may simply take this long.
+    let long = now.saturating_sub(batch.begun) >= SILENT_MAX && expected(state, id).is_some();
+    if let Some(worker) =
+        state.workers.get(&batch.worker).filter(|worker| long && state.is_sound(worker))
+    {
+        let name = worker.name.clone();
+        begin_probation(state, &name, now, now);
+    }
+}
+
+/// Gives up an audit that two workers did not answer in time, or that no other worker without
+/// overdue batches can compute: the answer is then accepted unchecked.
+fn give_up_audit(turn: &mut Turn, id: BatchId) {
+    let Some(batch) = turn.state.batches.get(&id) else {
+        return;
+    };
+    let audit = matches!(batch.purpose, Purpose::Audit { .. });
+    let other =
+        || turn.state.workers.values().any(|worker| is_fit(turn.state, id, worker, turn.now));
+    if !audit || (batch.retries == 0 && other()) {
+        return;
+    }
+    let mut given_up = batch.duplicates.clone();
+    given_up.push(id);
+    for id in given_up {
+        missed(turn.state, id, turn.now);
+        batches::revoke(turn, id);
+    }
+}
+
+/// Sends duplicates of overdue batches, before any other work is sent. Adds workers to `kept` that
+/// must not receive further batches, so that they soon hold none.
+pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
+    if turn.state.overdue.is_empty() {
+        return;
+    }
+    let busy = schedule::work_waits(turn.state);
+    let mut free = schedule::free_workers(turn.state, kept);
+    let mut sent = 0;
+    for id in Vec::from_iter(turn.state.overdue.iter().copied()) {
+        let Some(batch) = turn.state.batches.get(&id) else {
+            continue;
+        };
+        let (job, alone) = (batch.assignment.job, batch.purpose == Purpose::Exclusive);
+        // Since the last tick an answer may have shown that the job is slow.
+        if sent >= SENT_AT_ONCE_MAX
+            || (free.is_empty() && !alone)
+            || !is_overdue(turn.state, id, turn.now)
+            || (busy && has_scout(turn.state, job, turn.now))
+        {
+            continue;
+        }
+        let Some(choose_worker) = (if alone {
+            taker_alone(turn.state, id, turn.now)
+        } else {
+            choose_worker(turn.state, id, &free, turn.now)
+        }) else {
+            continue;
+        };
+        if alone && holds_anything(turn.state, choose_worker) {
+            kept.insert(choose_worker);
+        } else {
+            send(turn, id, choose_worker);
+            free.retain(|free| *free != choose_worker);
+            sent += 1;
+        }
+    }
+}
+
+/// Returns whether a job has a duplicate of an overdue batch out that is not overdue itself.
+fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
+    let newest_overdue_duplicate =
+        state.jobs.get(&job).and_then(|job| job.newest_overdue_duplicate);
+    newest_overdue_duplicate.is_some_and(|newest_overdue_duplicate| {
+        state.batches.contains_key(&newest_overdue_duplicate)
+            && !is_overdue(state, newest_overdue_duplicate, now)
+    })
+}
+
+fn holds_anything(state: &State, worker: WorkerId) -> bool {
+    state.workers.get(&worker).is_none_or(|worker| schedule::held(state, worker) > 0)
+}
+
+/// Chooses which of the workers in `free` gets a duplicate of a batch.
+fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
+    let rank = |(worker, choose_worker): &(&AttachedWorker, WorkerId)| {
+        let doubtful = worker.missed.count > 0 || !worker.has_answered;
+        let on_probation = !state.is_sound(worker);
+        let of_holder = is_of_holder(state, id, worker);
+        (on_probation, doubtful, of_holder, schedule::held(state, worker), *choose_worker)
+    };
+    let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
+    let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
+    fit.min_by_key(rank).map(|(_, choose_worker)| choose_worker)
+}
+
+/// Chooses the worker that gets a duplicate of an exclusive batch, whether it is busy or not.
+fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
+    let batch = state.batches.get(&id)?;
+    let crashes =
+        state.evaluation_of(&batch.assignment)?.crashes.get(&batch.assignment.indices.first);
+    let nobody = Crashes::default();
+    let crashes = crashes.unwrap_or(&nobody);
+    if poison::crash_limit_reached(state, crashes, |_| true) {
+        return None;
+    }
+    let rank =
+        |(choose_worker, worker): &(&WorkerId, &AttachedWorker)| -> (Reputation, bool, usize, WorkerId) {
+            let reputation = poison::reputation(state, worker, crashes);
+            (
+                reputation,
+                is_of_holder(state, id, worker),
+                schedule::held(state, worker),
+                **choose_worker,
+            )
+        };
+    let fit = |worker: &AttachedWorker| {
+        is_fit(state, id, worker, now) && !state.is_failing(worker.name.host())
+    };
+    let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
+    fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
+}
+
+/// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue
+/// batch itself.
+fn is_fit(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
+    let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
+    let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
+    trusted && may_have(state, id, &worker.name) && !late()
+}
+
+/// Returns whether a worker on probation is tried with a duplicate of a batch. Audits are not used
+/// for that.
+fn is_tried(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
+    let purpose = state.batches.get(&id).map(|batch| batch.purpose);
+    !worker.draining
+        && worker.in_flight.is_empty()
+        && !state.probation.is_paused(&worker.name, now)
+        && matches!(purpose, Some(Purpose::Fill | Purpose::Exclusive | Purpose::TieBreak))
+}
+
+/// Returns the names of the workers that hold a batch and its duplicates.
+fn holders(state: &State, id: BatchId) -> impl Iterator<Item = &WorkerName> {
+    let others = state.batches.get(&id).into_iter().flat_map(|batch| &batch.duplicates).copied();
+    let batches = others.chain([id]).filter_map(|id| state.batches.get(&id));
+    batches.filter_map(|batch| Some(&state.workers.get(&batch.worker)?.name))
+}
+
+fn is_of_holder(state: &State, id: BatchId, worker: &AttachedWorker) -> bool {
+    holders(state, id).any(|holder| holder.host() == worker.name.host())
+}
+
+/// Returns whether a worker is eligible for a duplicate of a batch. A worker that holds the batch
+/// or a duplicate is not, nor is the worker that the batch audits, nor one that has voted in the
+/// dispute that it decides.
+fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
+    let Some(batch) = state.batches.get(&id) else {
+        return false;
+    };
+    let Some(evaluation) = state.evaluation_of(&batch.assignment) else {
+        return false;
+    };
+    let about = |it: &&Dispute| it.tie_breakers.contains(&id);
+    let in_question = match batch.purpose {
+        Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
+        Purpose::Audit { .. } => {
+            evaluation.owner(batch.assignment.indices.first).is_none_or(|by| by == *name)
+        }
+        Purpose::TieBreak => {
+            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name))
+        }
+    };
+    !in_question && holders(state, id).all(|holder| holder != name)
+}
+
+/// Sends a worker a duplicate of an overdue batch.
+fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
+    let Some(batch) = turn.state.batches.get(&id) else {
+        return;
+    };
+    let Batch { assignment, purpose, retries, worker, .. } = *batch;
+    if purpose == Purpose::Exclusive {
+        batches::preempt(turn, to);
+    }
+    let Some(duplicate) = duplicates::send(turn, id, to) else {
+        return;
+    };
+    tracing::info!(job = %assignment.job, first = assignment.indices.first, overdue = %worker, %to,
+        "a batch is overdue; another worker computes the same");
+    if let Some(batch) = turn.state.batches.get_mut(&duplicate) {
+        batch.retries = retries + 1;
+    }
+    if let Some(evaluation) = turn.state.evaluation_of_mut(&assignment) {
+        match purpose {
+            Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
+            Purpose::Audit { .. } => evaluation.audits_out += 1,
+            Purpose::TieBreak => {
+                for dispute in &mut evaluation.disputes {
+                    if dispute.tie_breakers.contains(&id) {
+                        dispute.tie_breakers.push(duplicate);
+                    }
+                }
+            }
+        }
+    }
+    if let Some(job) = turn.state.jobs.get_mut(&assignment.job) {
+        job.newest_overdue_duplicate = Some(duplicate);
+    }
+}
+
+/// Counts a batch as missed if its worker should have answered it long ago. Called when it is
+/// revoked because another worker has answered it, or because it is no longer needed.
+pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
+    let Some(batch) = state.batches.get(&id) else {
+        return;
+    };
+    let waited = now.saturating_sub(batch.begun);
+    let expected = expected(state, id).unwrap_or_default();
+    if waited < (state.config.batch_target / 2).max(expected * OVERDUE_FACTOR) {
+        return;
+    }
+    let (sent, begun) = (batch.sent, batch.begun);
+    let Some(worker) = state.workers.get_mut(&batch.worker) else {
+        return;
+    };
+    let missed = &mut worker.missed;
+    if missed.count == 0 {
+        missed.since = begun;
+    }
+    missed.count = missed.count.saturating_add(1);
+    let many = missed.count >= MISSED_MAX && now.saturating_sub(missed.since) >= OVERDUE_MIN;
+    let name = worker.name.clone();
+    if many || state.probation.has(&name) {
+        begin_probation(state, &name, sent, now);
+    }
+}
+
+/// Puts a worker on probation that does not answer the batch sent at `sent`, or notes one more
+/// reason for its probation.
+pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
+    if state.probation.miss(name, sent, now) {
+        tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
+            holds; until it does it gets one realization at a time");
+    }
+}
+
+/// Notes that a worker has answered a batch that it holds.
+pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
+    let Some(worker) = state.workers.get_mut(&worker) else {
+        return;
+    };
+    worker.missed.count = 0;
+    if state.probation.end(&worker.name) {
+        tracing::info!(worker = %worker.name, "this worker answers again");
+    }
+    for later in worker.in_flight.iter().filter(|held| **held > batch) {
+        if let Some(later) = state.batches.get_mut(later) {
+            later.begun = now;
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Order of workers and jobs.
+
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
+
+use crate::core::batch::Purpose;
+use crate::core::ids::{JobId, WorkerId};
+use crate::core::job::Job;
+use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
+use crate::store::JobRecord;
+
+/// Returns whether anything besides quarantined realizations waits to be sent.
+pub(crate) fn work_waits(state: &State) -> bool {
+    next_job(state).is_some() || checks_wait(state)
+}
+
+/// Returns the workers that can accept more, in ascending order of the batches they hold; ties go
+/// to the first. Those on probation come last, and only if they hold nothing.
+pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
+    let exclusive = |worker| state.held_for(worker, Purpose::Exclusive).next().is_some();
+    let free = state
+        .workers
+        .iter()
+        .filter(|(id, worker)| !worker.draining && !kept.contains(id))
+        .filter(|(_, worker)| !exclusive(worker))
+        .map(|(id, worker)| {
+            (!state.is_sound(worker), held(state, worker), worker.in_flight.len(), *id)
+        });
+    let mut free: Vec<(bool, usize, usize, WorkerId)> = free.collect();
+    free.sort_unstable();
+    let most = |on_probation| if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
+    let free = free.into_iter().filter(|(on_probation, held, ..)| *held < most(*on_probation));
+    free.map(|(.., worker)| worker).collect()
+}
+
+/// Returns the number of batches that a worker holds, without speculative ones.
+pub(crate) fn held(state: &State, worker: &AttachedWorker) -> usize {
+    worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
+}
+
+/// Chooses the job that is served next, among the active jobs with work. The client with the least
+/// computing time comes first; of its jobs those with the highest priority are served in turn,
+/// starting after the job that was served last.
+pub(crate) fn next_job(state: &State) -> Option<JobId> {
+    let with_work = state.active.iter().filter_map(|id| {
+        let job = state.jobs.get(id)?;
+        (!job.evaluation()?.queue.is_empty()).then_some((*id, job))
+    });
+    let rank = |(id, job): (JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        let had = state.shares.used(client);
+        let served = state.last_served.is_some_and(|last| id <= last);
+        (had, client.clone(), Reverse(*priority), served, id)
+    };
+    with_work.map(rank).min().map(|(.., id)| id)
+}
+
+/// Returns whether any audit or dispute waits for a worker.
+pub(crate) fn checks_wait(state: &State) -> bool {
+    let mut evaluations = state.active.iter().filter_map(|id| state.jobs.get(id)?.evaluation());
+    evaluations.any(|evaluation| {
+        !evaluation.audits.is_empty()
+            || evaluation.disputes.iter().any(|dispute| dispute.tie_breakers.is_empty())
+    })
+}

@@ -1,0 +1,136 @@
+//! Answers to batches: each fills an evaluation, is compared with another answer, or decides a
+//! dispute.
+
+use std::time::Duration;
+
+use osteon_common::outcome::RealizationResult;
+
+use super::checks;
+use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::close_reason::CloseReason;
+use crate::core::fairness;
+use crate::core::ids::{BatchId, WorkerId};
+use crate::core::job::Job;
+use crate::core::reactor::dispatch::{batches, departures, overdue};
+use crate::core::reactor::lifecycle::{jobs, workers};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::State;
+use crate::core::worker_name::WorkerName;
+
+/// Weight of the newest measurement in a worker's rate.
+const RATE_WEIGHT: f64 = 0.5;
+/// A reported computing time below this, in seconds, is not accepted.
+const ELAPSED_MIN_S: f64 = 1e-6;
+
+/// Takes in a worker's answer. If the batch was settled before (a duplicate was faster, or the
+/// answer came twice), the answer is only compared with the known results; the answer to an unknown
+/// batch is ignored.
+pub(crate) fn answered(
+    turn: &mut Turn,
+    worker: WorkerId,
+    batch: BatchId,
+    solved: Vec<RealizationResult>,
+    elapsed_s: f64,
+) {
+    let Some(attached) = turn.state.workers.get_mut(&worker) else {
+        return;
+    };
+    attached.last_seen = turn.now;
+    attached.answered = turn.now;
+    attached.rate.add(solved.len() as u64, turn.now);
+    let name = attached.name.clone();
+    let held = turn.state.batches.get(&batch).filter(|held| held.worker == worker);
+    let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
+    let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
+        return;
+    };
+    let (purpose, duplicates) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();
+    let duplicates = duplicates.unwrap_or_default();
+    let (found, expected) = (solved.len(), assignment.indices.count);
+    if found as u64 != expected {
+        let reason = CloseReason::WrongCount { batch, found, expected };
+        workers::close(turn, worker, reason);
+        return;
+    }
+    turn.state.note_answer(worker);
+    if purpose.is_some() {
+        overdue::answered(turn.state, worker, batch, turn.now);
+    }
+    match purpose {
+        Some(Purpose::Fill | Purpose::Exclusive | Purpose::Speculative) => {
+            if let Some(held) = turn.state.settle(batch) {
+                measure(turn.state, &held, elapsed_s, turn.now);
+            }
+            take_back(turn, duplicates);
+            fill(turn.state, &assignment, &solved, &name, turn.now);
+            checks::audit(turn.state, &assignment, &name);
+        }
+        Some(Purpose::Audit { .. }) => {
+            turn.state.settle(batch);
+            take_back(turn, duplicates);
+            checks::compare(turn, &assignment, &solved, &name);
+        }
+        Some(Purpose::TieBreak) => {
+            take_back(turn, duplicates);
+            checks::tie_broken(turn, batch, &assignment, solved, &name);
+        }
+        None => checks::compare(turn, &assignment, &solved, &name),
+    }
+    jobs::store_if_complete(turn, assignment.job);
+    departures::dismiss_if_drained(turn, worker);
+}
+
+/// Revokes the duplicates of a batch that was answered.
+fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
+    for duplicate in duplicates {
+        overdue::missed(turn.state, duplicate, turn.now);
+        batches::revoke(turn, duplicate);
+    }
+}
+
+fn fill(
+    state: &mut State,
+    assignment: &Assignment,
+    solved: &[RealizationResult],
+    by: &WorkerName,
+    now: Duration,
+) {
+    let Some(evaluation) = state.evaluation_of_mut(assignment) else {
+        return;
+    };
+    let before = evaluation.filled();
+    evaluation.fill(assignment.indices, solved, by);
+    let news = evaluation.filled() - before;
+    let asked_for =
+        |job: &&mut Job| job.evaluation().is_some_and(|it| it.attempt == assignment.attempt);
+    if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
+        job.rate.add(news, now);
+        job.progressed = now;
+    }
+    state.changed.insert(assignment.job);
+}
+
+/// Updates the rate of a worker and the pace of its job with an answer.
+fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
+    let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
+    let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
+    let rate = batch.assignment.indices.count as f64 / if plausible { elapsed_s } else { waited_s };
+    let Some(worker) = state.workers.get_mut(&batch.worker) else {
+        return;
+    };
+    let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
+    *known += RATE_WEIGHT * (rate - *known);
+    let count = batch.assignment.indices.count;
+    let seconds = count as f64 / rate;
+    let slots = worker.hello.slots;
+    let took = fairness::slot_time(seconds, slots);
+    if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
+        // A worker cannot have computed for longer than the time since the batch was sent.
+        job.pace.learn(count, slots, seconds.min(waited_s));
+    }
+    if let Some(job) =
+        state.jobs.get(&batch.assignment.job).filter(|_| batch.purpose != Purpose::Speculative)
+    {
+        state.shares.correct(&job.record.client, batch.charged, took);
+    }
+}

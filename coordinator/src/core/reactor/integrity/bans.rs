@@ -1,0 +1,140 @@
+//! Bans of workers that return wrong answers: a banned worker is refused from then on, and the
+//! evaluations with its answers are computed again.
+
+use crate::core::close_reason::CloseReason;
+use crate::core::effect::{Effect, Record};
+use crate::core::evaluation::PendingEvaluation;
+use crate::core::ids::{JobId, WorkerId};
+use crate::core::job::Stage;
+use crate::core::reactor::dispatch::{batches, speculation};
+use crate::core::reactor::lifecycle::{jobs, records, replay, workers};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::Banned;
+use crate::core::worker_name::WorkerName;
+use crate::store::BanRecord;
+
+/// Bans a worker for a wrong answer found in `job`; `reason` completes the sentence "it …".
+pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String) {
+    if turn.state.ban(name).is_some() {
+        return;
+    }
+    tracing::error!(worker = %name, %job, %reason, "a worker is banned");
+    let number = turn.state.banned.last().map_or(1, |last| last.record.number + 1);
+    let worker = name.clone();
+    let record = BanRecord { number, worker, job, reason: reason.clone(), at: turn.now };
+    turn.effects.push(Effect::Store(Record::Ban(record.clone())));
+    let store_at = Some(turn.now + turn.state.config.store_retry);
+    turn.state.banned.push(Banned { record, store_at, refused: false });
+    let unfinished: Vec<JobId> = turn.state.jobs.keys().copied().collect();
+    for job in unfinished {
+        forget(turn, job, name);
+    }
+    let stays = turn.state.workers.iter().filter(|(_, worker)| worker.name == *name);
+    let stays: Vec<WorkerId> = stays.map(|(id, _)| *id).collect();
+    for stay in stays {
+        // Its batches are not to blame for the end of its stay.
+        if let Some(worker) = turn.state.workers.get_mut(&stay) {
+            worker.draining = true;
+        }
+        let reason = CloseReason::Banned { reason: reason.clone() };
+        workers::close(turn, stay, reason);
+    }
+}
+
+/// Removes the answers of a worker from a job.
+fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
+    speculation::forget(turn, id, name);
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    turn.state.changed.insert(id);
+    let contributed = job.workers.contains(name);
+    match &mut job.stage {
+        Stage::Computing(_) | Stage::Replaying { .. } if contributed => {
+            jobs::restart(turn, id);
+        }
+        Stage::Computing(evaluation) if evaluation.workers.contains(name) => {
+            compute_again(turn, id);
+        }
+        Stage::Computing(evaluation) => {
+            let mut over = Vec::new();
+            evaluation.disputes.retain_mut(|dispute| {
+                let stays = dispute.forget(name);
+                if !stays {
+                    over.append(&mut dispute.tie_breakers);
+                }
+                stays
+            });
+            for tie_breaker in over {
+                batches::revoke(turn, tie_breaker);
+            }
+        }
+        Stage::Storing { record, .. } => {
+            job.restart_pending |= contributed || record.workers.contains(name);
+            if job.restart_pending {
+                // The search may continue elsewhere after its restart.
+                speculation::drop_all(turn, id);
+            }
+        }
+        Stage::Finishing(_) if contributed => {
+            // An end on its way to the store may be durable already; only a refused one can be
+            // taken back.
+            let on_its_way =
+                job.store_trouble.as_ref().is_none_or(|store_trouble| store_trouble.on_its_way);
+            job.restart_pending = true;
+            if !on_its_way {
+                jobs::reopen(turn, id);
+            }
+        }
+        Stage::Accepting | Stage::Waiting | Stage::Replaying { .. } | Stage::Finishing(_) => {}
+    }
+}
+
+/// Restarts the evaluation of a job with a new attempt.
+fn compute_again(turn: &mut Turn, id: JobId) {
+    batches::revoke_all(turn, id);
+    let attempt = turn.state.new_attempt();
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let realizations = job.record.specification.monte_carlo.realizations;
+    if let Stage::Computing(evaluation) = &mut job.stage {
+        let mut fresh =
+            PendingEvaluation::new(evaluation.number, attempt, evaluation.point, realizations);
+        fresh.stored = std::mem::take(&mut evaluation.stored);
+        *evaluation = fresh;
+    }
+}
+
+/// Notes that the ban with this number is durable.
+pub(crate) fn stored(turn: &mut Turn, number: u64) {
+    let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
+    if let Some(banned) = found {
+        banned.store_at = None;
+        replay::read_on(turn);
+    }
+}
+
+/// Notes that the ban with this number could not be stored; the write is repeated later.
+pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
+    let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
+    if let Some(banned) = found {
+        banned.refused = true;
+        let since = banned.record.at;
+        records::give_up_if_late(turn, since, error);
+    }
+}
+
+/// Repeats the writes of refused bans that are due.
+pub(crate) fn store_again(turn: &mut Turn) {
+    let retry_in = turn.state.config.store_retry;
+    for banned in &mut turn.state.banned {
+        // The store will report a write that is on its way. A second one could still be on its way
+        // at the end of a shutdown.
+        if banned.refused && banned.store_at.is_some_and(|at| turn.now >= at) {
+            banned.store_at = Some(turn.now + retry_in);
+            banned.refused = false;
+            turn.effects.push(Effect::Store(Record::Ban(banned.record.clone())));
+        }
+    }
+}

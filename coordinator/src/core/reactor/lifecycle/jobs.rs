@@ -1,0 +1,226 @@
+//! Life cycle of a job, from acceptance to end.
+
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use osteon_common::results::Status;
+use osteon_common::version::Program;
+
+use crate::core::effect::{Effect, Record};
+use crate::core::failure::RunFailure;
+use crate::core::ids::JobId;
+use crate::core::job::{Job, Stage};
+use crate::core::notice::Notice;
+use crate::core::reactor::dispatch::{batches, speculation};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::State;
+use crate::store::{EndRecord, EvaluationRecord, JobRecord};
+use osteon_search::{Ending, Search, Step};
+
+/// Stores the evaluation of a job once it is complete and checked.
+pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let Stage::Computing(evaluation) = &mut job.stage else {
+        return;
+    };
+    let Some((outcomes, estimated_error)) = evaluation.complete() else {
+        return;
+    };
+    let (number, point) = (evaluation.number, evaluation.point);
+    // Only an evaluation that was stored before, with the same outcomes, leaves those after it
+    // valid.
+    let is_last = evaluation.diverges_from_store(&outcomes);
+    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
+    turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    let outcomes = record.outcomes.clone();
+    job.stage = Stage::Storing { record, is_last };
+    if is_last {
+        speculation::prepare(turn, id, &outcomes);
+    }
+}
+
+/// Ends a job because of `failure`.
+pub(crate) fn fail(turn: &mut Turn, id: JobId, failure: &RunFailure) {
+    let ending = Ending {
+        status: Status::Failed,
+        failure: Some(failure.kind()),
+        reason: Some(failure.to_string()),
+    };
+    finish(turn, id, ending);
+}
+
+/// Cancels a job for a client, at once or as soon as the record being stored is durable.
+pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.cancelled = true;
+    match job.stage {
+        Stage::Waiting if job.stored > 0 => {
+            // Its output is in the store and is only read, not computed, so it need not wait for
+            // its turn.
+            begin(turn, id);
+        }
+        Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
+        // The store cannot read the evaluations that would still belong to its output.
+        Stage::Replaying { .. } if job.store_trouble.is_some() => {
+            finish(turn, id, cancelled());
+        }
+        Stage::Accepting
+        | Stage::Replaying { .. }
+        | Stage::Storing { .. }
+        | Stage::Finishing(_) => {}
+    }
+}
+
+/// Begins waiting jobs while there is room. Jobs of the clients with the fewest active jobs come
+/// first, of these the highest priority, of equal ones the oldest. A client without any active job
+/// gets room beyond the limits, so that other clients cannot keep it waiting.
+pub(crate) fn begin_waiting(turn: &mut Turn) {
+    while !turn.state.waiting.is_empty() && !turn.state.draining {
+        let Some(id) = next_waiting(turn.state).filter(|job| has_room(turn.state, *job)) else {
+            return;
+        };
+        begin(turn, id);
+    }
+}
+
+/// Returns whether a waiting job may begin, by the limits on active realizations and active jobs.
+pub(crate) fn has_room(state: &State, id: JobId) -> bool {
+    let realizations = |id: &JobId| {
+        let job = state.jobs.get(id);
+        job.map_or(0, |job| job.record.specification.monte_carlo.realizations)
+    };
+    let Some(job) = state.jobs.get(&id) else {
+        return false;
+    };
+    let beyond = if state.shares.jobs(&job.record.client) == 0 { 2 } else { 1 };
+    let active = state.active.iter().map(realizations).sum::<u64>();
+    let fits =
+        active == 0 || active + realizations(&id) <= beyond * state.config.active_realizations_max;
+    fits && (state.active.len() as u64) < beyond * state.config.active_jobs_max as u64
+}
+
+/// Returns the job that begins next.
+fn next_waiting(state: &State) -> Option<JobId> {
+    let waiting = state.waiting.iter().filter_map(|id| Some((*id, state.jobs.get(id)?)));
+    let rank = |(id, job): &(JobId, &Job)| {
+        let JobRecord { client, priority, .. } = &job.record;
+        (state.shares.jobs(client), Reverse(*priority), *id)
+    };
+    waiting.min_by_key(rank).map(|(id, _)| id)
+}
+
+/// Begins a waiting job.
+fn begin(turn: &mut Turn, id: JobId) {
+    turn.state.waiting.retain(|waiting| *waiting != id);
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.progressed = turn.now;
+        turn.state.shares.begin(&job.record.client);
+        turn.state.active.insert(id);
+        turn.effects.push(Effect::Note(Notice::JobStarted { job: id, stored: job.stored }));
+        speculation::drop_excess(turn);
+        advance(turn, id);
+    }
+}
+
+/// Takes the next step of a job's search: replays a stored evaluation, begins a new one, or ends
+/// the job.
+pub(crate) fn advance(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    turn.state.changed.insert(id);
+    if job.search.evaluations() < job.stored {
+        read_next(turn, id);
+        return;
+    }
+    let ending = match job.search.ask() {
+        Step::Evaluate(_) if job.cancelled => cancelled(),
+        Step::Evaluate(point) => {
+            speculation::begin(turn, id, point);
+            store_if_complete(turn, id);
+            return;
+        }
+        Step::Done(ending) => ending,
+    };
+    finish(turn, id, ending);
+}
+
+/// Stores the end of a job; clients see it when it is durable.
+pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let search = &job.search;
+    // A grouped search has no best evaluation of the whole job.
+    let best = search.best().filter(|_| !search.is_grouped());
+    let program = Program::current(turn.state.config.commit);
+    let record = EndRecord::new(id, ending, program, turn.now, search.evaluations(), best);
+    let summary = Arc::new(search.summary());
+    turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
+    job.stage = Stage::Finishing(record);
+    job.store_trouble = None;
+    leave(turn, id);
+}
+
+/// Takes back an end that is neither durable nor on its way to the store, because answers in it are
+/// not reliable. The job waits for its turn and reads its stored evaluations again.
+pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.store_trouble = None;
+    job.restart_pending = false;
+    job.workers.clear();
+    job.search = Search::new(job.record.specification.clone());
+    job.stage = Stage::Waiting;
+    turn.state.waiting.push_back(id);
+    begin_waiting(turn);
+}
+
+/// Removes a job from the active jobs and the shares of its client.
+fn leave(turn: &mut Turn, id: JobId) {
+    if turn.state.active.remove(&id)
+        && let Some(job) = turn.state.jobs.get(&id)
+    {
+        turn.state.shares.end(&job.record.client);
+    }
+    turn.state.waiting.retain(|waiting| *waiting != id);
+    turn.state.changed.insert(id);
+    batches::revoke_all(turn, id);
+    for worker in turn.state.workers.values_mut() {
+        worker.rates.remove(&id);
+    }
+    begin_waiting(turn);
+}
+
+/// Returns the end of a cancelled job.
+pub(crate) fn cancelled() -> Ending {
+    Ending { status: Status::Cancelled, failure: None, reason: None }
+}
+
+/// Requests the next stored evaluation of a job, unless a ban is not durable yet.
+pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
+    let may = !turn.state.ban_pending();
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.stage = Stage::Replaying { asked: may };
+        if may {
+            turn.effects.push(Effect::Read { job: id, number: job.search.evaluations() });
+        }
+    }
+}
+
+/// Restarts the search of an active job, which replays its stored evaluations.
+pub(crate) fn restart(turn: &mut Turn, id: JobId) {
+    batches::revoke_all(turn, id);
+    if let Some(job) = turn.state.jobs.get_mut(&id) {
+        job.restart_pending = false;
+        job.workers.clear();
+        job.search = Search::new(job.record.specification.clone());
+        advance(turn, id);
+    }
+}

@@ -1,0 +1,138 @@
+//! Replay: the stored evaluations of a job are read one by one and passed to its search, after a
+//! restart and when a worker is banned whose answers are in them. An evaluation with answers of a
+//! banned worker is computed again; if it changes, those after it in the store belong to another
+//! path.
+
+use super::{jobs, records};
+use crate::core::effect::Effect;
+use crate::core::evaluation::{PendingEvaluation, StoredRecord};
+use crate::core::event::ReadFailure;
+use crate::core::failure::RunFailure;
+use crate::core::ids::JobId;
+use crate::core::job::{Stage, StoreRetry};
+use crate::core::reactor::turn::Turn;
+use crate::store::EvaluationRecord;
+use osteon_search::Step;
+
+/// Continues replays that waited for a ban to be durable.
+pub(crate) fn read_on(turn: &mut Turn) {
+    if turn.state.ban_pending() {
+        return;
+    }
+    for (&id, job) in &mut turn.state.jobs {
+        if let Stage::Replaying { asked: asked @ false } = &mut job.stage {
+            *asked = true;
+            turn.effects.push(Effect::Read { job: id, number: job.search.evaluations() });
+        }
+    }
+}
+
+/// Takes in the stored record of an evaluation.
+pub(crate) fn read(
+    turn: &mut Turn,
+    id: JobId,
+    number: u64,
+    found: Result<Option<EvaluationRecord>, ReadFailure>,
+) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    // Anything else is the second answer to a repeated request.
+    let wanted = matches!(job.stage, Stage::Replaying { asked: true });
+    if !wanted || job.search.evaluations() != number {
+        return;
+    }
+    match found {
+        Ok(Some(record)) => {
+            job.store_trouble = None;
+            replay(turn, id, record);
+        }
+        Ok(None) => jobs::fail(turn, id, &RunFailure::Missing { number }),
+        Err(ReadFailure::Refused { error }) => read_failed(turn, id, error),
+        Err(ReadFailure::Damaged) => recompute(turn, id),
+    }
+}
+
+/// Computes an evaluation again whose record is damaged. A point has the same outcomes each time,
+/// so the stored evaluations after it are on the same path, unless replay finds otherwise.
+fn recompute(turn: &mut Turn, id: JobId) {
+    let attempt = turn.state.new_attempt();
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.store_trouble = None;
+    job.progressed = turn.now;
+    turn.state.changed.insert(id);
+    if job.cancelled {
+        jobs::finish(turn, id, jobs::cancelled());
+        return;
+    }
+    match job.search.ask() {
+        Step::Evaluate(point) => {
+            let realizations = job.record.specification.monte_carlo.realizations;
+            let number = job.search.evaluations();
+            let mut evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+            evaluation.stored = StoredRecord::Damaged;
+            job.stage = Stage::Computing(evaluation);
+            job.recomputed = true;
+        }
+        Step::Done(ending) => jobs::finish(turn, id, ending),
+    }
+}
+
+/// Schedules another read after the store could not be read. Reads are repeated for as long as
+/// necessary, unless the job is cancelled.
+fn read_failed(turn: &mut Turn, id: JobId, error: String) {
+    let retry_at = turn.now + turn.state.config.store_retry;
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    if job.cancelled {
+        // No more than the evaluations replayed so far can be known.
+        jobs::finish(turn, id, jobs::cancelled());
+        return;
+    }
+    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
+    job.store_trouble =
+        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
+    turn.state.changed.insert(id);
+    records::give_up_if_late(turn, since, error);
+}
+
+/// Passes a stored evaluation to the search, or has it computed again.
+fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
+    let doubtful = record.workers.iter().any(|worker| turn.state.ban(worker).is_some());
+    let attempt = turn.state.new_attempt();
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    turn.state.changed.insert(id);
+    job.progressed = turn.now;
+    let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
+    if job.recomputed && job.search.expects(point).is_err() {
+        // The damaged record held wrong outcomes, so the stored path ends here.
+        job.stored = number;
+        jobs::advance(turn, id);
+    } else if doubtful && !job.cancelled {
+        let realizations = job.record.specification.monte_carlo.realizations;
+        match job.search.expects(point) {
+            Ok(()) => {
+                let mut evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+                evaluation.stored = StoredRecord::Outcomes(outcomes);
+                job.stage = Stage::Computing(evaluation);
+            }
+            Err(error) => jobs::fail(turn, id, &error.into()),
+        }
+    } else if doubtful {
+        // Only the evaluations replayed so far are known to be right.
+        jobs::finish(turn, id, jobs::cancelled());
+    } else {
+        match job.search.replay(point, outcomes, estimated_error) {
+            Ok(()) => {
+                job.workers.extend(workers);
+                jobs::advance(turn, id);
+            }
+            Err(error) => jobs::fail(turn, id, &error.into()),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Client requests.
+
+use std::ops::Bound;
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::job::{Data, Group, JobSpecification};
+use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
+use osteon_common::version;
+
+use super::{jobs, prune, workers};
+use crate::core::effect::{Answer, Effect, Record, Refusal};
+use crate::core::event::Request;
+use crate::core::ids::{JobId, Token, WorkerId};
+use crate::core::job::{Job, RequestName, Stage, identity};
+use crate::core::reactor::turn::Turn;
+use crate::core::snapshot;
+use crate::core::state::State;
+use crate::core::worker_list;
+use crate::store::JobRecord;
+
+/// Maximum number of banned workers that are listed.
+const BANNED_SHOWN_MAX: usize = 1000;
+
+pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
+    let answer = match request {
+        Request::Submit { specification, request_id, client, priority, name } => {
+            let submission = SubmittedJob { specification, request_id, client, priority, name };
+            match submit(turn, token, submission) {
+                Ok(answer) => answer,
+                Err(refusal) => Some(Answer::Refused(refusal)),
+            }
+        }
+        Request::Get(job) => Some(get(turn.state, job, turn.now)),
+        Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
+        Request::Cancel(job) => cancel(turn, token, job),
+        Request::Fetch(job) => Some(fetch(turn.state, job)),
+        Request::Banned => Some(banned(turn.state, turn.now)),
+        Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
+        Request::DrainWorker(worker) => Some(drain(turn, worker)),
+        Request::Prune(retention) => {
+            prune::requested(turn, token, retention);
+            None
+        }
+    };
+    if let Some(answer) = answer {
+        turn.effects.push(Effect::Answer { token, answer });
+    }
+}
+
+/// A submitted job.
+struct SubmittedJob {
+    specification: Arc<JobSpecification>,
+    request_id: String,
+    client: String,
+    priority: u32,
+    name: String,
+}
+
+/// Accepts a job; the client is answered when it is durable.
+fn submit(
+    turn: &mut Turn,
+    token: Token,
+    submission: SubmittedJob,
+) -> Result<Option<Answer>, Refusal> {
+    let SubmittedJob { specification, request_id, client, priority, name } = submission;
+    if turn.state.draining {
+        return Err(Refusal::Draining);
+    }
+    let request = RequestName::new(&client, &request_id);
+    if let Some(known) = request.as_ref().and_then(|request| turn.state.requests.get(request)) {
+        return resubmit(turn.state, token, *known, &specification, request_id);
+    }
+    if turn.state.unfinished() >= JOBS_MAX {
+        return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
+    }
+    find_room(turn.state, &client, bytes(&specification))?;
+    let id = JobId(turn.state.next_job);
+    turn.state.next_job += 1;
+    turn.state.requests.extend(request.map(|request| (request, id)));
+    let fingerprint = version::fingerprint();
+    let record = JobRecord {
+        job: id,
+        request_id,
+        specification,
+        accepted: turn.now,
+        fingerprint,
+        client,
+        priority,
+        name,
+    };
+    turn.effects.push(Effect::Store(Record::Job(record.clone())));
+    let mut job = Job::new(record, Stage::Accepting, 0, turn.now);
+    job.tokens.push(token);
+    turn.state.jobs.insert(id, job);
+    Ok(None)
+}
+
+/// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
+fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
+    let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
+        let records = state.jobs.values().map(|job| &job.record);
+        records.filter(|it| whose(&it.client)).map(|it| bytes(&it.specification)).sum()
+    };
+    let limit = state.config.jobs_bytes_max;
+    for (whose, held, limit) in [
+        ("this client's", of(&|name| name == client), limit / JOBS_BYTES_CLIENT_DIVISOR),
+        ("all", of(&|_| true), limit),
+    ] {
+        if held + more > limit {
+            return Err(Refusal::TooMuchQueued { whose, held, more, limit });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the approximate memory of a specification, bytes.
+fn bytes(specification: &JobSpecification) -> u64 {
+    let velocities = match &specification.data {
+        Some(Data::Velocities(velocities)) => size_of_val(velocities.as_slice()),
+        Some(Data::Groups(groups)) => {
+            let of = |group: &Group| {
+                size_of::<Group>() + group.name.len() + size_of_val(group.velocities.as_slice())
+            };
+            groups.iter().map(of).sum()
+        }
+        Some(Data::Moments { .. }) | None => 0,
+    };
+    (size_of::<JobSpecification>() + velocities) as u64
+}
+
+fn resubmit(
+    state: &mut State,
+    token: Token,
+    id: JobId,
+    specification: &JobSpecification,
+    request_id: String,
+) -> Result<Option<Answer>, Refusal> {
+    let ended = state.ended.get(&id).map(|ended| ended.identity);
+    let known = ended.or_else(|| Some(state.jobs.get(&id)?.identity));
+    if known != Some(identity(specification)) {
+        return Err(Refusal::RequestIdTaken { request_id, job: id });
+    }
+    match state.jobs.get_mut(&id) {
+        Some(job) if matches!(job.stage, Stage::Accepting) => {
+            job.tokens.push(token);
+            Ok(None)
+        }
+        _ => Ok(Some(Answer::Submitted(id))),
+    }
+}
+
+fn get(state: &State, job: JobId, now: Duration) -> Answer {
+    snapshot::job_snapshot(state, job, now)
+        .map_or(Answer::Refused(Refusal::NoJob { job }), Answer::Snapshot)
+}
+
+fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Answer {
+    let from = after.map_or(Bound::Unbounded, Bound::Excluded);
+    let range = (from, Bound::Unbounded);
+    let mut ids: Vec<JobId> = state.ended.range(range).map(|(id, _)| *id).take(limit + 1).collect();
+    ids.extend(state.jobs.range(range).map(|(id, _)| *id));
+    ids.sort_unstable();
+    let mut listed =
+        ids.into_iter().filter_map(|id| Some((id, snapshot::job_snapshot(state, id, now)?)));
+    let page: Vec<_> = listed.by_ref().take(limit).collect();
+    let more_after = listed.next().and_then(|_| page.last().map(|(id, _)| *id));
+    Answer::Page { snapshots: page.into_iter().map(|(_, snapshot)| snapshot).collect(), more_after }
+}
+
+/// Cancels a job; the client is answered when its end is durable.
+fn cancel(turn: &mut Turn, token: Token, id: JobId) -> Option<Answer> {
+    match turn.state.jobs.get_mut(&id) {
+        Some(job) if !matches!(job.stage, Stage::Accepting) => {
+            job.tokens.push(token);
+            jobs::cancel(turn, id);
+            None
+        }
+        _ => Some(get(turn.state, id, turn.now)),
+    }
+}
+
+fn fetch(state: &State, id: JobId) -> Answer {
+    if let Some(ended) = state.ended.get(&id) {
+        return Answer::Ended(ended.end.clone());
+    }
+    match state.jobs.get(&id).map(|job| &job.stage) {
+        None | Some(Stage::Accepting) => Answer::Refused(Refusal::NoJob { job: id }),
+        Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
+    }
+}
+
+/// Drains a worker, and returns its snapshot.
+fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
+    match workers::send_away(turn, worker) {
+        Ok(()) => worker_list::worker_snapshot(turn.state, worker, turn.now)
+            .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
+        Err(refusal) => Answer::Refused(refusal),
+    }
+}
+
+fn banned(state: &State, now: Duration) -> Answer {
+    let newest = state.banned.len().saturating_sub(BANNED_SHOWN_MAX);
+    let shown = state
+        .banned
+        .iter()
+        .skip(newest)
+        .map(|banned| (banned.record.clone(), now.saturating_sub(banned.record.at)));
+    Answer::Banned(shown.collect())
+}

@@ -1,0 +1,124 @@
+//! Restores a state from the store. The evaluations of jobs are not read here, however many there
+//! are: a job that has not ended reads its own when its turn comes.
+
+use std::time::Duration;
+
+use osteon_common::version;
+
+use super::jobs;
+use crate::config::Config;
+use crate::core::effect::Effect;
+use crate::core::ids::JobId;
+use crate::core::job::{EndedJob, Job, RequestName, Stage, sequence};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{Banned, State};
+use crate::store::{BanRecord, JobRecord, Store, StoreError};
+
+/// Contents of a store, without evaluations.
+#[derive(Debug, Default)]
+pub struct Restored {
+    ended: Vec<(JobId, EndedJob)>,
+    /// Each with the number of its stored evaluations.
+    unfinished: Vec<(JobRecord, u64)>,
+    banned: Vec<BanRecord>,
+    last_deleted_job: Option<JobId>,
+}
+
+impl Restored {
+    /// Reads a store. Blocks.
+    ///
+    /// An unfinished job whose evaluations were computed with other numerics than this program's
+    /// begins again: results of different numerics are never mixed. Workers stay banned while their
+    /// answers may be in the evaluations of an unfinished job.
+    ///
+    /// # Errors
+    /// When the store cannot be read or written, or an evaluation is missing in it.
+    pub fn load(store: &mut dyn Store) -> Result<Self, StoreError> {
+        let mut restored = Self::default();
+        store.visit_jobs(&mut |stored| match stored.end {
+            Some(end) => {
+                restored.ended.push((stored.record.job, EndedJob::new(&stored.record, end, 0)));
+            }
+            None => restored.unfinished.push((stored.record, stored.evaluations)),
+        })?;
+        for (record, evaluations) in &mut restored.unfinished {
+            keep_numerics(store, record, evaluations)?;
+        }
+        if restored.unfinished.is_empty() {
+            store.delete_bans()?;
+        }
+        restored.banned = store.bans()?;
+        restored.last_deleted_job = store.last_deleted_job()?;
+        Ok(restored)
+    }
+}
+
+/// Restarts a job from the beginning if its evaluations were computed with other numerics.
+fn keep_numerics(
+    store: &mut dyn Store,
+    record: &mut JobRecord,
+    evaluations: &mut u64,
+) -> Result<(), StoreError> {
+    let fingerprint = version::fingerprint();
+    if record.fingerprint != fingerprint {
+        tracing::warn!(
+            job = %record.job,
+            stored = %record.fingerprint,
+            now = %fingerprint,
+            "the job was begun with other numerics; its evaluations are computed again"
+        );
+        store.reset_job(record.job, &fingerprint)?;
+        record.fingerprint = fingerprint;
+        *evaluations = 0;
+    }
+    Ok(())
+}
+
+impl Restored {
+    /// Returns the number of jobs that have not ended.
+    pub fn unfinished(&self) -> usize {
+        self.unfinished.len()
+    }
+
+    /// Returns the number of jobs that have ended.
+    pub fn ended(&self) -> usize {
+        self.ended.len()
+    }
+
+    /// Returns the number of banned workers.
+    pub fn banned(&self) -> usize {
+        self.banned.len()
+    }
+}
+
+impl State {
+    /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
+    pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
+        let mut state = Self::new(config, now);
+        let Restored { ended, unfinished, banned, last_deleted_job } = restored;
+        state.next_job = last_deleted_job.map_or(1, |job| job.0 + 1);
+        let durable = |record| Banned { record, store_at: None, refused: false };
+        state.banned = banned.into_iter().map(durable).collect();
+        for (id, mut job) in ended {
+            // Snapshots were published while the end was on its way to the store.
+            job.sequence = sequence(job.sequence, now);
+            state.know(id, job.request.clone());
+            state.ended.insert(id, job);
+        }
+        for (record, evaluations) in unfinished {
+            let id = record.job;
+            state.know(id, RequestName::from_record(&record));
+            state.waiting.push_back(id);
+            state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
+        }
+        let mut turn = Turn::new(&mut state, now);
+        jobs::begin_waiting(&mut turn);
+        let effects = turn.effects;
+        (state, effects)
+    }
+
+    fn know(&mut self, id: JobId, request: Option<RequestName>) {
+        self.next_job = self.next_job.max(id.0 + 1);
+        self.requests.extend(request.map(|request| (request, id)));
+    }
+}

@@ -1,0 +1,122 @@
+//! Periodic work: expired leases, heartbeats, repeated writes and snapshots.
+
+use std::time::Duration;
+
+use super::{jobs, records, workers};
+use crate::core::close_reason::CloseReason;
+use crate::core::effect::Effect;
+use crate::core::ids::{JobId, WorkerId};
+use crate::core::job::sequence;
+use crate::core::reactor::dispatch::poison;
+use crate::core::reactor::turn::Turn;
+use crate::core::snapshot;
+use crate::core::state::{AttachedWorker, State};
+
+/// Interval at which unfinished jobs are published even if nothing but the time has changed.
+const PUBLISH_EVERY: Duration = Duration::from_secs(1);
+
+/// Excludes a gap in which this process did not run from all measured silences: messages that
+/// arrived meanwhile have not been read yet.
+pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
+    let gap = now.saturating_sub(std::mem::replace(&mut state.ticked, now));
+    if gap <= state.config.heartbeat {
+        return;
+    }
+    tracing::warn!(?gap, "the coordinator was paused; all leases are extended by the gap");
+    let excused = |since: &mut Duration| *since = (*since + gap).min(now);
+    for worker in state.workers.values_mut() {
+        excused(&mut worker.last_seen);
+        excused(&mut worker.answered);
+        excused(&mut worker.missed.since);
+    }
+    for batch in state.batches.values_mut() {
+        excused(&mut batch.sent);
+        excused(&mut batch.begun);
+    }
+    for job in state.jobs.values_mut() {
+        for evaluation in job.evaluations_mut() {
+            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
+            for dispute in &mut evaluation.disputes {
+                excused(&mut dispute.since);
+                dispute.crashes.shift(excused);
+            }
+        }
+    }
+}
+
+/// Ends the leases of workers that have been silent, or have not answered, for too long.
+pub(crate) fn expire(turn: &mut Turn) {
+    let expired: Vec<(WorkerId, CloseReason)> = turn
+        .state
+        .workers
+        .iter()
+        .filter_map(|(id, worker)| Some((*id, expired(turn.state, worker, turn.now)?)))
+        .collect();
+    for (worker, reason) in expired {
+        workers::close(turn, worker, reason);
+    }
+}
+
+/// Returns the reason why the lease of a worker has ended, if it has.
+fn expired(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
+    let silent = now.saturating_sub(worker.last_seen);
+    if silent > state.config.expiry {
+        return Some(CloseReason::Expired { silent });
+    }
+    let oldest = worker.in_flight.iter().filter_map(|held| state.batches.get(held));
+    let since = oldest.map(|batch| batch.sent).min()?.max(worker.answered);
+    let waited = now.saturating_sub(since);
+    (waited > state.config.answer_timeout).then_some(CloseReason::Unanswering { waited })
+}
+
+/// Sends heartbeats to workers for which one is due.
+pub(crate) fn send_heartbeats(turn: &mut Turn) {
+    for (&id, worker) in &mut turn.state.workers {
+        if turn.now.saturating_sub(worker.heartbeat_sent) >= turn.state.config.heartbeat {
+            worker.heartbeat_sent = turn.now;
+            turn.effects.push(Effect::Heartbeat { worker: id });
+        }
+    }
+}
+
+/// Fails jobs with poison realizations.
+pub(crate) fn fail_poisoned(turn: &mut Turn) {
+    poison::forget_old_crashes(turn.state, turn.now);
+    let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for job in active {
+        if let Some(failure) = poison::failure(turn.state, job, turn.now) {
+            jobs::fail(turn, job, &failure);
+        }
+    }
+}
+
+/// Repeats the writes of refused records that are due.
+pub(crate) fn store_again(turn: &mut Turn) {
+    for job in turn.state.jobs.values_mut() {
+        let Some(store_trouble) = &mut job.store_trouble else {
+            continue;
+        };
+        if turn.now >= store_trouble.retry_at && !store_trouble.on_its_way {
+            store_trouble.on_its_way = true;
+            records::store_again(job, &mut turn.effects);
+        }
+    }
+}
+
+/// Publishes the jobs that changed, and periodically all unfinished ones.
+pub(crate) fn publish(turn: &mut Turn) {
+    if turn.now.saturating_sub(turn.state.published) >= PUBLISH_EVERY {
+        turn.state.published = turn.now;
+        turn.state.changed.extend(&turn.state.active);
+        turn.state.changed.extend(&turn.state.waiting);
+    }
+    let changed: Vec<JobId> = std::mem::take(&mut turn.state.changed).into_iter().collect();
+    for job in changed {
+        if let Some(job) = turn.state.jobs.get_mut(&job) {
+            job.sequence = sequence(job.sequence, turn.now);
+        }
+        if let Some(snapshot) = snapshot::job_snapshot(turn.state, job, turn.now) {
+            turn.effects.push(Effect::Publish { job, snapshot });
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Order of service and batch sizes.
+
+use super::*;
+use crate::core::reactor::dispatch::sizing::batch_size;
+
+/// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
+/// per second, when `queued` realizations are left.
+fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64) {
+    let mut rig = Rig::with(1, threads);
+    for (worker, rate) in rig.state.workers.values_mut().zip(rates) {
+        worker.rates.clear();
+        worker.rates.extend(rate.map(|rate| (JobId(1), rate)));
+    }
+    let size = batch_size(&rig.state, &rig.state.workers[&WorkerId(1)], JobId(1), queued);
+    assert_eq!(size, expected, "{threads:?} {rates:?} {queued}");
+}
+
+#[test]
+fn batches_take_the_target_time_and_leave_work_for_the_others() {
+    // Unknown rate: four realizations per thread.
+    check_size(&[2], &[None], 10_000, 8);
+    check_size(&[64], &[None], 10_000, 256);
+    // Measured rate: 200 ms.
+    check_size(&[2], &[Some(5000.0)], 10_000, 1000);
+    check_size(&[1], &[Some(0.1)], 10_000, 1);
+    // Slow realizations: one for each thread, so that no thread is idle.
+    check_size(&[8], &[Some(8.0 / 0.3)], 10_000, 8);
+    check_size(&[2], &[Some(0.1)], 10_000, 2);
+    check_size(&[8, 8], &[Some(1.0), Some(1.0)], 6, 3);
+    // Never more than a message may hold.
+    check_size(&[2], &[Some(1e12)], 10_000_000, 65_536);
+    // A quarter of the share of the remaining realizations; shares are proportional to the rates.
+    check_size(&[2], &[Some(5000.0)], 400, 100);
+    check_size(&[2, 2], &[Some(5000.0), Some(5000.0)], 400, 50);
+    check_size(&[2, 2], &[Some(7500.0), Some(2500.0)], 400, 75);
+    check_size(&[2, 2], &[Some(5000.0), None], 400, 50);
+    check_size(&[2, 6], &[Some(5000.0), None], 400, 25);
+    // Near the end one for each thread, as long as that is within the share.
+    check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 20, 8);
+    check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 10, 5);
+    check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 1, 1);
+}
+
+#[test]
+fn each_worker_holds_two_batches_and_no_more() {
+    let mut rig = Rig::with(1000, &[]);
+    rig.check(
+        hello(1, 2),
+        &["welcome 1, lease 1", "send 1: batch 1 = 0+8", "send 1: batch 2 = 8+8"],
+    );
+    rig.check(
+        hello(2, 1),
+        &["welcome 2, lease 2", "send 2: batch 3 = 16+4", "send 2: batch 4 = 20+4"],
+    );
+    // 8 in 0.04 s are 200 per second, 40 in 200 ms.
+    rig.check(answer_in(0.04, 1, 1, 0, 8), &["send 1: batch 5 = 24+40"]);
+}
+
+#[test]
+fn slow_realizations_keep_every_thread_of_a_worker_busy() {
+    let mut rig = Rig::with(1000, &[8]);
+    // 32 on 8 threads, 0.3 s each.
+    rig.now += Duration::from_millis(1200);
+    rig.check(answer_in(1.2, 1, 1, 0, 32), &["send 1: batch 3 = 64+8"]);
+    rig.check(answer_in(1.2, 1, 2, 32, 32), &["send 1: batch 4 = 72+8"]);
+    rig.now += Duration::from_millis(300);
+    rig.check(answer_in(0.3, 1, 3, 64, 8), &["send 1: batch 5 = 80+8"]);
+}
+
+#[test]
+fn an_unbelievable_time_is_replaced_by_the_time_waited() {
+    for elapsed_s in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300] {
+        let mut rig = Rig::with(1000, &[2]);
+        rig.now += Duration::from_millis(80);
+        rig.check(answer_in(elapsed_s, 1, 1, 0, 8), &["send 1: batch 3 = 16+20"]);
+    }
+}
+
+#[test]
+fn jobs_are_served_in_turn() {
+    let mut rig = Rig::new();
+    for _ in 0..2 {
+        rig.accept(propagation(100));
+    }
+    rig.event(hello(1, 1));
+    let jobs = |rig: &Rig| -> Vec<u64> {
+        rig.state.batches.values().map(|batch| batch.assignment.job.0).collect()
+    };
+    assert_eq!(jobs(&rig), [1, 2]);
+    rig.check(answer(1, 1, 0, 4), &["send 1: batch 3 = 4+8"]);
+    assert_eq!(jobs(&rig), [2, 1]);
+    rig.check(answer(1, 2, 0, 4), &["send 1: batch 4 = 4+8"]);
+    assert_eq!(jobs(&rig), [1, 2]);
+}
+
+/// Worker 1 holds both halves of a small job, worker 2 is idle.
+fn with_idle_worker() -> Rig {
+    let mut rig = Rig::with(2, &[1]);
+    rig.check(hello(2, 1), &["welcome 2, lease 2"]);
+    rig.check_after(Duration::from_millis(99), &[]);
+    rig
+}
+
+#[test]
+fn an_idle_worker_gets_a_copy_of_the_slowest_batch() {
+    let mut rig = with_idle_worker();
+    rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
+    rig.check_after(Duration::from_millis(1), &[]);
+    // The duplicate is faster: the original is revoked, and the next slowest batch duplicated.
+    rig.check(answer(2, 3, 0, 1), &["revoke 1: batch 1", "send 2: batch 4 = 1+1"]);
+    // The original answers all the same: the answers agree, and nothing happens.
+    rig.check(answer(1, 1, 0, 1), &[]);
+    // The other original is faster than its duplicate.
+    rig.check(answer(1, 2, 1, 1), &["revoke 2: batch 4", "store job 1 evaluation 0"]);
+    rig.check(answer(2, 4, 1, 1), &[]);
+}
+
+#[test]
+fn a_sign_of_life_hands_out_nothing() {
+    let mut rig = with_idle_worker();
+    rig.now += Duration::from_millis(1);
+    // With thousands of workers heartbeats are frequent; a duplicate is due, but waits for the next
+    // tick.
+    for worker in [1, 2] {
+        rig.heartbeat(worker);
+    }
+    rig.check_after(Duration::ZERO, &["send 2: batch 3 = 0+1"]);
+}
+
+#[test]
+fn a_copy_outlives_its_original_and_the_other_way_round() {
+    let mut rig = with_idle_worker();
+    rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
+    // Only the batch without a duplicate is queued again; it was alone in its batch, so it waits
+    // for a worker that holds nothing else.
+    rig.check(end_of_stream(1), &[]);
+    rig.check(answer(2, 3, 0, 1), &["send 2: batch 4 = 1+1"]);
+    rig.check(answer(2, 4, 1, 1), &["store job 1 evaluation 0"]);
+
+    let mut rig = with_idle_worker();
+    rig.check_after(Duration::from_millis(1), &["send 2: batch 3 = 0+1"]);
+    rig.check(end_of_stream(2), &[]);
+    rig.check(answer(1, 1, 0, 1), &[]);
+    rig.check(answer(1, 2, 1, 1), &["store job 1 evaluation 0"]);
+}

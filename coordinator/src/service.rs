@@ -1,0 +1,15 @@
+//! The asynchronous shell around the state machine: listeners, gRPC services, streams and tasks. It
+//! only moves bytes between the network, the store and the state machine.
+
+pub(crate) mod accept;
+pub(crate) mod backing_up;
+pub(crate) mod core_task;
+pub(crate) mod failing;
+pub(crate) mod fetching;
+pub(crate) mod jobs;
+pub mod listen;
+pub(crate) mod observers;
+pub mod open_files;
+pub(crate) mod outbound;
+pub(crate) mod shell;
+pub(crate) mod workers;

@@ -1,0 +1,252 @@
+//! Accepts connections: limited in number, each with limited time for its handshake.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use futures::{Stream, stream};
+use osteon_common::limits::HANDSHAKES_MAX;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::task::JoinSet;
+use tokio::time::{Instant, Sleep, sleep, timeout};
+use tokio_rustls::server::TlsStream;
+use tokio_util::either::Either;
+use tonic::transport::server::Connected;
+
+use crate::access::Certificate;
+use crate::access::tls::Tls;
+use crate::service::open_files;
+
+/// Time limit for a peer's handshake, and again for its first bytes.
+pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Pause after the operating system failed to accept a connection, e.g. because too many files are
+/// open.
+const REFUSED_WAIT: Duration = Duration::from_millis(100);
+/// Minimum time between two log lines about such failures.
+const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// A bound socket.
+#[derive(Debug)]
+pub(crate) enum BoundSocket {
+    Tcp(TcpListener),
+    Unix(UnixListener),
+}
+
+/// A connection that has completed its handshake.
+#[derive(Debug)]
+pub(crate) struct AcceptedConnection {
+    number: u64,
+    io: Io,
+    certificate: Certificate,
+    /// Time limit for the first byte; `None` once it has arrived.
+    patience: Option<Pin<Box<Sleep>>>,
+    /// Permit, one of [`open_files::connections_max`].
+    _place: OwnedSemaphorePermit,
+}
+
+/// Facts about the peer of a call.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PeerInfo {
+    /// Number of its connection, from 1.
+    pub(crate) connection: u64,
+    /// Result of the check of its certificate.
+    pub(crate) certificate: Certificate,
+}
+
+/// Byte stream to and from a peer.
+type Io = Either<Box<TlsStream<TcpStream>>, Plain>;
+type Plain = Either<TcpStream, UnixStream>;
+
+/// Returns the connections as they arrive, with TLS if configured. A peer that does not complete
+/// its handshake is dropped silently.
+pub(crate) fn connections(
+    bound: BoundSocket,
+    tls: Option<watch::Receiver<Tls>>,
+) -> impl Stream<Item = io::Result<AcceptedConnection>> {
+    let acceptor = Acceptor {
+        bound,
+        tls,
+        places: Arc::new(Semaphore::new(open_files::connections_max())),
+        handshakes: JoinSet::new(),
+        complaint: None,
+    };
+    stream::unfold(acceptor, |mut acceptor| async {
+        let connection = acceptor.next().await;
+        Some((Ok(connection), acceptor))
+    })
+}
+
+struct Acceptor {
+    bound: BoundSocket,
+    /// Read for each connection, because it may be replaced while the coordinator runs.
+    tls: Option<watch::Receiver<Tls>>,
+    places: Arc<Semaphore>,
+    handshakes: JoinSet<Option<AcceptedConnection>>,
+    /// Time of the last log line about failures to accept connections.
+    complaint: Option<Instant>,
+}
+
+impl Acceptor {
+    async fn next(&mut self) -> AcceptedConnection {
+        loop {
+            tokio::select! {
+                Some(ended) = self.handshakes.join_next() => {
+                    if let Ok(Some(connection)) = ended {
+                        return connection;
+                    }
+                }
+                accepted = accept(&self.bound, &self.places),
+                    if self.handshakes.len() < HANDSHAKES_MAX =>
+                {
+                    let (io, place) = match accepted {
+                        Ok(accepted) => accepted,
+                        Err(error) => {
+                            self.complain(&error);
+                            sleep(REFUSED_WAIT).await;
+                            continue;
+                        }
+                    };
+                    match (&self.tls, io) {
+                        (Some(tls), Either::Left(stream)) => {
+                            let tls = tls.borrow().clone();
+                            self.handshakes.spawn(handshake(tls, stream, place));
+                        }
+                        (_, plain) => {
+                            let io = Either::Right(plain);
+                            return AcceptedConnection::new(io, Certificate::Absent, place);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Acceptor {
+    /// Logs a failure to accept a connection, at most once per interval.
+    fn complain(&mut self, error: &io::Error) {
+        if self.complaint.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
+            self.complaint = Some(Instant::now());
+            tracing::warn!(%error, "cannot accept connections (logged at most once a minute)");
+        }
+    }
+}
+
+async fn accept(
+    bound: &BoundSocket,
+    places: &Arc<Semaphore>,
+) -> io::Result<(Plain, OwnedSemaphorePermit)> {
+    let place = Arc::clone(places).acquire_owned().await.map_err(io::Error::other)?;
+    let io = match bound {
+        BoundSocket::Tcp(listener) => {
+            let (stream, _) = listener.accept().await?;
+            // Avoids delays of small messages; if it fails, they are only slower.
+            drop(stream.set_nodelay(true));
+            Either::Left(stream)
+        }
+        BoundSocket::Unix(listener) => Either::Right(listener.accept().await?.0),
+    };
+    Ok((io, place))
+}
+
+async fn handshake(
+    tls: Tls,
+    stream: TcpStream,
+    place: OwnedSemaphorePermit,
+) -> Option<AcceptedConnection> {
+    let peer = stream.peer_addr().ok();
+    match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
+        Ok(Ok(stream)) => {
+            let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
+            Some(AcceptedConnection::new(Either::Left(Box::new(stream)), certificate, place))
+        }
+        Ok(Err(error)) => {
+            tracing::debug!(?peer, %error, "a TLS handshake failed");
+            None
+        }
+        Err(_) => {
+            tracing::debug!(?peer, "a TLS handshake took too long");
+            None
+        }
+    }
+}
+
+impl AcceptedConnection {
+    fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
+        let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
+        Self { number, io, certificate, patience, _place: place }
+    }
+}
+
+impl Connected for AcceptedConnection {
+    type ConnectInfo = PeerInfo;
+
+    fn connect_info(&self) -> PeerInfo {
+        PeerInfo { connection: self.number, certificate: self.certificate }
+    }
+}
+
+impl AsyncRead for AcceptedConnection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        match Pin::new(&mut self.io).poll_read(cx, buffer) {
+            Poll::Ready(read) => {
+                if buffer.filled().len() > before {
+                    self.patience = None;
+                }
+                Poll::Ready(read)
+            }
+            Poll::Pending => {
+                if let Some(patience) = &mut self.patience {
+                    ready!(patience.as_mut().poll(cx));
+                    return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+                }
+                Poll::Pending
+            }
+        }
+    }
+}
+
+impl AsyncWrite for AcceptedConnection {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.io).poll_write(cx, bytes)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.io).poll_write_vectored(cx, slices)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.io.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.io).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.io).poll_shutdown(cx)
+    }
+}
+
+#[cfg(test)]
+mod tests;

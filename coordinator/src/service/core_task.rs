@@ -1,0 +1,282 @@
+//! The task that owns the state: it turns messages into events and effects into messages.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use osteon_proto::v1;
+use tokio::sync::{mpsc, oneshot, watch};
+
+use crate::config::Config;
+use crate::core::close_reason::CloseReason;
+use crate::core::effect::{Answer, Effect, Refusal};
+use crate::core::event::{Event, Hello, ReadFailure, Request};
+use crate::core::ids::{JobId, Token, WorkerId};
+use crate::core::reactor::react;
+use crate::core::snapshot;
+use crate::core::state::State;
+use crate::service::failing::{ComponentFailure, FailureReporter};
+use crate::service::outbound::{self, NotReading, Outbound};
+use crate::store::thread::StoreCommand;
+
+/// A message to the core task.
+pub(crate) enum Message {
+    /// An event happened.
+    Event(Event),
+    /// A client sends a request and waits for the answer.
+    Ask(Request, oneshot::Sender<Answer>),
+    /// A client requests to watch a job.
+    Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
+    /// A worker's stream began; messages to it go to `outbound`.
+    Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
+    /// Stop, and report when that is done.
+    Shutdown(oneshot::Sender<()>),
+}
+
+/// Clock of the time since the Unix epoch: read once at the start, monotonic from there.
+pub(crate) struct Clock {
+    started: Instant,
+    epoch: Duration,
+}
+
+impl Clock {
+    pub(crate) fn new() -> Self {
+        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { started: Instant::now(), epoch }
+    }
+
+    pub(crate) fn now(&self) -> Duration {
+        self.epoch + self.started.elapsed()
+    }
+}
+
+/// The task that owns the state.
+pub(crate) struct Core {
+    state: State,
+    clock: Clock,
+    commands: mpsc::Sender<StoreCommand>,
+    next_token: u64,
+    waiting: BTreeMap<Token, oneshot::Sender<Answer>>,
+    /// Newest snapshots of the jobs that are being watched.
+    watching: BTreeMap<JobId, watch::Sender<v1::JobSnapshot>>,
+    outbound: BTreeMap<WorkerId, Outbound>,
+    on_stop: Option<oneshot::Sender<()>>,
+    stopped: bool,
+    failing: FailureReporter,
+    config: Config,
+}
+
+impl Core {
+    pub(crate) fn new(
+        state: State,
+        clock: Clock,
+        commands: mpsc::Sender<StoreCommand>,
+        failing: FailureReporter,
+    ) -> Self {
+        let config = state.config;
+        Self {
+            state,
+            clock,
+            commands,
+            next_token: 0,
+            waiting: BTreeMap::new(),
+            watching: BTreeMap::new(),
+            outbound: BTreeMap::new(),
+            on_stop: None,
+            stopped: false,
+            failing,
+            config,
+        }
+    }
+
+    pub(crate) async fn run(
+        mut self,
+        effects: Vec<Effect>,
+        mut inbox: mpsc::Receiver<Message>,
+        mut from_store: mpsc::Receiver<Event>,
+        tick: Duration,
+    ) {
+        let mut followups = VecDeque::new();
+        self.apply(effects, &mut followups);
+        self.handle(followups);
+        let mut ticks = tokio::time::interval(tick);
+        ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        while !self.stopped {
+            // No branch may starve: `select!` chooses at random among those that are ready.
+            tokio::select! {
+                Some(message) = inbox.recv() => self.message(message),
+                Some(event) = from_store.recv() => self.handle(VecDeque::from([event])),
+                _ = ticks.tick() => self.handle(VecDeque::from([Event::Tick])),
+            }
+        }
+    }
+
+    fn message(&mut self, message: Message) {
+        match message {
+            Message::Event(event) => self.handle(VecDeque::from([event])),
+            Message::Ask(request, reply) => {
+                let token = Token(self.next_token);
+                self.next_token += 1;
+                // Requests whose clients have gone are dropped.
+                self.waiting.retain(|_, reply| !reply.is_closed());
+                self.waiting.insert(token, reply);
+                self.handle(VecDeque::from([Event::Requested { token, request }]));
+            }
+            Message::Watch(job, reply) => self.watch(job, reply),
+            Message::Attach { worker, hello, outbound } => {
+                self.outbound.insert(worker, outbound);
+                self.handle(VecDeque::from([Event::Hello { worker, hello }]));
+            }
+            Message::Shutdown(reply) => {
+                self.on_stop = Some(reply);
+                self.handle(VecDeque::from([Event::Drain]));
+            }
+        }
+    }
+
+    /// Reacts to events, and to the events that the effects cause.
+    fn handle(&mut self, mut events: VecDeque<Event>) {
+        while let Some(event) = events.pop_front() {
+            tracing::trace!(?event);
+            if let Event::StreamEnded { worker } = &event {
+                self.outbound.remove(worker);
+            }
+            let effects = react(&mut self.state, event, self.clock.now());
+            self.apply(effects, &mut events);
+        }
+    }
+
+    fn apply(&mut self, effects: Vec<Effect>, followups: &mut VecDeque<Event>) {
+        for effect in effects {
+            tracing::trace!(?effect);
+            match effect {
+                Effect::Welcome { worker, lease } => {
+                    let welcome = outbound::welcome(worker, lease, &self.config);
+                    self.send(worker, welcome, followups);
+                }
+                Effect::Send { worker, batch, work } => {
+                    self.queue(worker, followups, |outbound| outbound.send_batch(batch, &work));
+                }
+                Effect::Revoke { worker, batch } => {
+                    self.send(worker, outbound::revoke(batch), followups);
+                }
+                Effect::Heartbeat { worker } => {
+                    self.send(worker, outbound::heartbeat(), followups);
+                }
+                Effect::Drain { worker } => {
+                    self.send(worker, outbound::drain(), followups);
+                }
+                Effect::Close { worker, reason } => self.close(worker, &reason),
+                Effect::Store(record) => {
+                    let (job, key) = record.key();
+                    if let Err(refused) = self.commands.try_send(StoreCommand::Put(record)) {
+                        followups.push_back(Event::StoreFailed {
+                            job,
+                            key,
+                            error: refused.to_string(),
+                        });
+                    }
+                }
+                Effect::Read { job, number } => {
+                    if let Err(refused) = self.commands.try_send(StoreCommand::Read { job, number })
+                    {
+                        let found = Err(ReadFailure::Refused { error: refused.to_string() });
+                        followups.push_back(Event::Read { job, number, found });
+                    }
+                }
+                Effect::Prune { token, jobs } => {
+                    let command = StoreCommand::Prune { token, jobs: jobs.clone() };
+                    if let Err(refused) = self.commands.try_send(command) {
+                        let outcome = Err(refused.to_string());
+                        followups.push_back(Event::Pruned { token, jobs, outcome });
+                    }
+                }
+                Effect::Answer { token, answer } => {
+                    if let Some(reply) = self.waiting.remove(&token) {
+                        // The client may have gone.
+                        let _ = reply.send(answer);
+                    }
+                }
+                Effect::Note(notice) => notice.write(),
+                Effect::Publish { job, snapshot } => self.publish(job, snapshot),
+                Effect::GiveUp { error, waited } => {
+                    self.failing.report(ComponentFailure::StoreRefuses { error, waited });
+                }
+                Effect::Stop => self.stop(),
+            }
+        }
+    }
+
+    fn send(
+        &mut self,
+        worker: WorkerId,
+        message: v1::AttachResponse,
+        followups: &mut VecDeque<Event>,
+    ) {
+        self.queue(worker, followups, |outbound| outbound.send(Ok(message)));
+    }
+
+    fn queue(
+        &mut self,
+        worker: WorkerId,
+        followups: &mut VecDeque<Event>,
+        send: impl FnOnce(&mut Outbound) -> Result<(), NotReading>,
+    ) {
+        if let Some(outbound) = self.outbound.get_mut(&worker)
+            && send(outbound).is_err()
+        {
+            // The messages in flight are bounded, so the queue is full only if the worker does not
+            // read or has gone.
+            followups.push_back(Event::Misbehaved { worker, reason: CloseReason::NotReading });
+        }
+    }
+
+    fn close(&mut self, worker: WorkerId, reason: &CloseReason) {
+        tracing::debug!(%worker, %reason, "stream of a worker closed");
+        if let Some(outbound) = self.outbound.remove(&worker) {
+            // If the queue is full, the worker does not read; its stream ends all the same.
+            let _ = outbound.send(Err(outbound::status(reason)));
+        }
+    }
+
+    fn watch(
+        &mut self,
+        job: JobId,
+        reply: oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>,
+    ) {
+        let answer = match snapshot::job_snapshot(&self.state, job, self.clock.now()) {
+            None => Err(Refusal::NoJob { job }),
+            Some(snapshot) => {
+                let sender =
+                    self.watching.entry(job).or_insert_with(|| watch::Sender::new(snapshot));
+                Ok(sender.subscribe())
+            }
+        };
+        let ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
+            receiver.borrow().state() == v1::JobState::Ended
+        };
+        if answer.as_ref().is_ok_and(ended) {
+            self.watching.remove(&job);
+        }
+        // The client may have gone.
+        let _ = reply.send(answer);
+    }
+
+    fn publish(&mut self, job: JobId, snapshot: v1::JobSnapshot) {
+        let ended = snapshot.state() == v1::JobState::Ended;
+        if let Some(watching) = self.watching.get(&job) {
+            watching.send_replace(snapshot);
+            if ended || watching.receiver_count() == 0 {
+                self.watching.remove(&job);
+            }
+        }
+    }
+
+    fn stop(&mut self) {
+        self.stopped = true;
+        self.watching.clear();
+        if let Some(reply) = self.on_stop.take() {
+            // The caller may no longer wait.
+            let _ = reply.send(());
+        }
+    }
+}

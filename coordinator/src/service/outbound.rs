@@ -1,0 +1,201 @@
+//! Messages to a worker: made from effects, and queued.
+
+use std::time::Duration;
+
+use osteon_proto::announced::Announced;
+use osteon_proto::batch::{self, Work};
+use osteon_proto::evaluation::{self, Evaluation};
+use osteon_proto::status::resource_exhausted;
+use osteon_proto::v1::attach_response::Message as Response;
+use osteon_proto::v1::{AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerWelcome};
+use tokio::sync::{mpsc, oneshot};
+use tonic::{Code, Status};
+
+use crate::config::Config;
+use crate::core::close_reason::CloseReason;
+use crate::core::ids::{BatchId, LeaseId, WorkerId};
+
+/// Maximum number of queued messages to one worker: its batches, each with a revocation and perhaps
+/// an evaluation before it, and heartbeats.
+pub(crate) const OUTBOUND_MAX: usize = 96;
+
+/// Time after which a worker that was refused for lack of room may try again.
+const RETRY: Duration = Duration::from_secs(30);
+
+/// A message to a worker, or the status that ends its stream.
+pub(crate) type Outgoing = Result<AttachResponse, Status>;
+
+/// Queue of messages to one worker. The worker's stream ends when this is dropped, even if the
+/// queue is full.
+#[derive(Debug)]
+pub(crate) struct Outbound {
+    messages: mpsc::Sender<Outgoing>,
+    /// The evaluations that the worker keeps.
+    announced: Announced<()>,
+    /// Nothing is sent on it; dropping it is the signal.
+    _open: oneshot::Sender<()>,
+}
+
+impl Outbound {
+    /// Returns a queue for a worker whose stream receives `messages`, and a receiver that completes
+    /// when the queue is dropped.
+    pub(crate) fn new(messages: mpsc::Sender<Outgoing>) -> (Self, oneshot::Receiver<()>) {
+        let (open, closed) = oneshot::channel();
+        (Self { messages, announced: Announced::default(), _open: open }, closed)
+    }
+
+    /// Queues a message.
+    ///
+    /// # Errors
+    /// When the queue is full or the worker has gone.
+    pub(crate) fn send(&self, message: Outgoing) -> Result<(), NotReading> {
+        self.messages.try_send(message).map_err(|_| NotReading)
+    }
+
+    /// Queues a batch, after its evaluation if the worker does not have it.
+    ///
+    /// # Errors
+    /// As [`Outbound::send`].
+    pub(crate) fn send_batch(&mut self, id: BatchId, work: &Work) -> Result<(), NotReading> {
+        if self.announced.get(work.evaluation.id).is_none() {
+            self.send(Ok(evaluation(&work.evaluation)))?;
+            self.announced.announce(work.evaluation.id, ());
+        }
+        self.send(Ok(batch(id, work)))
+    }
+}
+
+/// Error when a worker accepts no message.
+#[derive(Debug)]
+pub(crate) struct NotReading;
+
+/// Returns the first message to an attached worker.
+pub(crate) fn welcome(worker: WorkerId, lease: LeaseId, config: &Config) -> AttachResponse {
+    respond(Response::Welcome(WorkerWelcome {
+        worker: worker.0,
+        lease: lease.0,
+        heartbeat_s: config.heartbeat.as_secs_f64(),
+        expiry_s: config.expiry.as_secs_f64(),
+    }))
+}
+
+/// Returns the message that announces an evaluation.
+fn evaluation(evaluation: &Evaluation) -> AttachResponse {
+    respond(Response::Evaluation(evaluation::to_message(evaluation)))
+}
+
+/// Returns the message that sends a batch.
+fn batch(id: BatchId, work: &Work) -> AttachResponse {
+    respond(Response::Batch(batch::to_message(id.0, work)))
+}
+
+/// Returns the message that revokes a batch.
+pub(crate) fn revoke(batch: BatchId) -> AttachResponse {
+    respond(Response::Revoke(BatchRevoke { batch: batch.0 }))
+}
+
+/// Returns the message that drains a worker: it leaves when it has answered the batches that it
+/// holds.
+pub(crate) fn drain() -> AttachResponse {
+    respond(Response::Drain(WorkerDrain {}))
+}
+
+/// Returns a heartbeat.
+pub(crate) fn heartbeat() -> AttachResponse {
+    respond(Response::Heartbeat(Heartbeat {}))
+}
+
+/// Returns the status that ends a worker's stream.
+pub(crate) fn status(reason: &CloseReason) -> Status {
+    let code = match reason {
+        CloseReason::FingerprintDiffers { .. } => Code::FailedPrecondition,
+        CloseReason::Slots { .. }
+        | CloseReason::NameTooLong { .. }
+        | CloseReason::Malformed(_)
+        | CloseReason::WrongCount { .. }
+        | CloseReason::SecondHello => Code::InvalidArgument,
+        CloseReason::Banned { .. } => Code::PermissionDenied,
+        CloseReason::TooManyWorkers { .. } => {
+            return resource_exhausted(reason.to_string(), RETRY);
+        }
+        CloseReason::Expired { .. } | CloseReason::Unanswering { .. } | CloseReason::NotReading => {
+            Code::Aborted
+        }
+        CloseReason::Drained => Code::Ok,
+        CloseReason::Draining => Code::Unavailable,
+    };
+    Status::new(code, reason.to_string())
+}
+
+fn respond(message: Response) -> AttachResponse {
+    AttachResponse { message: Some(message) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use osteon_common::case::Setup;
+    use osteon_common::germ_source::GermSource;
+    use osteon_common::parameters::Point;
+    use osteon_proto::announced::{EVALUATIONS_KEPT_MAX, Received};
+    use osteon_proto::evaluation::Evaluation;
+
+    use super::*;
+
+    fn work(id: u64) -> Work {
+        let germs = GermSource::streams(id);
+        let evaluation = Evaluation { id, setup: Setup::default(), point: Point([1.0; 7]), germs };
+        Work { evaluation: Arc::new(evaluation), first: 0, count: 1 }
+    }
+
+    /// Sends batches of these evaluations on a new stream to a worker that reads each at once;
+    /// returns the evaluations that came, in their order.
+    fn announced(ids: impl IntoIterator<Item = u64>) -> Vec<u64> {
+        let (sender, mut stream) = mpsc::channel(2);
+        let (mut outbound, _closed) = Outbound::new(sender);
+        let (mut received, mut announced) = (Received::default(), Vec::new());
+        for id in ids {
+            outbound.send_batch(BatchId(9), &work(id)).unwrap();
+            while let Ok(message) = stream.try_recv() {
+                match message.unwrap().message {
+                    Some(Response::Evaluation(message)) => {
+                        received.receive(&message).unwrap();
+                        announced.push(message.evaluation);
+                    }
+                    Some(Response::Batch(message)) => {
+                        assert_eq!(batch::from_message(&message, &received), Ok(work(id)));
+                    }
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+        announced
+    }
+
+    #[test]
+    fn an_evaluation_is_sent_before_its_first_batch_and_again_when_the_worker_has_lost_it() {
+        for _stream in 0..2 {
+            assert_eq!(announced([5, 5, 6, 5, 6]), [5, 6]);
+        }
+        let most = EVALUATIONS_KEPT_MAX as u64;
+        let all = || 0..most;
+        assert_eq!(announced(all().chain(all())), all().collect::<Vec<_>>());
+        let one_more = || all().chain([most]);
+        let twice: Vec<u64> = one_more().chain([0, 1]).collect();
+        assert_eq!(announced(one_more().chain([most, 0, 1, most])), twice);
+    }
+
+    #[test]
+    fn an_evaluation_for_which_the_queue_has_no_room_is_not_taken_as_sent() {
+        let (sender, mut stream) = mpsc::channel(2);
+        let (mut outbound, _closed) = Outbound::new(sender);
+        outbound.send(Ok(heartbeat())).unwrap();
+        outbound.send(Ok(heartbeat())).unwrap();
+        assert!(outbound.send_batch(BatchId(1), &work(5)).is_err());
+        while stream.try_recv().is_ok() {}
+        outbound.send_batch(BatchId(2), &work(5)).unwrap();
+        let first = stream.try_recv().unwrap().unwrap();
+        assert_eq!(first, evaluation(&work(5).evaluation));
+    }
+}
