@@ -272,7 +272,7 @@ fn a_command_that_a_signal_ends_has_its_code() {
         (&["simulate", case], "no results were saved"),
         (&["identify", job, "--coordinator", &silent], "a job that was accepted continues"),
         (&["watch", "1", "--coordinator", &silent], "the job continues"),
-        (&["submit", job, "--coordinator", &silent], "may have accepted the job"),
+        (&["submit", job, "--coordinator", &silent], "the job may have been accepted"),
         (&["fetch", "1", "--out", text(&out), "--coordinator", &silent], "to fetch the results"),
     ];
     for (arguments, expected) in commands {

@@ -6,16 +6,15 @@
 mod job;
 mod section;
 mod setup;
+mod value;
 
-use crate::accepted::{Interval, WholeRange};
 use crate::job::JobSpecification;
-use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
 pub(crate) use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, job_from, no_data};
 pub use self::job::{data, job};
-use self::section::section;
 pub use self::setup::setup;
+pub(crate) use self::value::{number, quantity};
 
 impl JobSpecification {
     /// Returns all violations of the specification, each with its field named as in a job file.
@@ -24,47 +23,4 @@ impl JobSpecification {
         job(self, &mut violations);
         violations
     }
-}
-
-/// Records a number outside `accepted`, unless `field` is known to be wrong.
-pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
-    if !known_wrong(field, violations) && !accepted.contains(value) {
-        violations.add(field, accepted.refusal(value));
-    }
-}
-
-/// Records a number outside `accepted`, or one that is physically impossible and would be plausible
-/// in another unit, unless `field` is known to be wrong.
-pub(crate) fn quantity(
-    field: &str,
-    value: f64,
-    accepted: Interval,
-    quantity: &PlausibleRange,
-    violations: &mut Violations,
-) {
-    if known_wrong(field, violations) {
-        return;
-    }
-    let question = quantity.question(&[value], accepted);
-    let refusal = match (accepted.contains(value), question) {
-        (true, None) => return,
-        (true, Some(question)) => format!("is {value:?}; {}: {question}", quantity.asked_for()),
-        (false, None) => accepted.refusal(value),
-        (false, Some(question)) => format!("{}: {question}", accepted.refusal(value)),
-    };
-    violations.add(field, refusal);
-}
-
-/// Records a whole number outside `accepted`, unless `field` is known to be wrong.
-fn whole(field: &str, value: u64, accepted: WholeRange, violations: &mut Violations) {
-    if !known_wrong(field, violations) && !accepted.contains(value) {
-        violations.add(field, accepted.refusal(&value));
-    }
-}
-
-/// Returns whether `field`, something inside it, or a table around it is known to be wrong.
-fn known_wrong(field: &str, violations: &Violations) -> bool {
-    let around =
-        |table: &str| field.strip_prefix(table).is_some_and(|rest| rest.starts_with(['.', '[']));
-    violations.touches(field) || violations.iter().any(|violation| around(&violation.field))
 }

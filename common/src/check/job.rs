@@ -18,7 +18,9 @@ use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
 
-use super::{known_wrong, number, quantity, section, setup};
+use super::section::section;
+use super::setup::setup;
+use super::value::{known_wrong, number, quantity};
 
 /// Accepted values of a measured velocity.
 pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");

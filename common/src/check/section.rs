@@ -5,7 +5,7 @@ use crate::document::entry_path;
 use crate::fields::{Choice, Condition, Fields, Key, Number, Section, Whole, entries};
 use crate::violations::Violations;
 
-use super::{known_wrong, number, quantity, whole};
+use super::value::{known_wrong, number, quantity, whole};
 
 /// Records each key of `section`, which is the table `name` of a file, whose value is not accepted
 /// or in another unit. Keys that are not meaningful must have the values that they have in

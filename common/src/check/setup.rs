@@ -9,17 +9,18 @@ use crate::sampling::pair_count;
 use crate::settings::Method;
 use crate::violations::Violations;
 
-use super::{known_wrong, quantity};
+use super::section::section;
+use super::value::{known_wrong, quantity};
 
 /// Records all violations of `setup`.
 pub fn setup(setup: &Setup, violations: &mut Violations) {
     let (mut checked, mut default) = (*setup, Setup::default());
-    for ((key, section), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
+    for ((key, declared), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
         if key.name == "probe" {
             // The range of the heights is narrower than that of their keys.
             heights(setup, violations);
         }
-        super::section(key.name, section, default, violations);
+        section(key.name, declared, default, violations);
     }
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);

@@ -8,12 +8,11 @@
 use std::cell::RefCell;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::results::{JobFailure, Moments, Status};
 use osteon_common::version::Program;
-use osteon_proto::{specification, v1};
+use osteon_proto::specification;
 use osteon_search::{Ending, Summary};
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
@@ -28,6 +27,7 @@ use crate::core::worker_name::WorkerName;
 mod acknowledged;
 mod backup;
 mod columns;
+mod job_row;
 mod opening;
 mod schema;
 mod store_trait;
@@ -39,6 +39,7 @@ use columns::{
     JobColumns, ban_checksum, end_checksum, evaluation, evaluation_checksum, job_checksum,
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
+use job_row::{job_columns, job_record};
 
 /// The header field of the file that holds the highest identifier of a deleted job. It is part of
 /// the database, so it changes in one transaction with the tables.
@@ -484,52 +485,6 @@ fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
     };
     let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
     EndRecord::new(record.job, ending, program, record.accepted, 0, None)
-}
-
-/// Returns the job of a row, and its identifier; `None` if the row is damaged.
-fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
-    let job = JobId(row.get(0)?);
-    let (request_id, fingerprint, client, name): (String, String, String, String) =
-        (row.get(1)?, row.get(4)?, row.get(6)?, row.get(8)?);
-    let (encoded, checksum) = (row.get_ref(3)?.as_blob()?, row.get_ref(5)?.as_blob()?);
-    let columns = JobColumns {
-        job,
-        request_id: &request_id,
-        accepted_ns: row.get(2)?,
-        specification: encoded,
-        fingerprint: &fingerprint,
-        client: &client,
-        priority: row.get(7)?,
-        name: &name,
-    };
-    let intact = checksum == job_checksum(&columns);
-    let (accepted, priority) = (Duration::from_nanos(columns.accepted_ns), columns.priority);
-    let message = intact.then(|| v1::JobSpecification::decode(encoded).ok()).flatten();
-    let known = message.and_then(|message| specification::from_message(&message).ok());
-    let record = known.map(|specification| JobRecord {
-        job,
-        request_id,
-        specification: Arc::new(specification),
-        accepted,
-        fingerprint,
-        client,
-        priority,
-        name,
-    });
-    Ok((job, record))
-}
-
-fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobColumns<'a> {
-    JobColumns {
-        job: record.job,
-        request_id: &record.request_id,
-        accepted_ns: nanoseconds(record.accepted),
-        specification: encoded,
-        fingerprint: &record.fingerprint,
-        client: &record.client,
-        priority: record.priority,
-        name: &record.name,
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! that is read is written and read again, unchanged.
 
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
-use osteon_proto::results;
+use osteon_proto::{results, v1};
 
 use super::summary::summary_checksum;
 use super::tests::{end, evaluation, job, summary};

@@ -1,0 +1,48 @@
+//! Rules on one value by itself.
+
+use crate::accepted::{Interval, WholeRange};
+use crate::plausible::PlausibleRange;
+use crate::violations::Violations;
+
+/// Records a number outside `accepted`, unless `field` is known to be wrong.
+pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
+    if !known_wrong(field, violations) && !accepted.contains(value) {
+        violations.add(field, accepted.refusal(value));
+    }
+}
+
+/// Records a number outside `accepted`, or one that is physically impossible and would be plausible
+/// in another unit, unless `field` is known to be wrong.
+pub(crate) fn quantity(
+    field: &str,
+    value: f64,
+    accepted: Interval,
+    quantity: &PlausibleRange,
+    violations: &mut Violations,
+) {
+    if known_wrong(field, violations) {
+        return;
+    }
+    let question = quantity.question(&[value], accepted);
+    let refusal = match (accepted.contains(value), question) {
+        (true, None) => return,
+        (true, Some(question)) => format!("is {value:?}; {}: {question}", quantity.asked_for()),
+        (false, None) => accepted.refusal(value),
+        (false, Some(question)) => format!("{}: {question}", accepted.refusal(value)),
+    };
+    violations.add(field, refusal);
+}
+
+/// Records a whole number outside `accepted`, unless `field` is known to be wrong.
+pub(super) fn whole(field: &str, value: u64, accepted: WholeRange, violations: &mut Violations) {
+    if !known_wrong(field, violations) && !accepted.contains(value) {
+        violations.add(field, accepted.refusal(&value));
+    }
+}
+
+/// Returns whether `field`, something inside it, or a table around it is known to be wrong.
+pub(super) fn known_wrong(field: &str, violations: &Violations) -> bool {
+    let around =
+        |table: &str| field.strip_prefix(table).is_some_and(|rest| rest.starts_with(['.', '[']));
+    violations.touches(field) || violations.iter().any(|violation| around(&violation.field))
+}

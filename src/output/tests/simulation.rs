@@ -1,0 +1,110 @@
+//! Output of `simulate`.
+
+use super::*;
+
+fn arrival() -> Arrival {
+    Arrival {
+        velocity: 3908.75,
+        times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
+        estimated_error: 2e-5,
+        passes: None,
+    }
+}
+
+/// A setup with three receivers. The exact method's sampling changes with every improvement of it;
+/// the hybrid method's discretisation is set by the user.
+fn setup(method: Method) -> Setup {
+    let mut setup = Setup::default();
+    setup.probe.receivers.count = 3;
+    setup.solver.method = method;
+    setup
+}
+
+fn simulation(
+    format: OutputFormat,
+    arrival: &Result<Arrival, Failure>,
+    check: Option<&Check>,
+) -> String {
+    let setup = setup(Method::Hybrid);
+    let shown =
+        ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
+    // Each build has its own commit.
+    let commit = format!("\"commit\": {}", serde_json::json!(crate::program::COMMIT));
+    printed(format, |output| output.simulation(&shown).unwrap())
+        .replace(&commit, "\"commit\": \"(of the build)\"")
+}
+
+#[test]
+fn a_simulation_shows_times_and_velocity() {
+    insta::assert_snapshot!(simulation(OutputFormat::Text, &Ok(arrival()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Json, &Ok(arrival()), None));
+}
+
+#[test]
+fn a_simulation_without_velocity_says_why() {
+    let failure = || Failure {
+        kind: FailureKind::NoArrival,
+        detail: "receiver 3 has no extremum".to_owned(),
+    };
+    insta::assert_snapshot!(simulation(OutputFormat::Text, &Err(failure()), None));
+    insta::assert_snapshot!(simulation(OutputFormat::Json, &Err(failure()), None));
+}
+
+#[test]
+fn the_sampling_that_decided_is_shown() {
+    let last = Sampled { band: 12.5e6, period: 1.1e-5, pairs: 9000 };
+    let passes = Some(PassSummary { count: 3, pairs_computed: 17_000, last });
+    let arrival = Ok(Arrival { passes, ..arrival() });
+    let setup = setup(Method::Exact);
+    let shown = ShownSimulation { setup: &setup, arrival: &arrival, traces: None, check: None };
+    let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
+    let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
+    assert!(unwrapped(&text(OutputFormat::Text)).contains(line), "{}", text(OutputFormat::Text));
+    let value: serde_json::Value = serde_json::from_str(&text(OutputFormat::Json)).unwrap();
+    let expected = [("pairs", 9000), ("pairs_computed", 17_000), ("passes", 3)];
+    for (key, number) in expected {
+        assert_eq!(value["solver"][key], number, "{value:#}");
+    }
+}
+
+/// A check in which the hybrid method differs by this.
+fn checked(hybrid: Difference) -> Check {
+    let solution = |method, velocity, difference| MethodSolution {
+        setup: setup(method),
+        arrival: Ok(Arrival { velocity, ..arrival() }),
+        difference,
+    };
+    let numbers = |velocity, time| Difference::Numbers { velocity, time };
+    let mut refined = setup(Method::Exact);
+    refined.solver.refinement = 5.0;
+    Check {
+        exact: solution(Method::Exact, 3908.85, numbers(2.5e-5, 1.2e-10)),
+        hybrid: solution(Method::Hybrid, 3908.9, hybrid),
+        refined: MethodSolution {
+            setup: refined,
+            ..solution(Method::Exact, 3908.75, numbers(0.0, 0.0))
+        },
+    }
+}
+
+#[test]
+fn a_check_shows_every_solution_and_whether_it_passed() {
+    let text = |check: &Check| simulation(OutputFormat::Text, &Ok(arrival()), Some(check));
+    let same = checked(Difference::Numbers { velocity: 3.8e-5, time: 4e-10 });
+    insta::assert_snapshot!(text(&same));
+    assert!(text(&checked(Difference::Picks)).contains("THE PICKS DIFFER\n"));
+    let mut off = same.clone();
+    off.exact.difference = Difference::Numbers { velocity: 1.1e-4, time: 1e-9 };
+    assert!(text(&off).contains("OFF by more than 1e-4: EXACT\n"), "{}", text(&off));
+    off.hybrid.difference = Difference::Numbers { velocity: 2.7e-4, time: 1e-9 };
+    assert!(text(&off).contains("OFF by more than 1e-4: EXACT AND HYBRID\n"), "{}", text(&off));
+    let json = simulation(OutputFormat::Json, &Ok(arrival()), Some(&same));
+    let check = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["check"];
+    assert_eq!(check.as_array().unwrap().len(), 3);
+    assert_eq!(check[0]["velocity"], 3908.85);
+    assert_eq!(check[1]["method"], "hybrid");
+    assert_eq!(check[1]["relative_difference"], 3.8e-5);
+    assert_eq!(check[1]["time_difference"], 4e-10);
+    assert_eq!(check[2]["estimated_error"], 2e-5);
+    assert_eq!(check[2]["same_pick"], true);
+}
