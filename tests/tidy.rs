@@ -93,8 +93,8 @@ fn state_and_reactions_know_no_clock_no_socket_and_no_future() {
     let single = ["coordinator/src/access.rs", "worker/src/state.rs", "worker/src/backend.rs"];
     let paths: Vec<_> = pure.iter().chain(&single).map(|path| root().join(path)).collect();
     let pure = files(&[".rs"]).into_iter().filter(|file| {
-        let test = file.components().any(|part| part.as_os_str() == "tests")
-            || file.ends_with("tests.rs");
+        let test =
+            file.components().any(|part| part.as_os_str() == "tests") || file.ends_with("tests.rs");
         !test && paths.iter().any(|path| file.starts_with(path))
     });
     let mut count = 0;

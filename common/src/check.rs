@@ -12,8 +12,7 @@ use crate::job::JobSpecification;
 use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
-pub(crate) use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, job_from, no_data};
-pub use self::job::{data, job};
+pub use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, data, job, job_from, no_data};
 use self::section::section;
 pub use self::setup::setup;
 
@@ -27,7 +26,7 @@ impl JobSpecification {
 }
 
 /// Records a number outside `accepted`, unless `field` is known to be wrong.
-pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
+pub fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
     if !known_wrong(field, violations) && !accepted.contains(value) {
         violations.add(field, accepted.refusal(value));
     }
@@ -35,7 +34,7 @@ pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &m
 
 /// Records a number outside `accepted`, or one that is physically impossible and would be plausible
 /// in another unit, unless `field` is known to be wrong.
-pub(crate) fn quantity(
+pub fn quantity(
     field: &str,
     value: f64,
     accepted: Interval,

@@ -9,7 +9,7 @@ mod node;
 mod toml;
 
 pub use self::node::{Format, SyntaxError};
-pub(crate) use self::node::{Node, Value, element_path, entry_path, position, quoted};
+pub(crate) use self::node::{Node, Value, position};
 
 /// Parses a text into a tree.
 ///

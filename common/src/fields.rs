@@ -8,11 +8,10 @@
 
 mod collect;
 
-use crate::accepted::Interval;
 use crate::plausible::PlausibleRange;
 
 pub use self::collect::{Entry, Value, entries, names};
-pub use crate::accepted::WholeRange;
+pub use crate::accepted::{Edge, Interval, WholeRange};
 
 /// Name and meaning of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +75,8 @@ pub struct Condition {
 /// The numbers that a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number {
-    pub(crate) interval: Interval,
+    /// The interval of accepted numbers.
+    pub interval: Interval,
     pub(crate) plausible: Option<&'static PlausibleRange>,
 }
 

@@ -9,7 +9,8 @@ use std::fmt;
 use std::slice;
 
 use crate::accepted::WholeRange;
-use crate::document::{Node, Value, element_path, entry_path, quoted};
+use crate::document::{Node, Value};
+use crate::field_path::{element_path, entry_path, quoted};
 use crate::fields::Choice;
 use crate::file_error::Invalid;
 use crate::violations::{Violation, Violations};

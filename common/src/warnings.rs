@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::case::{Case, Setup};
-use crate::document::entry_path;
+use crate::field_path::entry_path;
 use crate::fields::{self, Entry, Number, Value};
 use crate::job::{Data, JobSpecification, Range};
 use crate::origin::Origin;
@@ -53,7 +53,7 @@ pub fn job_warnings(specification: &JobSpecification) -> Vec<Warning> {
 }
 
 /// Same as [`job_warnings`], for a job whose measured velocities are in the file `origin`.
-pub(crate) fn job_warnings_from(
+pub fn job_warnings_from(
     specification: &JobSpecification,
     origin: Option<&Origin>,
 ) -> Vec<Warning> {

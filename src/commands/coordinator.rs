@@ -5,8 +5,8 @@ use std::pin::pin;
 
 use anyhow::Context as _;
 use osteon_common::visible;
-use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::service::open_files;
+use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress};
 
 use crate::arguments::CoordinatorArguments;

@@ -1,7 +1,7 @@
 //! Checks the declared keys of a section, each by itself.
 
 use crate::accepted::WholeRange;
-use crate::document::entry_path;
+use crate::field_path::entry_path;
 use crate::fields::{Choice, Condition, Fields, Key, Number, Section, Whole, entries};
 use crate::violations::Violations;
 

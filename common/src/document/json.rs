@@ -7,7 +7,8 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::budget::Budget;
-use super::node::{Format, Node, SyntaxError, Value, quoted};
+use super::node::{Format, Node, SyntaxError, Value};
+use crate::field_path::quoted;
 
 /// Parses a JSON text.
 pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {

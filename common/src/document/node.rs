@@ -5,6 +5,7 @@ use std::path::Path;
 
 use thiserror::Error;
 
+use crate::field_path::{quoted, shown_key};
 use crate::visible;
 
 /// Format of a file.
@@ -87,7 +88,8 @@ impl Node {
     /// Returns the line of the field with this path, or else of the innermost table around it that
     /// has one.
     ///
-    /// Paths have the form of [`entry_path`] and [`element_path`].
+    /// Paths have the form of [`entry_path`](crate::field_path::entry_path) and
+    /// [`element_path`](crate::field_path::element_path).
     pub(crate) fn line_of(&self, path: &str) -> Option<usize> {
         let mut node = self;
         let mut rest = path;
@@ -124,39 +126,6 @@ impl Node {
         }
     }
 }
-
-/// Returns the path of the entry `key` of the table at `table`; the root's path is empty.
-pub(crate) fn entry_path(table: &str, key: &str) -> String {
-    let key = shown_key(key);
-    if table.is_empty() { key } else { format!("{table}.{key}") }
-}
-
-/// Returns the path of element `index` (from 0) of the list at `list`.
-pub(crate) fn element_path(list: &str, index: usize) -> String {
-    format!("{list}[{index}]")
-}
-
-/// Returns a key as it must be written in TOML, shortened if it is long.
-fn shown_key(key: &str) -> String {
-    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if !key.is_empty() && key.len() <= SHOWN_CHARACTERS_MAX && key.chars().all(bare) {
-        key.to_owned()
-    } else {
-        quoted(key)
-    }
-}
-
-/// Returns `text` in quotes, with control characters escaped, shortened if it is long.
-pub(crate) fn quoted(text: &str) -> String {
-    let mut shown: String = text.chars().take(SHOWN_CHARACTERS_MAX).collect();
-    if shown.len() < text.len() {
-        shown.push('…');
-    }
-    format!("{shown:?}")
-}
-
-/// Longest part of a user's text that is quoted in a message.
-const SHOWN_CHARACTERS_MAX: usize = 60;
 
 impl fmt::Display for Value {
     /// Formats the value for a message, after "is" or "found".

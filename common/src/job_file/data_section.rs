@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::check::{self, DATA_FORMS};
-use crate::document::{Value, entry_path};
+use crate::document::Value;
+use crate::field_path::entry_path;
 use crate::fields::Key;
 use crate::job::{Data, Group, JobKind};
 use crate::origin::Origin;

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::Group;
-use crate::document::quoted;
+use crate::field_path::quoted;
 use crate::version::RESULT_SCHEMA;
 
 /// Longest cause that a message repeats: it may hold a value of the file.
