@@ -109,7 +109,7 @@ impl Interval {
     }
 
     /// Returns the message that refuses `value`.
-    pub(crate) fn refusal(&self, value: f64) -> String {
+    pub fn refusal(&self, value: f64) -> String {
         let finite = if value.is_finite() { "" } else { "finite and " };
         match (self.lower, self.upper) {
             (Edge::None, Edge::None) => format!("is {value:?}; it must be {self}"),
