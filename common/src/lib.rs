@@ -2,8 +2,9 @@
 //!
 //! Elasticity and its random ensemble, layers, probe, case and job specifications with their
 //! validation, the moments of a set of velocities, results, and the digest that identifies them.
-//! This crate uses no network, clock or thread; everything in it is a pure function of its input
-//! except [`job_file`], [`case_file`] and [`user_file`], which read the files that a user names.
+//! Keys of files are declared here and specifications are checked here; `osteon-files` reads and
+//! writes the files. This crate uses no file, network, clock or thread; everything in it is a pure
+//! function of its input.
 //!
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 
@@ -34,7 +35,6 @@ pub mod quantile;
 pub mod reach;
 pub mod realization;
 pub mod results;
-
 pub mod sampling;
 mod search_settings;
 pub mod settings;
