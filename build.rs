@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 20] = [
+const SOURCES: [&str; 22] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -16,6 +16,8 @@ const SOURCES: [&str; 20] = [
     "common/src",
     "coordinator/Cargo.toml",
     "coordinator/src",
+    "files/Cargo.toml",
+    "files/src",
     "proto/Cargo.toml",
     "proto/build.rs",
     "proto/osteon",

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::job_file;
 use osteon_common::parameters::Parameter;
+use osteon_files::job_file;
 use osteon_search::{CompletedJob, IdentifyError, identify};
 use osteon_solver::{Solver, Workspace};
 use rayon::prelude::*;

@@ -4,10 +4,10 @@
 use std::fs;
 use std::path::Path;
 
-use osteon_common::document::Format as FileFormat;
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::job_file;
-use osteon_common::report::ResultFile;
+use osteon_files::document::Format as FileFormat;
+use osteon_files::job_file;
+use osteon_files::report::ResultFile;
 use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
 use crate::output::{self, ShownResult};

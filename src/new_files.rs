@@ -6,7 +6,8 @@ use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use osteon_common::{user_file, visible};
+use osteon_common::visible;
+use osteon_files::user_file;
 
 use crate::exit_status::CommandFailure;
 

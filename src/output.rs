@@ -9,8 +9,8 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::job::JobSpecification;
-use osteon_common::report::{ResultFile, Solver};
 use osteon_common::sampling::NominalSampling;
+use osteon_files::report::{ResultFile, Solver};
 use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure};

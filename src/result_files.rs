@@ -7,7 +7,8 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use osteon_common::version::{Program, RESULT_SCHEMA};
-use osteon_common::{user_file, visible};
+use osteon_common::visible;
+use osteon_files::user_file;
 use serde_json::{Value, json};
 
 /// The result file, written last: a directory that contains it is complete.

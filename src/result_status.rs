@@ -2,8 +2,8 @@
 //! treated like one that was just computed.
 
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::report::{Propagation, ResultFile};
 use osteon_common::results::Status;
+use osteon_files::report::{Propagation, ResultFile};
 
 use crate::client::Fetched;
 use crate::exit_status::ExitStatus;

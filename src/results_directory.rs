@@ -10,12 +10,13 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
-use osteon_common::document::Format;
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
-use osteon_common::report::ResultFile;
 use osteon_common::results::{GroupResult, JobResult, Status};
-use osteon_common::{job_file, results_csv, user_file, visible};
+use osteon_common::visible;
+use osteon_files::document::Format;
+use osteon_files::report::ResultFile;
+use osteon_files::{job_file, results_csv, user_file};
 
 use crate::client::Fetched;
 use crate::exit_status::CommandFailure;

@@ -1,6 +1,6 @@
 //! Complete results for tests, in which a test sets only the keys that matter to it.
 
-use osteon_common::report::ResultFile;
+use osteon_files::report::ResultFile;
 use serde_json::Value;
 
 /// Returns a complete result of an identification, in which the keys of `partial` are replaced.

@@ -9,8 +9,9 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use osteon_common::case::Case;
-use osteon_common::document::Format;
-use osteon_common::{case_file, visible};
+use osteon_common::visible;
+use osteon_files::case_file;
+use osteon_files::document::Format;
 
 use crate::exit_status::CommandFailure;
 use crate::program;

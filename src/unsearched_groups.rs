@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use osteon_common::job::Data;
-use osteon_common::job_file::JobWithWarnings;
 use osteon_common::visible;
+use osteon_files::job_file::JobWithWarnings;
 
 use crate::progress::say;
 

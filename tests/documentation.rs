@@ -9,7 +9,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
-use osteon_common::job_file;
+use osteon_files::job_file;
 
 use support::{Owned, Scratch, osteon};
 

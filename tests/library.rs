@@ -13,8 +13,8 @@ mod example;
 use std::path::Path;
 
 use osteon_common::job::JobKind;
-use osteon_common::job_file;
 use osteon_common::parameters::Parameter;
+use osteon_files::job_file;
 use support::{Scratch, job, run, text};
 
 /// Compares the example's result with the output of `osteon identify`.

@@ -7,7 +7,7 @@ use crate::parameters::Parameter;
 
 /// An interval of finite numbers with its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Interval {
+pub struct Interval {
     lower: Edge,
     upper: Edge,
     unit: &'static str,
@@ -15,7 +15,7 @@ pub(crate) struct Interval {
 
 /// End of an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Edge {
+pub enum Edge {
     /// No limit.
     None,
     /// The limit does not belong to the interval.
@@ -40,7 +40,7 @@ impl Interval {
     }
 
     /// Accepts numbers above `lower`.
-    pub(crate) const fn above(lower: f64, unit: &'static str) -> Self {
+    pub const fn above(lower: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Open(lower), upper: Edge::None, unit }
     }
 
@@ -71,7 +71,7 @@ impl Interval {
 
     /// Returns the values accepted for a parameter of the mean model, or the dispersion, regardless
     /// of other fields.
-    pub(crate) fn of(parameter: Parameter) -> Self {
+    pub fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density
             | Parameter::LongitudinalYoungModulus
@@ -84,17 +84,17 @@ impl Interval {
     }
 
     /// Returns the unit, or what the numbers are fractions of; empty for pure numbers.
-    pub(crate) const fn unit(&self) -> &'static str {
+    pub const fn unit(&self) -> &'static str {
         self.unit
     }
 
     /// Returns the lower and the upper end.
-    pub(crate) const fn edges(&self) -> (Edge, Edge) {
+    pub const fn edges(&self) -> (Edge, Edge) {
         (self.lower, self.upper)
     }
 
     /// Returns whether `value` is finite and inside the interval.
-    pub(crate) fn contains(&self, value: f64) -> bool {
+    pub fn contains(&self, value: f64) -> bool {
         let above = match self.lower {
             Edge::None => true,
             Edge::Open(lower) => value > lower,
@@ -109,7 +109,7 @@ impl Interval {
     }
 
     /// Returns the message that refuses `value`.
-    pub(crate) fn refusal(&self, value: f64) -> String {
+    pub fn refusal(&self, value: f64) -> String {
         let finite = if value.is_finite() { "" } else { "finite and " };
         match (self.lower, self.upper) {
             (Edge::None, Edge::None) => format!("is {value:?}; it must be {self}"),
@@ -172,12 +172,12 @@ impl WholeRange {
     }
 
     /// Returns whether `value` is inside the range.
-    pub(crate) fn contains(&self, value: u64) -> bool {
+    pub fn contains(&self, value: u64) -> bool {
         (self.min..=self.max).contains(&value)
     }
 
     /// Returns the message that refuses `value`.
-    pub(crate) fn refusal(&self, value: &impl fmt::Display) -> String {
+    pub fn refusal(&self, value: &impl fmt::Display) -> String {
         format!("is {value}; it must be {self}")
     }
 }

@@ -11,10 +11,9 @@ mod value;
 use crate::job::JobSpecification;
 use crate::violations::Violations;
 
-pub(crate) use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, job_from, no_data};
-pub use self::job::{data, job};
+pub use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, data, job, job_from, no_data};
 pub use self::setup::setup;
-pub(crate) use self::value::{number, quantity};
+pub use self::value::{number, quantity};
 
 impl JobSpecification {
     /// Returns all violations of the specification, each with its field named as in a job file.

@@ -8,11 +8,10 @@
 
 mod collect;
 
-use crate::accepted::Interval;
 use crate::plausible::PlausibleRange;
 
-pub use self::collect::{Entry, Value, entries, names};
-pub use crate::accepted::WholeRange;
+pub use self::collect::{DeclaredKey, DeclaredValue, entries, names};
+pub use crate::accepted::{Edge, Interval, WholeRange};
 
 /// Name and meaning of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +44,7 @@ pub trait Fields {
     fn whole(&mut self, key: Key, field: &mut dyn Whole, accepted: WholeRange);
 
     /// Declares a Boolean.
-    fn truth(&mut self, key: Key, field: &mut bool);
+    fn boolean(&mut self, key: Key, field: &mut bool);
 
     /// Declares a choice from a closed set of names.
     fn choice(&mut self, key: Key, field: &mut dyn Choice);
@@ -57,7 +56,7 @@ pub trait Fields {
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields));
 
     /// Declares a table that has code of its own for each use.
-    fn special(&mut self, key: Key);
+    fn custom_table(&mut self, key: Key);
 }
 
 /// Condition under which keys are meaningful. If it does not hold, they keep their defaults.
@@ -76,7 +75,8 @@ pub struct Condition {
 /// The numbers that a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number {
-    pub(crate) interval: Interval,
+    /// The interval of accepted numbers.
+    pub interval: Interval,
     pub(crate) plausible: Option<&'static PlausibleRange>,
 }
 

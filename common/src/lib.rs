@@ -2,54 +2,45 @@
 //!
 //! Elasticity and its random ensemble, layers, probe, case and job specifications with their
 //! validation, the moments of a set of velocities, results, and the digest that identifies them.
-//! This crate uses no network, clock or thread; everything in it is a pure function of its input
-//! except [`job_file`], [`case_file`] and [`user_file`], which read the files that a user names.
+//! Keys of files are declared here and specifications are checked here; `osteon-files` reads and
+//! writes the files. This crate uses no file, network, clock or thread; everything in it is a pure
+//! function of its input.
 //!
 //! Units are SI throughout: m, s, kg/m³, Pa, Hz.
 
 mod accepted;
 pub mod bulk_velocity;
 pub mod case;
-pub mod case_file;
 pub mod check;
 pub mod conclusions;
 pub mod data_statistics;
 pub mod digest;
-pub mod document;
 pub mod elasticity;
 pub mod ensemble;
+pub mod field_path;
 pub mod fields;
-pub mod file_error;
 pub mod germ_source;
 pub mod inference;
 pub mod job;
-pub mod job_file;
 pub mod layers;
 pub mod limits;
 pub mod moments;
 mod monte_carlo;
-mod origin;
+pub mod origin;
 pub mod outcome;
 pub mod parameters;
 pub mod plausible;
 pub mod probe;
 pub mod quantile;
 pub mod reach;
-mod reader;
 pub mod realization;
-pub mod report;
 pub mod results;
-pub mod results_csv;
-
 pub mod sampling;
 mod search_settings;
 pub mod settings;
 mod sobol;
 pub mod special;
 pub mod statistics;
-mod toml_text;
-pub mod user_file;
-mod velocities;
 pub mod version;
 pub mod violations;
 pub mod visible;

@@ -110,7 +110,7 @@ impl Section for MonteCarlo {
         let control_variate = "`true`: the moments are corrected by those of √(c1111/ρ), which are \
                                known exactly ([physics.md](physics.md#the-control-variate)); not used \
                                where a realization failed";
-        fields.truth(
+        fields.boolean(
             Key { name: "control_variate", meaning: control_variate },
             &mut self.control_variate,
         );

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 /// File and lines of a job's velocities.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Origin {
+pub struct Origin {
     /// The file.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// Line of each velocity of each set, from 1.
-    pub(crate) lines: Vec<Vec<u32>>,
+    pub lines: Vec<Vec<u32>>,
 }
 
 impl Origin {
     /// Returns the path of the file.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 

@@ -175,7 +175,7 @@ const DISPERSION: PlausibleRange = PlausibleRange {
 
 impl PlausibleRange {
     /// Returns the prior knowledge about a parameter of the mean model, or the dispersion.
-    pub(crate) fn of(parameter: Parameter) -> Self {
+    pub fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density => DENSITY,
             Parameter::LongitudinalYoungModulus

@@ -164,12 +164,12 @@ impl Section for Search {
                              the result requires them \
                              ([searches.md](searches.md#identifiability-and-intervals))";
         fields
-            .truth(Key { name: "sensitivities", meaning: sensitivities }, &mut self.sensitivities);
+            .boolean(Key { name: "sensitivities", meaning: sensitivities }, &mut self.sensitivities);
         let priors = "for each free parameter that has one: `{ value = …, weight = … }`; the cost \
                       grows by weight × ((p - value)/(upper - lower))² \
                       ([searches.md](searches.md#priors)). The value must be within the bounds, the \
                       weight above 0; not available with `\"newton\"`";
-        fields.special(Key { name: "priors", meaning: priors });
+        fields.custom_table(Key { name: "priors", meaning: priors });
     }
 }
 

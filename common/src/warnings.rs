@@ -3,8 +3,8 @@
 use std::fmt;
 
 use crate::case::{Case, Setup};
-use crate::document::entry_path;
-use crate::fields::{self, Entry, Number, Value};
+use crate::field_path::entry_path;
+use crate::fields::{self, DeclaredKey, Number, DeclaredValue};
 use crate::job::{Data, JobSpecification, Range};
 use crate::origin::Origin;
 use crate::parameters::Parameter;
@@ -53,7 +53,7 @@ pub fn job_warnings(specification: &JobSpecification) -> Vec<Warning> {
 }
 
 /// Same as [`job_warnings`], for a job whose measured velocities are in the file `origin`.
-pub(crate) fn job_warnings_from(
+pub fn job_warnings_from(
     specification: &JobSpecification,
     origin: Option<&Origin>,
 ) -> Vec<Warning> {
@@ -94,14 +94,14 @@ impl Warnings {
         }
     }
 
-    fn entries(&mut self, table: &str, entries: &[Entry]) {
+    fn entries(&mut self, table: &str, entries: &[DeclaredKey]) {
         for entry in entries.iter().filter(|entry| entry.applies()) {
             let field = entry_path(table, entry.key.name);
             match &entry.value {
-                Value::Number(Some(value), Number { plausible: Some(range), .. }) => {
+                DeclaredValue::Number(Some(value), Number { plausible: Some(range), .. }) => {
                     self.number(&field, *value, range);
                 }
-                Value::Table(entries) => self.entries(&field, entries),
+                DeclaredValue::Table(entries) => self.entries(&field, entries),
                 _ => {}
             }
         }

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use osteon_common::limits::{CREDENTIAL_FILE_BYTES_MAX, CREDENTIAL_PIPE_S_MAX};
-use osteon_common::{user_file, visible};
+use osteon_common::visible;
+use osteon_files::user_file;
 use thiserror::Error;
 use tokio_rustls::rustls;
 use tokio_rustls::rustls::crypto::ring;

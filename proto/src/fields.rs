@@ -6,7 +6,7 @@
 use std::sync::LazyLock;
 
 use osteon_common::fields::{
-    self, Choice, Condition, Entry, Fields, Key, Number, Section, Value, Whole, WholeRange,
+    self, Choice, Condition, DeclaredKey, Fields, Key, Number, Section, DeclaredValue, Whole, WholeRange,
 };
 use osteon_common::violations::Violations;
 use prost::{Message, Name};
@@ -38,7 +38,7 @@ pub(crate) fn from_message<M: Message + Name>(
     if let Err(error) = dynamic.transcode_from(message) {
         return violations.add(name, error.to_string());
     }
-    section.declare(&mut FromMessage { path: name.to_owned(), message: dynamic, violations });
+    section.declare(&mut MessageReader { path: name.to_owned(), message: dynamic, violations });
 }
 
 static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
@@ -56,7 +56,7 @@ fn transcoded<M: Message + Default>(message: &DynamicMessage) -> M {
     message.transcode_to().expect("the message has its own type")
 }
 
-fn fill(message: &mut DynamicMessage, entries: &[Entry]) {
+fn fill(message: &mut DynamicMessage, entries: &[DeclaredKey]) {
     for entry in entries.iter().filter(|entry| entry.applies()) {
         let Some(field) = message.descriptor().get_field_by_name(entry.key.name) else { continue };
         if let Some(value) = field_value(&field, &entry.value) {
@@ -65,24 +65,24 @@ fn fill(message: &mut DynamicMessage, entries: &[Entry]) {
     }
 }
 
-fn field_value(field: &FieldDescriptor, value: &Value) -> Option<FieldValue> {
+fn field_value(field: &FieldDescriptor, value: &DeclaredValue) -> Option<FieldValue> {
     Some(match (value, field.kind()) {
-        (Value::Number(number, _), _) => FieldValue::F64((*number)?),
-        (Value::Whole(whole, _), Kind::Uint32) => {
+        (DeclaredValue::Number(number, _), _) => FieldValue::F64((*number)?),
+        (DeclaredValue::Whole(whole, _), Kind::Uint32) => {
             FieldValue::U32(u32::try_from(*whole).unwrap_or(u32::MAX))
         }
-        (Value::Whole(whole, _), _) => FieldValue::U64(*whole),
-        (Value::Truth(truth), _) => FieldValue::Bool(*truth),
-        (Value::Choice { chosen, .. }, Kind::Enum(names)) => {
+        (DeclaredValue::Whole(whole, _), _) => FieldValue::U64(*whole),
+        (DeclaredValue::Boolean(truth), _) => FieldValue::Bool(*truth),
+        (DeclaredValue::Choice { chosen, .. }, Kind::Enum(names)) => {
             let found = names.values().find(|value| short_name(&names, value.name()) == *chosen)?;
             FieldValue::EnumNumber(found.number())
         }
-        (Value::Table(entries), Kind::Message(descriptor)) => {
+        (DeclaredValue::Table(entries), Kind::Message(descriptor)) => {
             let mut message = DynamicMessage::new(descriptor);
             fill(&mut message, entries);
             FieldValue::Message(message)
         }
-        (Value::Choice { .. } | Value::Table(_) | Value::Special, _) => return None,
+        (DeclaredValue::Choice { .. } | DeclaredValue::Table(_) | DeclaredValue::CustomTable, _) => return None,
     })
 }
 
@@ -94,13 +94,13 @@ fn short_name(names: &EnumDescriptor, name: &str) -> String {
     name.strip_prefix(prefix).unwrap_or(name).to_lowercase()
 }
 
-struct FromMessage<'v> {
+struct MessageReader<'v> {
     path: String,
     message: DynamicMessage,
     violations: &'v mut Violations,
 }
 
-impl FromMessage<'_> {
+impl MessageReader<'_> {
     /// Returns the field of a key; `None` if it is absent.
     fn get(&self, key: &str) -> Option<(FieldDescriptor, FieldValue)> {
         let field = self.message.descriptor().get_field_by_name(key)?;
@@ -113,7 +113,7 @@ impl FromMessage<'_> {
     }
 }
 
-impl Fields for FromMessage<'_> {
+impl Fields for MessageReader<'_> {
     fn number(&mut self, key: Key, field: &mut f64, _: Number) {
         if let Some(number) = self.get(key.name).and_then(|(_, value)| value.as_f64()) {
             *field = number;
@@ -133,7 +133,7 @@ impl Fields for FromMessage<'_> {
         }
     }
 
-    fn truth(&mut self, key: Key, field: &mut bool) {
+    fn boolean(&mut self, key: Key, field: &mut bool) {
         if let Some(truth) = self.get(key.name).and_then(|(_, value)| value.as_bool()) {
             *field = truth;
         }
@@ -155,7 +155,7 @@ impl Fields for FromMessage<'_> {
     fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields)) {
         if let Some((_, FieldValue::Message(message))) = self.get(key.name) {
             let path = self.path(key.name);
-            declare(&mut FromMessage { path, message, violations: self.violations });
+            declare(&mut MessageReader { path, message, violations: self.violations });
         }
     }
 
@@ -174,7 +174,7 @@ impl Fields for FromMessage<'_> {
         }
     }
 
-    fn special(&mut self, _: Key) {}
+    fn custom_table(&mut self, _: Key) {}
 }
 
 #[cfg(test)]
@@ -185,19 +185,19 @@ mod tests {
     use super::*;
 
     /// Checks that the keys are exactly the fields of the message, each of a type that holds it.
-    fn check(entries: &[Entry], message: &MessageDescriptor) {
+    fn check(entries: &[DeclaredKey], message: &MessageDescriptor) {
         let mut keys: Vec<_> = entries.iter().map(|entry| entry.key.name).collect();
         let mut names: Vec<_> = message.fields().map(|field| field.name().to_owned()).collect();
         keys.sort_unstable();
         names.sort_unstable();
         assert_eq!(keys, names, "{}", message.full_name());
-        for Entry { key, value, .. } in entries {
+        for DeclaredKey { key, value, .. } in entries {
             let field = message.get_field_by_name(key.name).unwrap();
             match (value, field.kind()) {
-                (Value::Number(..), Kind::Double) | (Value::Truth(_), Kind::Bool) => {
+                (DeclaredValue::Number(..), Kind::Double) | (DeclaredValue::Boolean(_), Kind::Bool) => {
                     assert!(field.supports_presence(), "{}", field.full_name());
                 }
-                (Value::Whole(_, accepted), kind) => {
+                (DeclaredValue::Whole(_, accepted), kind) => {
                     assert!(field.supports_presence(), "{}", field.full_name());
                     let fits = match kind {
                         Kind::Uint32 => accepted.max <= u64::from(u32::MAX),
@@ -206,14 +206,14 @@ mod tests {
                     };
                     assert!(fits, "{}", field.full_name());
                 }
-                (Value::Choice { names, .. }, Kind::Enum(descriptor)) => {
+                (DeclaredValue::Choice { names, .. }, Kind::Enum(descriptor)) => {
                     let known = descriptor.values().skip(1);
                     let known: Vec<_> =
                         known.map(|value| short_name(&descriptor, value.name())).collect();
                     assert_eq!(*names, known, "{}", field.full_name());
                 }
-                (Value::Table(entries), Kind::Message(inner)) => check(entries, &inner),
-                (Value::Special, Kind::Message(_)) => {}
+                (DeclaredValue::Table(entries), Kind::Message(inner)) => check(entries, &inner),
+                (DeclaredValue::CustomTable, Kind::Message(_)) => {}
                 (value, kind) => panic!("{}: {value:?} as {kind:?}", field.full_name()),
             }
         }

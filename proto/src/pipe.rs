@@ -62,7 +62,7 @@ mod tests {
     use std::fs::OpenOptions;
     use std::io::Write as _;
 
-    use osteon_common::user_file::open_or_pipe;
+    use osteon_files::user_file::open_or_pipe;
 
     use super::*;
 

@@ -6,20 +6,20 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use osteon_common::document::Format;
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{JobKind, JobSpecification, Sampling};
 use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::report::ResultFile;
 use osteon_common::results::{
     BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupResult,
     JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;
-use osteon_common::{job_file, results_csv};
+use osteon_files::document::Format;
+use osteon_files::report::ResultFile;
+use osteon_files::{job_file, results_csv};
 use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use osteon_common::job::JobKind;
-use osteon_common::job_file;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener};
+use osteon_files::job_file;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
 use tokio::sync::Notify;
 use tonic::Status;

@@ -7,7 +7,7 @@ use osteon_common::case::Case;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
-use osteon_common::{case_file, job_file, report};
+use osteon_files::{case_file, job_file, report};
 
 use crate::arguments::DrawArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};

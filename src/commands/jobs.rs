@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
-use osteon_common::report::ResultFile;
 use osteon_common::results::Status;
-use osteon_common::{job_file, visible};
+use osteon_common::visible;
+use osteon_files::job_file;
+use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 

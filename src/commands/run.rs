@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::job_file;
-use osteon_common::report::ResultFile;
 use osteon_common::results::Status;
+use osteon_files::job_file;
+use osteon_files::report::ResultFile;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 

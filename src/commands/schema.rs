@@ -1,6 +1,6 @@
 //! `schema`: the JSON Schema of a file, for other programs.
 
-use osteon_common::{job_file, report};
+use osteon_files::{job_file, report};
 
 use crate::arguments::{SchemaArguments, SchemaFile};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};

@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 
 use osteon_common::case::Case;
-use osteon_common::case_file;
 use osteon_common::warnings::case_warnings;
+use osteon_files::case_file;
 use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
 

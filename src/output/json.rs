@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use osteon_common::report::{CheckedSolution, Receiver, Simulation};
 use osteon_common::version::Program;
+use osteon_files::report::{CheckedSolution, Receiver, Simulation};
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, DepartedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,

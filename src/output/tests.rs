@@ -1,9 +1,9 @@
-use osteon_common::document::Format as FileFormat;
 use osteon_common::job::{JobKind, Objective, Search, SearchMethod};
-use osteon_common::job_file;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::settings::Method;
+use osteon_files::document::Format as FileFormat;
+use osteon_files::job_file;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
 use osteon_solver::check::{Difference, MethodSolution};
 use osteon_solver::{Failure, PassSummary, Sampled};

@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use osteon_common::document::Format;
-use osteon_common::job_file;
+use osteon_files::document::Format;
+use osteon_files::job_file;
 
 use super::*;
 use crate::sample_result::{identification, propagation};

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
-use osteon_common::job_file;
+use osteon_files::job_file;
 use osteon_proto::endpoint::{connect, jobs_client};
 use osteon_proto::specification;
 use osteon_proto::v1::fetch_response::Part;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::accepted::{Interval, written};
-use crate::document::{element_path, entry_path};
+use crate::field_path::{element_path, entry_path};
 use crate::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
     SearchMethod,
@@ -23,14 +23,14 @@ use super::setup::setup;
 use super::value::{known_wrong, number, quantity};
 
 /// Accepted values of a measured velocity.
-pub(crate) const VELOCITY: Interval = Interval::above(0.0, "m/s");
+pub const VELOCITY: Interval = Interval::above(0.0, "m/s");
 /// Accepted values of the data's coefficient of variation.
 const VARIATION: Interval = Interval::above(0.0, "");
 const MOMENTS_NEED: &str = "a coefficient of variation above 0 needs";
 /// Minimum number of velocities that have a coefficient of variation.
-pub(crate) const VELOCITIES_MIN: usize = 2;
+pub const VELOCITIES_MIN: usize = 2;
 /// The forms in which `[data]` may be given.
-pub(crate) const DATA_FORMS: &str =
+pub const DATA_FORMS: &str =
     "give either velocities, or groups, or mean and coefficient_of_variation";
 
 /// Maximum number of velocities that are refused individually.
@@ -45,7 +45,7 @@ pub fn job(specification: &JobSpecification, violations: &mut Violations) {
 }
 
 /// Same as [`job`], for a job whose measured velocities are in the file `origin`.
-pub(crate) fn job_from(
+pub fn job_from(
     specification: &JobSpecification,
     origin: Option<&Origin>,
     violations: &mut Violations,
@@ -79,7 +79,7 @@ pub(crate) fn job_from(
 }
 
 /// Returns the message for an identification without data.
-pub(crate) fn no_data() -> String {
+pub fn no_data() -> String {
     format!("is missing; an identification needs it: {DATA_FORMS}")
 }
 

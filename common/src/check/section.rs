@@ -1,7 +1,7 @@
 //! Checks the declared keys of a section, each by itself.
 
 use crate::accepted::WholeRange;
-use crate::document::entry_path;
+use crate::field_path::entry_path;
 use crate::fields::{Choice, Condition, Fields, Key, Number, Section, Whole, entries};
 use crate::violations::Violations;
 
@@ -61,7 +61,7 @@ impl Fields for Checker<'_> {
         whole(&path, field.get(), accepted, self.violations);
     }
 
-    fn truth(&mut self, _: Key, _: &mut bool) {}
+    fn boolean(&mut self, _: Key, _: &mut bool) {}
 
     fn choice(&mut self, _: Key, _: &mut dyn Choice) {}
 
@@ -76,5 +76,5 @@ impl Fields for Checker<'_> {
         }
     }
 
-    fn special(&mut self, _: Key) {}
+    fn custom_table(&mut self, _: Key) {}
 }

@@ -5,7 +5,7 @@ use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
 /// Records a number outside `accepted`, unless `field` is known to be wrong.
-pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
+pub fn number(field: &str, value: f64, accepted: Interval, violations: &mut Violations) {
     if !known_wrong(field, violations) && !accepted.contains(value) {
         violations.add(field, accepted.refusal(value));
     }
@@ -13,7 +13,7 @@ pub(crate) fn number(field: &str, value: f64, accepted: Interval, violations: &m
 
 /// Records a number outside `accepted`, or one that is physically impossible and would be plausible
 /// in another unit, unless `field` is known to be wrong.
-pub(crate) fn quantity(
+pub fn quantity(
     field: &str,
     value: f64,
     accepted: Interval,

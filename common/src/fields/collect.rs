@@ -6,24 +6,24 @@ use super::{Choice, Condition, Fields, Key, Number, Section, Whole};
 
 /// A declared key with its value.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct DeclaredKey {
     /// Name and meaning.
     pub key: Key,
-    /// Value, and the values that are accepted.
-    pub value: Value,
+    /// DeclaredValue, and the values that are accepted.
+    pub value: DeclaredValue,
     /// Condition under which the key is meaningful, if it has one.
     pub condition: Option<Condition>,
 }
 
 /// The value of a declared key, and the values that it accepts.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value {
+pub enum DeclaredValue {
     /// A number; `None` if it is absent.
     Number(Option<f64>, Number),
     /// A whole number.
     Whole(u64, WholeRange),
     /// A Boolean.
-    Truth(bool),
+    Boolean(bool),
     /// One of several names.
     Choice {
         /// The name of the value.
@@ -32,12 +32,12 @@ pub enum Value {
         names: Vec<&'static str>,
     },
     /// A table.
-    Table(Vec<Entry>),
+    Table(Vec<DeclaredKey>),
     /// A table that has code of its own.
-    Special,
+    CustomTable,
 }
 
-impl Entry {
+impl DeclaredKey {
     /// Returns whether the key is meaningful with the values of the section.
     pub fn applies(&self) -> bool {
         self.condition.as_ref().is_none_or(|condition| condition.holds)
@@ -45,7 +45,7 @@ impl Entry {
 }
 
 /// Returns all keys of a section with their values.
-pub fn entries(section: &mut dyn Section) -> Vec<Entry> {
+pub fn entries(section: &mut dyn Section) -> Vec<DeclaredKey> {
     let mut collector = Collector::default();
     section.declare(&mut collector);
     collector.entries
@@ -60,41 +60,41 @@ pub fn names(declare: &mut dyn FnMut(&mut dyn Fields)) -> Vec<&'static str> {
 
 #[derive(Debug, Default)]
 struct Collector {
-    entries: Vec<Entry>,
+    entries: Vec<DeclaredKey>,
     condition: Option<Condition>,
 }
 
 impl Collector {
-    fn push(&mut self, key: Key, value: Value) {
-        self.entries.push(Entry { key, value, condition: self.condition.clone() });
+    fn push(&mut self, key: Key, value: DeclaredValue) {
+        self.entries.push(DeclaredKey { key, value, condition: self.condition.clone() });
     }
 }
 
 impl Fields for Collector {
     fn number(&mut self, key: Key, field: &mut f64, accepted: Number) {
-        self.push(key, Value::Number(Some(*field), accepted));
+        self.push(key, DeclaredValue::Number(Some(*field), accepted));
     }
 
     fn optional_number(&mut self, key: Key, field: &mut Option<f64>, accepted: Number) {
-        self.push(key, Value::Number(*field, accepted));
+        self.push(key, DeclaredValue::Number(*field, accepted));
     }
 
     fn whole(&mut self, key: Key, field: &mut dyn Whole, accepted: WholeRange) {
-        self.push(key, Value::Whole(field.get(), accepted));
+        self.push(key, DeclaredValue::Whole(field.get(), accepted));
     }
 
-    fn truth(&mut self, key: Key, field: &mut bool) {
-        self.push(key, Value::Truth(*field));
+    fn boolean(&mut self, key: Key, field: &mut bool) {
+        self.push(key, DeclaredValue::Boolean(*field));
     }
 
     fn choice(&mut self, key: Key, field: &mut dyn Choice) {
-        self.push(key, Value::Choice { chosen: field.name(), names: field.names() });
+        self.push(key, DeclaredValue::Choice { chosen: field.name(), names: field.names() });
     }
 
     fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields)) {
         let mut inner = Self::default();
         declare(&mut inner);
-        self.push(key, Value::Table(inner.entries));
+        self.push(key, DeclaredValue::Table(inner.entries));
     }
 
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
@@ -103,7 +103,7 @@ impl Fields for Collector {
         self.condition = None;
     }
 
-    fn special(&mut self, key: Key) {
-        self.push(key, Value::Special);
+    fn custom_table(&mut self, key: Key) {
+        self.push(key, DeclaredValue::CustomTable);
     }
 }

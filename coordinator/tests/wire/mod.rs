@@ -2,9 +2,9 @@
 
 use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
-use osteon_common::report::ResultFile;
 use osteon_common::results::JobResult;
-use osteon_common::results_csv;
+use osteon_files::report::ResultFile;
+use osteon_files::results_csv;
 
 use osteon_proto::v1::{GroupResult, HistoryBlock, JobResult as ResultMessage};
 

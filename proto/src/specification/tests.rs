@@ -1,10 +1,10 @@
 use std::path::Path;
 
 use osteon_common::case::Setup;
-use osteon_common::document::Format;
 use osteon_common::job::{Sampling, SearchMethod};
-use osteon_common::job_file;
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_files::document::Format;
+use osteon_files::job_file;
 use osteon_fuzz::properties;
 use proptest::prelude::*;
 

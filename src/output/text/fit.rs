@@ -2,7 +2,7 @@
 
 use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::report::{Data, Identification, Moment};
+use osteon_files::report::{Data, Identification, Moment};
 use osteon_search::search_box::{SearchBox, Side};
 
 use super::identified;

@@ -2,8 +2,8 @@
 //! groups have no result or no intervals.
 
 use osteon_common::parameters::Parameter;
-use osteon_common::report::{Data, Group, Moment, QuantityEstimate};
 use osteon_common::results::Status;
+use osteon_files::report::{Data, Group, Moment, QuantityEstimate};
 
 use super::result::scale;
 use super::{aligned, significant};

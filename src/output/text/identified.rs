@@ -3,7 +3,7 @@
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::inference::Spread;
 use osteon_common::parameters::Parameter;
-use osteon_common::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
+use osteon_files::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, digits, measured, significant};

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use osteon_common::job::{JobSpecification, Objective, Range};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::report::{Data, Identification, Moment, Propagation, ResultFile, Velocity};
 use osteon_common::results::Status;
 use osteon_common::visible;
+use osteon_files::report::{Data, Identification, Moment, Propagation, ResultFile, Velocity};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};

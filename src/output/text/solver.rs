@@ -1,7 +1,7 @@
 //! The line that describes how velocities were computed.
 
-use osteon_common::report::{EstimatedErrors, Solver};
 use osteon_common::settings::Method;
+use osteon_files::report::{EstimatedErrors, Solver};
 
 use super::significant;
 

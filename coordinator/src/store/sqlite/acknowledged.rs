@@ -14,7 +14,7 @@ use std::io::{self, Write as _};
 use std::os::unix::fs::{FileExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
-use osteon_common::user_file;
+use osteon_files::user_file;
 
 use super::opening::FILE_MODE;
 use crate::core::ids::JobId;

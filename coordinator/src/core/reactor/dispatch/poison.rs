@@ -10,10 +10,10 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use osteon_common::case::Case;
-use osteon_common::case_file;
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
+use osteon_files::case_file;
 
 use super::{batches, schedule};
 use crate::core::batch::{Assignment, Purpose};

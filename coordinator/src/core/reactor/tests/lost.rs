@@ -1,9 +1,9 @@
 //! Batches of lost workers.
 
 use osteon_common::case::Case;
-use osteon_common::case_file;
-use osteon_common::document::Format;
 use osteon_common::realization::Ensemble;
+use osteon_files::case_file;
+use osteon_files::document::Format;
 
 use super::*;
 use crate::core::batch::Assignment;

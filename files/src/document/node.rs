@@ -1,0 +1,153 @@
+//! The tree of a file, with paths and lines for messages.
+
+use std::fmt;
+use std::path::Path;
+
+use osteon_common::field_path::{quoted, shown_key};
+use osteon_common::visible;
+use thiserror::Error;
+
+/// Format of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// TOML 1.
+    Toml,
+    /// JSON, with the same keys and nesting.
+    Json,
+}
+
+impl Format {
+    /// Returns the format that the extension of `path` denotes; `None` if it is neither `toml` nor
+    /// `json`.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        if extension.eq_ignore_ascii_case("toml") {
+            Some(Self::Toml)
+        } else if extension.eq_ignore_ascii_case("json") {
+            Some(Self::Json)
+        } else {
+            None
+        }
+    }
+
+    /// Returns the name for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Toml => "TOML",
+            Self::Json => "JSON",
+        }
+    }
+}
+
+/// Syntax error of a text.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
+pub struct SyntaxError {
+    /// The expected format.
+    pub format: Format,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// The parser's message.
+    pub message: String,
+}
+
+/// A value with its line number (for a table's entry: the line of its key).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Node {
+    /// Line, from 1, if the format provides it.
+    pub(crate) line: Option<usize>,
+    /// The value.
+    pub(crate) value: Value,
+}
+
+/// The values that a file may contain.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Value {
+    /// JSON's null.
+    Null,
+    /// true or false.
+    Boolean(bool),
+    /// A number written without fraction or exponent, within ±2⁶³ or so.
+    Integer(i128),
+    /// Any other number; may be NaN or infinite.
+    Number(f64),
+    /// A string.
+    Text(String),
+    /// TOML's date or time.
+    Date,
+    /// An array.
+    List(Vec<Node>),
+    /// A table (JSON: object), in the order of the file; keys are unique.
+    Table(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// Returns the line of the field with this path, or else of the innermost table around it that
+    /// has one.
+    ///
+    /// Paths have the form of [`entry_path`](osteon_common::field_path::entry_path) and
+    /// [`element_path`](osteon_common::field_path::element_path).
+    pub(crate) fn line_of(&self, path: &str) -> Option<usize> {
+        let mut node = self;
+        let mut rest = path;
+        let mut line = None;
+        while let Some((child, after)) = node.child_on(rest) {
+            line = if child.is_implied() { None } else { child.line };
+            node = child;
+            rest = after;
+        }
+        line
+    }
+
+    /// Returns whether this is a table that no line of the file opens by itself, as `parameters` in
+    /// `[parameters.density]`: the parser gives it the line of its first entry.
+    fn is_implied(&self) -> bool {
+        let Value::Table(entries) = &self.value else { return false };
+        let first = entries.first().map(|(_, node)| node);
+        first.is_some_and(|node| node.line == self.line && matches!(node.value, Value::Table(_)))
+    }
+
+    /// Returns the child that the first segment of `path` names, and the rest of the path.
+    fn child_on<'a, 'p>(&'a self, path: &'p str) -> Option<(&'a Node, &'p str)> {
+        match &self.value {
+            Value::Table(entries) => entries.iter().find_map(|(key, node)| {
+                let path = path.strip_prefix('.').unwrap_or(path);
+                let rest = path.strip_prefix(shown_key(key).as_str())?;
+                (rest.is_empty() || rest.starts_with(['.', '['])).then_some((node, rest))
+            }),
+            Value::List(elements) => {
+                let (index, rest) = path.strip_prefix('[')?.split_once(']')?;
+                Some((elements.get(index.parse::<usize>().ok()?)?, rest))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    /// Formats the value for a message, after "is" or "found".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Boolean(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value:?}"),
+            Self::Text(text) => write!(f, "the string {}", quoted(text)),
+            Self::Date => f.write_str("a date or time"),
+            Self::List(elements) => match elements.len() {
+                0 => f.write_str("an empty list"),
+                count => write!(f, "a list of {count}"),
+            },
+            Self::Table(_) => f.write_str("a table"),
+        }
+    }
+}
+
+/// Returns line and column, both from 1, of a byte offset.
+pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}

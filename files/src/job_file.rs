@@ -1,0 +1,152 @@
+//! Job files: the specification of a job, in TOML or JSON.
+
+mod data_section;
+mod key_tables;
+mod parameters;
+mod priors;
+mod schema;
+
+use std::path::{Path, PathBuf};
+
+use osteon_common::case::Setup;
+use osteon_common::check;
+use osteon_common::job::{JobKind, JobSpecification, MonteCarlo, Objective, Search};
+use osteon_common::limits;
+use osteon_common::warnings::{self, Warning};
+
+use crate::document::{self, Format};
+use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::reader::{self, Reader, Table};
+
+pub use self::key_tables::{job_table, setup_table};
+pub use self::schema::schema;
+pub use crate::toml_text::job as to_toml;
+
+/// Limit of a job file's length; it may contain measured velocities.
+const BOUND: Bound = Bound {
+    bytes: limits::JOB_FILE_BYTES_MAX,
+    purpose: "a job with a million velocities needs; data.velocities may also name a CSV file",
+};
+
+/// Reads and validates the job file at `path`; its extension determines the format. If it names a
+/// file of measured velocities, that is read too, relative to the job file, and inlined.
+///
+/// For a propagation, `[data]` may be left out and is not kept; no file of velocities is read.
+///
+/// # Errors
+/// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
+/// once.
+pub fn read(path: &Path, kind: JobKind) -> Result<JobSpecification, FileError> {
+    read_with_warnings(path, kind).map(|noted| noted.specification)
+}
+
+/// A job, with warnings and notes about the file from which it was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobWithWarnings {
+    /// The job.
+    pub specification: JobSpecification,
+    /// Warnings about values that are allowed but unusual.
+    pub warnings: Vec<Warning>,
+    /// The file of its measured velocities, if they are in a separate one.
+    pub velocities_file: Option<PathBuf>,
+}
+
+/// Reads a job file as [`read`] does, and also returns warnings and notes.
+///
+/// # Errors
+/// Same as [`read`].
+pub fn read_with_warnings(path: &Path, kind: JobKind) -> Result<JobWithWarnings, FileError> {
+    let (text, format) = file_error::read(path, BOUND)?;
+    let directory = path.parent().unwrap_or(Path::new(""));
+    parse_with_warnings(&text, format, directory, kind)
+        .map_err(|content| FileError::Content { path: path.to_owned(), content })
+}
+
+/// Reads and validates the text of a job file in `directory`; otherwise the same as [`read`].
+///
+/// # Errors
+/// If the text is malformed or violates a rule; all violations are reported at once.
+pub fn parse(
+    text: &str,
+    format: Format,
+    directory: &Path,
+    kind: JobKind,
+) -> Result<JobSpecification, ContentError> {
+    parse_with_warnings(text, format, directory, kind).map(|noted| noted.specification)
+}
+
+fn parse_with_warnings(
+    text: &str,
+    format: Format,
+    directory: &Path,
+    kind: JobKind,
+) -> Result<JobWithWarnings, ContentError> {
+    let root = document::parse(file_error::without_byte_order_mark(text), format)?;
+    let mut reader = Reader::default();
+    let keys = [
+        "layers",
+        "probe",
+        "picking",
+        "solver",
+        "data",
+        "parameters",
+        "monte_carlo",
+        "objective",
+        "search",
+    ];
+    let table = reader.root(&root, &keys);
+    if !table.is_table() {
+        return Err(reader.refuse(&root).into());
+    }
+    let setup = setup(&mut reader, &table);
+    let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
+    let specification = JobSpecification {
+        kind,
+        setup,
+        data,
+        parameters: parameters::read(&mut reader, &table),
+        monte_carlo: monte_carlo(&mut reader, &table),
+        objective: objective(&mut reader, &table),
+        search: search(&mut reader, &table),
+    };
+    check::job_from(&specification, origin.as_ref(), &mut reader.violations);
+    if !reader.violations.is_empty() {
+        return Err(reader.refuse(&root).into());
+    }
+    let warnings = warnings::job_warnings_from(&specification, origin.as_ref());
+    let velocities_file = origin.map(|origin| origin.path().to_owned());
+    Ok(JobWithWarnings { specification, warnings, velocities_file })
+}
+
+/// Reads the sections that case and job files share.
+pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>) -> Setup {
+    let mut setup = Setup::default();
+    for (key, section) in setup.sections() {
+        reader::section(reader, root, key.name, section);
+    }
+    setup
+}
+
+fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
+    let mut monte_carlo = MonteCarlo::default();
+    let table = reader::section(reader, root, "monte_carlo", &mut monte_carlo);
+    // If these are misspelt, the scrambles cannot be checked against them, and only the misspelling
+    // is reported.
+    if ["realizations", "sampling"].iter().any(|key| reader.is_misspelt(&table, key)) {
+        monte_carlo.scrambles = MonteCarlo::default().scrambles;
+    }
+    monte_carlo
+}
+
+fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
+    let mut objective = Objective::default();
+    reader::section(reader, root, "objective", &mut objective);
+    objective
+}
+
+fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
+    let mut search = Search::default();
+    let table = reader::section(reader, root, "search", &mut search);
+    search.priors = priors::read(reader, &table);
+    search
+}

@@ -1,0 +1,78 @@
+//! The tables of `docs/job-files.md`, in Markdown.
+
+use osteon_common::case::Setup;
+use osteon_common::fields::{DeclaredKey, Key, DeclaredValue, entries};
+use osteon_common::job::RunSettings;
+use osteon_common::parameters::Parameter;
+
+use crate::toml_text;
+
+use super::{data_section, parameters, priors};
+
+/// Returns the table of the keys that case and job files share.
+pub fn setup_table() -> String {
+    let mut setup = Setup::default();
+    let sections = setup.sections().map(|(key, section)| rows(key.name, &entries(section)));
+    table(&sections.concat())
+}
+
+/// Returns the table of the other keys of a job file.
+pub fn job_table() -> String {
+    let special = |path: &str, keys: &[Key]| -> String {
+        keys.iter().map(|key| row(&format!("{path}.{}", key.name), "", "", key.meaning)).collect()
+    };
+    let names = Parameter::ALL.map(|parameter| format!("`{}`", parameter.name())).join(", ");
+    let each = format!("a range for each of {names}");
+    let mut settings = RunSettings::default();
+    let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
+    table(&format!(
+        "{}{}{}{}{}",
+        special("data", &data_section::KEYS),
+        row("parameters.NAME", "", "", &each),
+        special("parameters.NAME", &parameters::KEYS),
+        declared.concat(),
+        special("search.priors.NAME", &priors::KEYS),
+    ))
+}
+
+fn table(rows: &str) -> String {
+    format!("| key | default | allowed | meaning |\n|---|---|---|---|\n{rows}")
+}
+
+fn row(path: &str, default: &str, allowed: &str, meaning: &str) -> String {
+    format!("| `{path}` | {default} | {allowed} | {meaning} |\n")
+}
+
+fn rows(table: &str, entries: &[DeclaredKey]) -> String {
+    entries.iter().map(|entry| rows_of(table, entry)).collect()
+}
+
+fn rows_of(table: &str, DeclaredKey { key, value, condition }: &DeclaredKey) -> String {
+    let path = format!("{table}.{}", key.name);
+    let meaning = match condition {
+        Some(condition) => format!("only {}: {}", condition.description, key.meaning),
+        None => key.meaning.to_owned(),
+    };
+    let default = match value {
+        DeclaredValue::Table(_) => None,
+        value => toml_text::value(value),
+    };
+    let default = default.map(|text| format!("`{text}`")).unwrap_or_default();
+    let own = row(&path, &default, &allowed(value), &meaning);
+    match value {
+        DeclaredValue::Table(entries) => own + &rows(&path, entries),
+        _ => own,
+    }
+}
+
+fn allowed(value: &DeclaredValue) -> String {
+    match value {
+        DeclaredValue::Number(_, accepted) => accepted.interval.to_string(),
+        DeclaredValue::Whole(_, accepted) => accepted.to_string(),
+        DeclaredValue::Boolean(_) => "`true` or `false`".to_owned(),
+        DeclaredValue::Choice { names, .. } => {
+            names.iter().map(|name| format!("`\"{name}\"`")).collect::<Vec<_>>().join(" or ")
+        }
+        DeclaredValue::Table(_) | DeclaredValue::CustomTable => String::new(),
+    }
+}

@@ -1,0 +1,89 @@
+//! `[parameters]`: the range of each parameter.
+
+use std::slice;
+
+use osteon_common::fields::Key;
+use osteon_common::job::Range;
+use osteon_common::parameters::Parameter;
+
+use crate::reader::{Reader, Table};
+
+/// The keys of a range.
+pub(super) const KEYS: [Key; 3] = [
+    Key { name: "start", meaning: "first value of a free parameter, within its bounds" },
+    Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
+    Key {
+        name: "fixed",
+        meaning: "instead of both: the value of a parameter that is not searched",
+    },
+];
+
+/// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no
+/// meaning.
+pub(super) fn read(reader: &mut Reader, root: &Table<'_>) -> [Range; 7] {
+    let table = reader.table(root, "parameters", &Parameter::ALL.map(Parameter::name));
+    if !table.is_table() {
+        if !root.has("parameters") {
+            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            let message = format!("is missing; it must have the seven tables {names}");
+            reader.lacks("parameters", &["parameters".to_owned()], message);
+        }
+        return [UNKNOWN; 7];
+    }
+    Parameter::ALL.map(|parameter| range(reader, &table, parameter))
+}
+
+/// Placeholder for a range that could not be read; a violation is always recorded with it.
+const UNKNOWN: Range = Range::Fixed(f64::NAN);
+
+/// Reads a range; numbers that cannot be read are recorded and become NaN.
+fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter) -> Range {
+    let key = parameter.name();
+    let table = reader.table(parameters, key, &KEYS.map(|key| key.name));
+    let path = parameters.path(key);
+    if !table.is_table() {
+        if !parameters.has(key) {
+            reader.lacks(&path, slice::from_ref(&path), format!("is missing; {RANGE_FORMS}"));
+        }
+        return UNKNOWN;
+    }
+    match (table.has("fixed"), table.has("start") || table.has("bounds")) {
+        (true, false) => Range::Fixed(reader.number(&table, "fixed").unwrap_or(f64::NAN)),
+        (false, true) => {
+            if !table.has("start") {
+                reader.missing(&table, "start", format_args!("within the bounds; {RANGE_FORMS}"));
+            }
+            if !table.has("bounds") {
+                reader.missing(&table, "bounds", format_args!("[lower, upper]; {RANGE_FORMS}"));
+            }
+            let start = reader.number(&table, "start").unwrap_or(f64::NAN);
+            let [lower, upper] = bounds(reader, &table).unwrap_or([f64::NAN; 2]);
+            Range::Free { start, lower, upper }
+        }
+        (true, true) => {
+            let message = format!("has fixed together with start or bounds; {RANGE_FORMS}");
+            reader.violations.add(path, message);
+            UNKNOWN
+        }
+        (false, false) => {
+            let cures = ["fixed", "start", "bounds"].map(|key| table.path(key));
+            reader.lacks(&path, &cures, format!("has no value; {RANGE_FORMS}"));
+            UNKNOWN
+        }
+    }
+}
+
+const RANGE_FORMS: &str = "give either fixed, or start and bounds";
+
+fn bounds(reader: &mut Reader, table: &Table<'_>) -> Option<[f64; 2]> {
+    let expected = "[lower, upper]";
+    let elements = reader.list(table, "bounds", expected)?;
+    let path = table.path("bounds");
+    let numbers = reader.numbers(&path, elements)?;
+    let bounds = <[f64; 2]>::try_from(numbers).ok();
+    if bounds.is_none() {
+        let count = elements.len();
+        reader.violations.add(path, format!("is a list of {count}; it must be {expected}"));
+    }
+    bounds
+}

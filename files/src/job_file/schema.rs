@@ -1,0 +1,172 @@
+//! The JSON Schema of job files, by which editors complete them.
+
+use osteon_common::case::Setup;
+use osteon_common::fields::{Edge, DeclaredKey, Interval, Key, DeclaredValue, entries};
+use osteon_common::job::RunSettings;
+use osteon_common::parameters::Parameter;
+use serde_json::{Map, Value as Json, json};
+
+use super::{data_section, parameters, priors};
+
+/// Returns the JSON Schema (draft 2020-12) of a job file in TOML or JSON, with a final newline. It
+/// states names, types and ranges; relations between keys are checked when a file is read.
+pub fn schema() -> String {
+    let mut properties = Map::new();
+    let mut setup = Setup::default();
+    for (key, section) in setup.sections() {
+        properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
+    }
+    let data_key = Key { name: "data", meaning: "measured velocities, or their moments" };
+    properties.insert(data_key.name.to_owned(), described(data(), data_key));
+    let meaning = "the range of each parameter: fixed, or free between bounds";
+    let ranges_key = Key { name: "parameters", meaning };
+    properties.insert(ranges_key.name.to_owned(), described(ranges(), ranges_key));
+    for (key, section) in RunSettings::default().sections() {
+        properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
+    }
+    properties["search"]["properties"]["priors"]["properties"] = each_parameter(prior);
+    let schema = json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Job file of osteon",
+        "description": "Units are SI: m, s, kg/m³, Pa, Hz.",
+        "type": "object",
+        "properties": properties,
+        "required": ["parameters"],
+        "additionalProperties": false,
+    });
+    format!("{schema:#}\n")
+}
+
+fn object(properties: Json) -> Json {
+    json!({ "type": "object", "properties": properties, "additionalProperties": false })
+}
+
+fn table(entries: &[DeclaredKey]) -> Json {
+    let property = |entry: &DeclaredKey| (entry.key.name.to_owned(), property(entry));
+    object(entries.iter().map(property).collect::<Map<_, _>>().into())
+}
+
+fn property(DeclaredKey { key, value, condition }: &DeclaredKey) -> Json {
+    let mut property = match value {
+        DeclaredValue::Number(default, accepted) => number(*default, accepted.interval),
+        DeclaredValue::Whole(default, accepted) => json!({
+            "type": "integer",
+            "minimum": accepted.min,
+            "maximum": accepted.max,
+            "default": default,
+        }),
+        DeclaredValue::Boolean(default) => json!({ "type": "boolean", "default": default }),
+        DeclaredValue::Choice { chosen, names } => json!({ "enum": names, "default": chosen }),
+        DeclaredValue::Table(entries) => table(entries),
+        DeclaredValue::CustomTable => object(json!({})),
+    };
+    let only = condition.as_ref().map(|condition| format!("only {}: ", condition.description));
+    let meaning = format!("{}{}", only.unwrap_or_default(), key.meaning);
+    property["description"] = plain(&meaning).into();
+    property
+}
+
+fn number(default: Option<f64>, accepted: Interval) -> Json {
+    let mut number = json!({ "type": "number" });
+    let (lower, upper) = accepted.edges();
+    let limits = [("minimum", "exclusiveMinimum", lower), ("maximum", "exclusiveMaximum", upper)];
+    for (closed, open, edge) in limits {
+        match edge {
+            Edge::None => {}
+            Edge::Open(limit) => number[open] = limit.into(),
+            Edge::Closed(limit) => number[closed] = limit.into(),
+        }
+    }
+    if let Some(default) = default {
+        number["default"] = default.into();
+    }
+    number
+}
+
+fn described(mut schema: Json, Key { meaning, .. }: Key) -> Json {
+    schema["description"] = plain(meaning).into();
+    schema
+}
+
+fn data() -> Json {
+    let above_zero = || json!({ "type": "number", "exclusiveMinimum": 0 });
+    let list = || json!({ "type": "array", "items": above_zero() });
+    let types = [
+        json!({ "anyOf": [{ "type": "string" }, list()] }),
+        json!({ "type": "string" }),
+        json!({ "type": "object", "additionalProperties": list() }),
+        above_zero(),
+        above_zero(),
+    ];
+    let properties = data_section::KEYS.into_iter().zip(types);
+    let properties = properties.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
+    object(properties.collect::<Map<_, _>>().into())
+}
+
+fn each_parameter(schema: fn(Parameter) -> Json) -> Json {
+    let properties =
+        Parameter::ALL.map(|parameter| (parameter.name().to_owned(), schema(parameter)));
+    properties.into_iter().collect::<Map<_, _>>().into()
+}
+
+fn ranges() -> Json {
+    let mut ranges = object(each_parameter(range));
+    ranges["required"] = Parameter::ALL.map(Parameter::name).to_vec().into();
+    ranges
+}
+
+fn range(parameter: Parameter) -> Json {
+    let value = || number(None, Interval::of(parameter));
+    let bounds = json!({ "type": "array", "items": value(), "minItems": 2, "maxItems": 2 });
+    let [start, bounds, fixed] = {
+        let [start_key, bounds_key, fixed_key] = parameters::KEYS;
+        [
+            (start_key.name, described(value(), start_key)),
+            (bounds_key.name, described(bounds, bounds_key)),
+            (fixed_key.name, described(value(), fixed_key)),
+        ]
+    };
+    let required = [json!({ "required": [start.0, bounds.0] }), json!({ "required": [fixed.0] })];
+    let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1, fixed.0: fixed.1 }));
+    range["oneOf"] = required.to_vec().into();
+    described(range, Key { name: parameter.name(), meaning: meaning(parameter) })
+}
+
+fn prior(parameter: Parameter) -> Json {
+    let [value, weight] = priors::KEYS;
+    let properties = json!({
+        value.name: described(number(None, Interval::of(parameter)), value),
+        weight.name: described(number(None, Interval::above(0.0, "")), weight),
+    });
+    let mut prior = object(properties);
+    prior["required"] = json!([value.name, weight.name]);
+    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+}
+
+fn meaning(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::Density => "mass density of the bone, kg/m³",
+        Parameter::LongitudinalYoungModulus => "longitudinal Young modulus, Pa",
+        Parameter::LongitudinalPoissonRatio => "longitudinal Poisson ratio",
+        Parameter::LongitudinalShearModulus => "longitudinal shear modulus, Pa",
+        Parameter::TransverseYoungModulus => "transverse Young modulus, Pa",
+        Parameter::TransversePoissonRatio => "transverse Poisson ratio",
+        Parameter::Dispersion => "dispersion of the random elasticity",
+    }
+}
+
+/// Returns Markdown as plain text: links without their targets, code without its marks.
+fn plain(markdown: &str) -> String {
+    let mut text = String::new();
+    let mut rest = markdown;
+    while let Some((before, (label, after))) = rest.split_once('[').and_then(|(before, link)| {
+        let (label, after) = link.split_once("](")?;
+        Some((before, (label, after.split_once(')')?.1)))
+    }) {
+        text.push_str(before);
+        text.push_str(label);
+        rest = after;
+    }
+    text.push_str(rest);
+    text.replace('`', "")
+}

@@ -1,0 +1,18 @@
+//! The files of osteon's users: they are read, checked and written here.
+//!
+//! Jobs and cases in TOML or JSON ([`job_file`], [`case_file`]), measured velocities in CSV, and the
+//! results of jobs in JSON ([`report`]) and CSV ([`results_csv`]). The checks themselves are in
+//! `osteon-common`, because specifications that come as messages must pass them, too.
+//!
+//! Every file that a user names is opened by [`user_file`].
+
+pub mod case_file;
+pub mod document;
+pub mod file_error;
+pub mod job_file;
+mod reader;
+pub mod report;
+pub mod results_csv;
+mod toml_text;
+pub mod user_file;
+mod velocities;

@@ -1,0 +1,77 @@
+//! Reads the declared keys of a section from a table of a file.
+
+use osteon_common::fields::{
+    self, Choice, Condition, Fields, Key, Number, Section, Whole, WholeRange,
+};
+
+use super::{Reader, Table};
+
+/// Reads `section` from the table `name` of `root`, and returns the table. A key that is absent or
+/// cannot be read leaves its field as it is; unknown keys and wrong types are recorded.
+pub(crate) fn section<'a>(
+    reader: &mut Reader,
+    root: &Table<'a>,
+    name: &str,
+    section: &mut dyn Section,
+) -> Table<'a> {
+    let names = fields::names(&mut |fields| section.declare(fields));
+    let table = reader.table(root, name, &names);
+    section.declare(&mut TableReader { reader, table: table.clone() });
+    table
+}
+
+struct TableReader<'r, 'a> {
+    reader: &'r mut Reader,
+    table: Table<'a>,
+}
+
+impl Fields for TableReader<'_, '_> {
+    fn number(&mut self, key: Key, field: &mut f64, _: Number) {
+        if let Some(number) = self.reader.number(&self.table, key.name) {
+            *field = number;
+        }
+    }
+
+    fn optional_number(&mut self, key: Key, field: &mut Option<f64>, _: Number) {
+        if let Some(number) = self.reader.number(&self.table, key.name) {
+            *field = Some(number);
+        }
+    }
+
+    fn whole(&mut self, key: Key, field: &mut dyn Whole, accepted: WholeRange) {
+        if let Some(whole) = self.reader.whole(&self.table, key.name, accepted) {
+            field.set(whole);
+        }
+    }
+
+    fn boolean(&mut self, key: Key, field: &mut bool) {
+        if let Some(truth) = self.reader.boolean(&self.table, key.name) {
+            *field = truth;
+        }
+    }
+
+    fn choice(&mut self, key: Key, field: &mut dyn Choice) {
+        self.reader.choice(&self.table, key.name, field);
+    }
+
+    fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields)) {
+        let names = fields::names(declare);
+        let table = self.reader.table(&self.table, key.name, &names);
+        declare(&mut TableReader { reader: self.reader, table });
+    }
+
+    fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
+        if condition.holds {
+            return declare(self);
+        }
+        // If the deciding key cannot be read, it is unknown whether these keys are meaningful.
+        if self.reader.violations.touches(&self.table.path(condition.decided_by)) {
+            return;
+        }
+        for name in fields::names(declare).into_iter().filter(|name| self.table.has(name)) {
+            self.reader.violations.add(self.table.path(name), condition.refusal.as_str());
+        }
+    }
+
+    fn custom_table(&mut self, _: Key) {}
+}

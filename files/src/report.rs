@@ -1,0 +1,191 @@
+//! `result.json` and the output of `--json` as types: one definition of what is written, what is read
+//! back, and what the published schema says.
+//!
+//! The keys of an object stand in the order of the fields. A number that is not finite, or that is not
+//! known, is null; every other one is the shortest decimal that reads back to the same bits.
+
+mod conclusions;
+mod error;
+mod identification;
+mod moments;
+mod point;
+mod propagation;
+mod schema;
+mod simulation;
+mod solver;
+
+use osteon_common::job::JobKind;
+use osteon_common::parameters::Point;
+use osteon_common::results::{JobFailure, JobResult, Status};
+use osteon_common::version::RESULT_SCHEMA;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+
+pub use self::conclusions::{
+    Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solution, Solutions, Spreads,
+};
+pub use self::error::{NoPoint, ReadError, listed};
+pub use self::identification::{Group, Identification, SearchSettings};
+pub use self::moments::{Data, Moment, MomentIntervals, Moments, Velocity};
+pub use self::point::MeanModel;
+pub use self::propagation::Propagation;
+pub use self::schema::schema;
+pub use self::simulation::{CheckedSolution, Receiver, Simulation};
+pub use self::solver::{EstimatedErrors, Solver};
+
+/// The result of a job.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ResultFile {
+    /// The result of `identify`.
+    Identification(Box<Identification>),
+    /// The result of `propagate`.
+    Propagation(Box<Propagation>),
+}
+
+impl ResultFile {
+    /// The file of a job of this kind.
+    pub fn from_job(kind: JobKind, result: &JobResult) -> Self {
+        match kind {
+            JobKind::Identification => Self::Identification(Box::new(result.into())),
+            JobKind::Propagation => Self::Propagation(Box::new(result.into())),
+        }
+    }
+
+    /// Reads the text of a `result.json`. Keys that are not known are passed over.
+    ///
+    /// # Errors
+    /// When the text is no JSON, or not the result of a job, or one of another schema.
+    pub fn from_json(text: &str) -> Result<Self, ReadError> {
+        let Head { schema, kind } = parse(text)?;
+        if schema != u64::from(RESULT_SCHEMA) {
+            return Err(ReadError::Schema { found: schema });
+        }
+        match kind.as_str() {
+            "identification" => Ok(Self::Identification(parse(text)?)),
+            "propagation" => Ok(Self::Propagation(parse(text)?)),
+            _ => Err(ReadError::unknown_kind(&kind)),
+        }
+    }
+
+    /// The text of the file, with a final newline.
+    pub fn to_json(&self) -> String {
+        text(match self {
+            Self::Identification(found) => DocumentContent::Identification(found),
+            Self::Propagation(found) => DocumentContent::Propagation(found),
+        })
+    }
+
+    /// The kind of the job.
+    pub fn kind(&self) -> JobKind {
+        match self {
+            Self::Identification(_) => JobKind::Identification,
+            Self::Propagation(_) => JobKind::Propagation,
+        }
+    }
+
+    /// How the search ended; `None` for a propagation, which has none.
+    pub fn status(&self) -> Option<Status> {
+        match self {
+            Self::Identification(found) => Some(found.status),
+            Self::Propagation(_) => None,
+        }
+    }
+
+    /// The kind of failure and the reason in words; `None` for a result that is no failure.
+    pub fn failure(&self) -> Option<(JobFailure, Option<&str>)> {
+        match self {
+            Self::Identification(found) => Some((found.failure?, found.reason.as_deref())),
+            Self::Propagation(_) => None,
+        }
+    }
+
+    /// BLAKE3 digest of the evaluations.
+    pub fn digest(&self) -> &str {
+        match self {
+            Self::Identification(found) => &found.digest,
+            Self::Propagation(found) => &found.digest,
+        }
+    }
+
+    /// Returns the result of each group of the data; empty where the data are not grouped.
+    pub fn groups(&self) -> &[Group] {
+        match self {
+            Self::Identification(found) => found.groups.as_deref().unwrap_or_default(),
+            Self::Propagation(_) => &[],
+        }
+    }
+
+    /// The best point, or with a name that of the group.
+    ///
+    /// # Errors
+    /// When there is no such group, or no point was found.
+    pub fn best_point(&self, group: Option<&str>) -> Result<Point, NoPoint> {
+        let (parameters, dispersion) = match (group, self) {
+            (Some(name), _) => {
+                let found = self.groups().iter().find(|group| group.name == name);
+                let found = found.ok_or_else(|| NoPoint::no_group(name, self.groups()))?;
+                (&found.parameters, found.dispersion)
+            }
+            (None, Self::Identification(found)) => (&found.parameters, found.dispersion),
+            (None, Self::Propagation(found)) => (&found.parameters, found.dispersion),
+        };
+        parameters.point(dispersion).ok_or(NoPoint::NoPoint)
+    }
+}
+
+/// The result of an osteon run, as `result.json` and `--json` have it. Units are SI: m, s, kg/m³, Pa, Hz.
+#[derive(Serialize, JsonSchema)]
+#[schemars(title = "osteon result")]
+struct Document<'a> {
+    /// Revision of the keys. Keys may be added to a revision, so a reader should ignore those that it
+    /// does not know.
+    #[schemars(extend("const" = RESULT_SCHEMA))]
+    schema: u32,
+    #[serde(flatten)]
+    content: DocumentContent<'a>,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum DocumentContent<'a> {
+    /// The result of `osteon identify`.
+    Identification(&'a Identification),
+    /// The result of `osteon propagate`.
+    Propagation(&'a Propagation),
+    /// The result of `osteon simulate`.
+    Simulation(&'a Simulation),
+}
+
+#[expect(clippy::expect_used, reason = "only a key that is no string could fail, and none is")]
+fn text(content: DocumentContent<'_>) -> String {
+    let document = Document { schema: RESULT_SCHEMA, content };
+    serde_json::to_string_pretty(&document).expect("keys are strings") + "\n"
+}
+
+/// The keys that decide how the others are read.
+#[derive(Deserialize)]
+#[serde(expecting = "an object with `schema` and `kind`")]
+struct Head {
+    schema: u64,
+    kind: String,
+}
+
+fn parse<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
+    let mut deserializer = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(ReadError::from)?;
+    deserializer.end().map_err(ReadError::Syntax)?;
+    Ok(value)
+}
+
+/// A number as it is written: null where it is not finite.
+fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
+}
+
+/// Reads a key that only some results have, and that may be null where it stands.
+fn present<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Option<Option<T>>, D::Error> {
+    Option::deserialize(deserializer).map(Some)
+}

@@ -1,0 +1,157 @@
+//! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
+
+use osteon_common::moments::{ConfidenceInterval, KolmogorovTest};
+use osteon_common::results::{self, BestPoint, DataSummary};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{finite, present};
+
+/// One of the two moments of a set of velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moment {
+    /// The mean.
+    Mean,
+    /// The coefficient of variation.
+    CoefficientOfVariation,
+}
+
+impl Moment {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Mean, Self::CoefficientOfVariation];
+}
+
+/// A number for the mean of velocities, and one for their coefficient of variation; null where they are
+/// not known.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Moments {
+    /// The number for the mean: a velocity is in m/s, a relative error and a derivative have no unit.
+    pub mean: Option<f64>,
+    /// The number for the coefficient of variation; it has no unit.
+    pub coefficient_of_variation: Option<f64>,
+}
+
+impl Moments {
+    /// The number for one of them.
+    pub fn get(&self, moment: Moment) -> Option<f64> {
+        match moment {
+            Moment::Mean => self.mean,
+            Moment::CoefficientOfVariation => self.coefficient_of_variation,
+        }
+    }
+}
+
+impl From<results::Moments> for Moments {
+    fn from(moments: results::Moments) -> Self {
+        Self {
+            mean: finite(moments.mean),
+            coefficient_of_variation: finite(moments.coefficient_of_variation),
+        }
+    }
+}
+
+impl From<Option<results::Moments>> for Moments {
+    fn from(moments: Option<results::Moments>) -> Self {
+        moments.map(Self::from).unwrap_or_default()
+    }
+}
+
+/// Moments of the model's velocities (m/s) at the best point; null where there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Velocity {
+    /// The moments.
+    #[serde(flatten)]
+    pub moments: Moments,
+    /// Standard errors of the moments by sampling, in their units.
+    pub standard_error: Moments,
+    /// Whether the moments are those that the control variate gives.
+    pub controlled: Option<bool>,
+    /// Change of the moments that is expected if the failed realizations had succeeded.
+    pub failure_bias: Moments,
+}
+
+impl From<Option<&BestPoint>> for Velocity {
+    fn from(best: Option<&BestPoint>) -> Self {
+        let estimate = best.and_then(|best| best.velocity);
+        Self {
+            moments: estimate.map(|estimate| estimate.moments).into(),
+            standard_error: estimate.map(|estimate| estimate.standard_error).into(),
+            controlled: estimate.map(|estimate| estimate.controlled),
+            failure_bias: best.and_then(|best| best.failure_bias).into(),
+        }
+    }
+}
+
+/// Moments of the data; where velocities were measured also their intervals, and a test of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Data {
+    /// The moments, that of the mean in m/s.
+    #[serde(flatten)]
+    pub moments: Moments,
+    /// Confidence intervals of the moments of the law that the velocities were drawn from; not there
+    /// where only moments are known, null where the velocities give none.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    pub interval: Option<Option<MomentIntervals>>,
+    /// Kolmogorov–Smirnov test of the velocities against the model's; not there where only moments are
+    /// known, null where there is no best point.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    pub kolmogorov: Option<Option<KolmogorovTest>>,
+    /// Number of the velocities; only of groups.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    pub count: Option<Option<u64>>,
+}
+
+impl Data {
+    /// The data of the one set that a job has.
+    pub(super) fn of_job(data: &DataSummary, best: Option<&BestPoint>) -> Self {
+        let measured = data.count.is_some();
+        Self {
+            moments: data.moments.into(),
+            interval: measured.then(|| data.intervals.map(MomentIntervals::from)),
+            kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
+            count: None,
+        }
+    }
+
+    /// The data of a group.
+    pub(super) fn of_group(data: &DataSummary, best: Option<&BestPoint>) -> Self {
+        Self { count: Some(data.count), ..Self::of_job(data, best) }
+    }
+
+    /// The intervals, where they are known.
+    pub fn intervals(&self) -> Option<&MomentIntervals> {
+        self.interval.as_ref()?.as_ref()
+    }
+}
+
+/// Confidence intervals of both moments.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MomentIntervals {
+    /// Lower and upper end for the mean, m/s.
+    pub mean: [f64; 2],
+    /// Lower and upper end for the coefficient of variation.
+    pub coefficient_of_variation: [f64; 2],
+    /// Probability with which each interval holds its moment.
+    pub level: f64,
+}
+
+impl MomentIntervals {
+    /// The interval of one of them.
+    pub fn get(&self, moment: Moment) -> [f64; 2] {
+        match moment {
+            Moment::Mean => self.mean,
+            Moment::CoefficientOfVariation => self.coefficient_of_variation,
+        }
+    }
+}
+
+impl From<osteon_common::moments::MomentIntervals> for MomentIntervals {
+    fn from(found: osteon_common::moments::MomentIntervals) -> Self {
+        let ends = |interval: ConfidenceInterval| [interval.low, interval.high];
+        Self {
+            mean: ends(found.mean),
+            coefficient_of_variation: ends(found.coefficient_of_variation),
+            level: found.level,
+        }
+    }
+}

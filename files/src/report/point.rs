@@ -1,0 +1,51 @@
+//! The mean model at a point.
+
+use osteon_common::parameters::{Parameter, Point};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The six parameters of the mean model; null where there is no point.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct MeanModel {
+    /// Mass density, kg/m³.
+    pub density: Option<f64>,
+    /// Longitudinal Young modulus, Pa.
+    pub longitudinal_young_modulus: Option<f64>,
+    /// Longitudinal Poisson ratio.
+    pub longitudinal_poisson_ratio: Option<f64>,
+    /// Longitudinal shear modulus, Pa.
+    pub longitudinal_shear_modulus: Option<f64>,
+    /// Transverse Young modulus, Pa.
+    pub transverse_young_modulus: Option<f64>,
+    /// Transverse Poisson ratio.
+    pub transverse_poisson_ratio: Option<f64>,
+}
+
+impl MeanModel {
+    /// The whole point, with this dispersion; `None` where a number is missing.
+    pub fn point(&self, dispersion: Option<f64>) -> Option<Point> {
+        Some(Point([
+            self.density?,
+            self.longitudinal_young_modulus?,
+            self.longitudinal_poisson_ratio?,
+            self.longitudinal_shear_modulus?,
+            self.transverse_young_modulus?,
+            self.transverse_poisson_ratio?,
+            dispersion?,
+        ]))
+    }
+}
+
+impl From<&Point> for MeanModel {
+    fn from(point: &Point) -> Self {
+        let value = |parameter| super::finite(point.get(parameter));
+        Self {
+            density: value(Parameter::Density),
+            longitudinal_young_modulus: value(Parameter::LongitudinalYoungModulus),
+            longitudinal_poisson_ratio: value(Parameter::LongitudinalPoissonRatio),
+            longitudinal_shear_modulus: value(Parameter::LongitudinalShearModulus),
+            transverse_young_modulus: value(Parameter::TransverseYoungModulus),
+            transverse_poisson_ratio: value(Parameter::TransversePoissonRatio),
+        }
+    }
+}

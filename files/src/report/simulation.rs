@@ -1,0 +1,69 @@
+//! The result of `simulate`.
+
+use osteon_common::outcome::FailureKind;
+use osteon_common::settings::Picking;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{DocumentContent, Solver};
+
+/// One case and its velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Simulation {
+    /// Velocity of the first arriving signal, m/s; null where none was picked.
+    pub velocity: Option<f64>,
+    /// Why there is no velocity; null where there is one.
+    pub failure: Option<FailureKind>,
+    /// The reason in words; null where there is a velocity.
+    pub detail: Option<String>,
+    /// The receivers, in their order.
+    pub receivers: Vec<Receiver>,
+    /// The criterion of the first arrival.
+    pub picking: Picking,
+    /// How the velocity was computed.
+    pub solver: Solver<Option<f64>>,
+    /// The case solved in other ways, with `--check`; only printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub check: Option<Vec<CheckedSolution>>,
+    /// Version of the program.
+    pub version: String,
+    /// Revision of the numerics, which decides the bits of every velocity.
+    pub numerics: u32,
+    /// The commit that the program was built from, with `-dirty` behind it if the sources were
+    /// modified; null if it was built outside a repository.
+    pub commit: Option<String>,
+}
+
+impl Simulation {
+    /// The text of the file, with a final newline.
+    pub fn to_json(&self) -> String {
+        super::text(DocumentContent::Simulation(self))
+    }
+}
+
+/// One receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Receiver {
+    /// Position along the bone, m.
+    pub x1: f64,
+    /// Picked time of the first arrival, s; null where there is none.
+    pub time: Option<f64>,
+}
+
+/// One solution of a check, and how it differs from the refined one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CheckedSolution {
+    /// How it was computed.
+    #[serde(flatten)]
+    pub solver: Solver<Option<f64>>,
+    /// Velocity, m/s; null where none was picked.
+    pub velocity: Option<f64>,
+    /// Why there is no velocity; null where there is one.
+    pub failure: Option<FailureKind>,
+    /// Whether the same extremum was picked.
+    pub same_pick: bool,
+    /// Largest difference of a picked time, s.
+    pub time_difference: Option<f64>,
+    /// Relative difference of the velocity.
+    pub relative_difference: Option<f64>,
+}

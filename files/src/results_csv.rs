@@ -1,0 +1,355 @@
+//! Results as CSV: `history.csv` and `realizations.csv`, for groups also `groups.csv` and
+//! `comparison.csv`.
+
+use std::fmt::{self, Write as _};
+
+use osteon_common::inference::{DerivedQuantity, Uncertainty};
+use osteon_common::job::{Data, JobSpecification, Range};
+use osteon_common::moments::ConfidenceInterval;
+use osteon_common::outcome::Outcome;
+use osteon_common::parameters::Parameter;
+use osteon_common::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
+
+/// Returns the text of `history.csv`: one row per evaluation of the search, with the seven
+/// parameters between its number and its moments; with groups or several starts, also the group and
+/// start.
+///
+/// Moments are empty if every realization failed; a cost is `inf` at an infeasible point.
+pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> String {
+    let parameters = Parameter::ALL.map(Parameter::name).join(",");
+    let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
+    let several = specification.search.starts > 1;
+    let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
+    out.push_str(if several { ",start" } else { "" });
+    out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
+    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.varied.is_none()) {
+        // Writing to a string does not fail.
+        let _infallible = history_row(&mut out, evaluation);
+        if several {
+            let _infallible = write!(out, ",{}", evaluation.role.start);
+        }
+        if let Some(name) = names.get(evaluation.role.group as usize) {
+            let _infallible = write!(out, ",{}", field(name));
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Returns a text as a field that no spreadsheet interprets as a formula. A `'` is put before a
+/// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
+/// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
+/// removing one `'` there. The field is quoted if necessary.
+fn field(text: &str) -> String {
+    let mut harmless = String::with_capacity(text.len());
+    let mut begins = true;
+    for c in text.chars() {
+        if begins && (c == '\'' || FORMULA.contains(&c)) {
+            harmless.push('\'');
+        }
+        begins = c == ';' || (begins && c == ' ');
+        harmless.push(c);
+    }
+    let changed = harmless.len() > text.len();
+    if changed || text.contains([',', ';', '"', '#', '\t', '\r', '\n']) || text.trim() != text {
+        format!("\"{}\"", harmless.replace('"', "\"\""))
+    } else {
+        harmless
+    }
+}
+
+/// Characters that begin a formula, or are skipped before one (OWASP, "CSV Injection").
+const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
+
+fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
+    write!(out, "{}", evaluation.number)?;
+    for value in evaluation.point.0 {
+        write!(out, ",{value:?}")?;
+    }
+    let moments = evaluation.moments;
+    for value in [
+        moments.map(|moments| moments.mean),
+        moments.map(|moments| moments.coefficient_of_variation),
+        evaluation.cost,
+    ] {
+        match value {
+            Some(value) => write!(out, ",{value:?}")?,
+            None => out.push(','),
+        }
+    }
+    write!(out, ",{}", evaluation.failures.total())
+}
+
+/// Maximum number of groups of which all pairs are compared; more groups are compared with the
+/// first only.
+const COMPARED_MAX: usize = 200;
+
+/// Returns the text of `groups.csv`: one row per group, with the measured and the identified
+/// quantities (m/s, kg/m³, Pa, dimensionless) and the ends of their confidence intervals, empty if
+/// they are unknown.
+pub fn groups(
+    specification: &JobSpecification,
+    result: &JobResult,
+    history: &[Evaluation],
+) -> String {
+    let free = |name: &Parameter| matches!(specification.range(*name), Range::Free { .. });
+    // The dispersion has its own columns whether it is free or not.
+    let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
+    let free: Vec<Parameter> = elastic.filter(free).collect();
+    let mut out = header(&free);
+    for (set, group) in result.groups.iter().enumerate() {
+        let best = group.best.as_ref();
+        let mut fields = vec![
+            field(&group.name),
+            group.data.count.unwrap_or(0).to_string(),
+            group.status.name().to_owned(),
+            number(best.and_then(|best| best.cost)),
+        ];
+        for quantity in quantities_of(group) {
+            fields.push(number(quantity.map(|quantity| quantity.value)));
+            let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
+            fields.extend(ends(interval));
+        }
+        fields.extend(Parameter::ALL.map(|name| number(best.map(|best| best.point.get(name)))));
+        fields.extend(free.iter().flat_map(|&name| identified(name, group)));
+        fields.extend(measured(group));
+        fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
+        let of_group = |row: &&Evaluation| row.role.group as usize == set;
+        let searched = history.iter().filter(|row| row.role.varied.is_none());
+        fields.push(searched.filter(of_group).count().to_string());
+        fields.push(field(reason(group)));
+        out.push_str(&fields.join(","));
+        out.push('\n');
+    }
+    out
+}
+
+/// Returns the header of `groups.csv`, given the free parameters of the mean model.
+fn header(free: &[Parameter]) -> String {
+    let with_interval =
+        |name: &str| [name.to_owned(), format!("{name}_lower"), format!("{name}_upper")];
+    let single = |name: &str| vec![name.to_owned()];
+    let columns = ["group", "velocities", "status", "cost"].into_iter().flat_map(single);
+    let columns =
+        columns.chain(["bulk_velocity", "dispersion"].into_iter().flat_map(with_interval));
+    let columns = columns.chain(Parameter::ALL.map(|name| format!("best_{}", name.name())));
+    let columns = columns.chain(free.iter().flat_map(|name| with_interval(name.name())));
+    let data = ["data_mean", "data_coefficient_of_variation"];
+    let columns = columns.chain(data.into_iter().flat_map(with_interval));
+    let last = ["kolmogorov_distance", "kolmogorov_p_value", "failures", "evaluations", "reason"];
+    let columns: Vec<String> = columns.chain(last.into_iter().flat_map(single)).collect();
+    columns.join(",") + "\n"
+}
+
+/// Returns a free parameter with the ends of its interval, if the data determine it.
+fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
+    let found = group.conclusions.inference.as_ref();
+    let of = found.and_then(|found| found.parameters.iter().find(|(known, _)| *known == name));
+    let quantity = of.map(|(_, quantity)| *quantity).filter(|quantity| quantity.known.is_some());
+    let [lower, upper] =
+        ends(quantity.and_then(|quantity| quantity.known).map(|known| known.interval));
+    [number(quantity.map(|quantity| quantity.value)), lower, upper]
+}
+
+/// Returns the moments of a group's data with their intervals, and the test against the model's
+/// law.
+fn measured(group: &GroupResult) -> [String; 8] {
+    let DataSummary { moments, intervals, .. } = group.data;
+    let both =
+        |interval: Option<ConfidenceInterval>| ends(interval.map(|found| [found.low, found.high]));
+    let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));
+    let [variation_lower, variation_upper] =
+        both(intervals.map(|found| found.coefficient_of_variation));
+    let test = group.best.as_ref().and_then(|best| best.kolmogorov);
+    [
+        number(Some(moments.mean)),
+        mean_lower,
+        mean_upper,
+        number(Some(moments.coefficient_of_variation)),
+        variation_lower,
+        variation_upper,
+        number(test.map(|test| test.distance)),
+        number(test.map(|test| test.p_value)),
+    ]
+}
+
+/// Returns the reason why a group did not converge, or has no intervals; empty if neither is the
+/// case.
+fn reason(group: &GroupResult) -> &str {
+    let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
+    let unknown = match (&group.best, &group.conclusions.inference) {
+        (None, _) => "no point was feasible",
+        (Some(_), None) => "the derivatives are not known: no intervals",
+        (Some(_), Some(found)) if !found.matched => {
+            "the model does not match the data within their noise: no intervals"
+        }
+        _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
+        _ => "",
+    };
+    told.unwrap_or(unknown)
+}
+
+/// Formats both ends of an interval.
+fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
+    [0, 1].map(|end| number(interval.map(|ends| ends[end])))
+}
+
+/// Returns the text of `comparison.csv`: one row per pair of groups, with the differences (first
+/// minus second) of the identified quantities and the ends of their confidence intervals, empty if
+/// they are unknown. Each interval has the confidence level of the groups' own intervals.
+///
+/// The sampling noise, which all groups share, is counted in both groups: intervals tend to be too
+/// wide.
+pub fn comparison(result: &JobResult) -> String {
+    let mut out = "first,second".to_owned();
+    for name in ["bulk_velocity", "dispersion"] {
+        out.push_str(&format!(
+            ",{name}_difference,{name}_difference_lower,{name}_difference_upper"
+        ));
+    }
+    out.push('\n');
+    let groups = &result.groups;
+    let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
+    for (first, one) in groups.iter().enumerate().take(firsts) {
+        for other in &groups[first + 1..] {
+            let mut fields = vec![field(&one.name), field(&other.name)];
+            for pair in quantities_of(one).into_iter().zip(quantities_of(other)) {
+                fields.extend(difference(pair).map(number));
+            }
+            out.push_str(&fields.join(","));
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// Returns the difference of two quantities, and the ends of its interval.
+fn difference(
+    (first, second): (Option<DerivedQuantity>, Option<DerivedQuantity>),
+) -> [Option<f64>; 3] {
+    let Some((first, second)) = first.zip(second) else { return [None; 3] };
+    let difference = first.value - second.value;
+    let Some((one, other)) = first.known.zip(second.known) else {
+        return [Some(difference), None, None];
+    };
+    // Half the length of each interval already accounts for the degrees of freedom of its data.
+    let half = |known: Uncertainty| 0.5 * (known.interval[1] - known.interval[0]);
+    let reach = libm::hypot(half(one), half(other));
+    [Some(difference), Some(difference - reach), Some(difference + reach)]
+}
+
+fn quantities_of(group: &GroupResult) -> [Option<DerivedQuantity>; 2] {
+    let found = group.conclusions.inference.as_ref();
+    [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
+}
+
+/// Formats a number; empty if it is absent or not finite.
+fn number(value: Option<f64>) -> String {
+    value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
+}
+
+/// Returns the text of `realizations.csv` for groups: the rows of each group at its best point, one
+/// group after another.
+pub fn realizations_of_groups(groups: &[GroupResult]) -> String {
+    let mut out = "index,velocity,failure,group\n".to_owned();
+    for group in groups {
+        let outcomes = group.best.as_ref().map(|best| best.outcomes.as_slice());
+        let name = field(&group.name);
+        for (index, outcome) in outcomes.unwrap_or_default().iter().enumerate() {
+            out.push_str(&realization(index, outcome));
+            out.push_str(&format!(",{name}\n"));
+        }
+    }
+    out
+}
+
+/// Returns the text of `realizations.csv`: one row per index; the velocity (m/s) is empty for a
+/// failure, and the failure is empty for a velocity.
+pub fn realizations(outcomes: &[Outcome]) -> String {
+    let mut out = "index,velocity,failure\n".to_owned();
+    for (index, outcome) in outcomes.iter().enumerate() {
+        out.push_str(&realization(index, outcome));
+        out.push('\n');
+    }
+    out
+}
+
+/// Formats a row without the columns after its failure.
+fn realization(index: usize, outcome: &Outcome) -> String {
+    match outcome {
+        Ok(velocity) => format!("{index},{velocity:?},"),
+        Err(kind) => format!("{index},,{}", kind.name()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Recovers the text of a field as described in docs/results.md.
+    fn text_of(field: &str) -> String {
+        let inner = field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+        let text = inner.unwrap_or(field).replace("\"\"", "\"");
+        let mut found = String::new();
+        let mut begins = true;
+        for c in text.chars() {
+            if begins && c == '\'' {
+                begins = false;
+                continue;
+            }
+            begins = c == ';' || (begins && c == ' ');
+            found.push(c);
+        }
+        found
+    }
+
+    #[test]
+    fn no_field_is_a_formula() {
+        for (text, expected) in [
+            ("left", "left"),
+            ("left tibia, 2", "\"left tibia, 2\""),
+            ("say \"a\"", "\"say \"\"a\"\"\""),
+            ("x-1+2=y@z'", "x-1+2=y@z'"),
+            ("=1+1", "\"'=1+1\""),
+            ("+1", "\"'+1\""),
+            ("-1", "\"'-1\""),
+            ("@SUM(A1)", "\"'@SUM(A1)\""),
+            ("\t=1", "\"'\t=1\""),
+            ("\r=1", "\"'\r=1\""),
+            ("\n=1", "\"'\n=1\""),
+            ("＝1", "\"'＝1\""),
+            (" =1", "\" '=1\""),
+            ("'=1", "\"''=1\""),
+            ("'", "\"''\""),
+            ("a;=1", "\"a;'=1\""),
+            ("a; -b;'c", "\"a; '-b;''c\""),
+            ("a;b", "\"a;b\""),
+            ("a\rb", "\"a\rb\""),
+            ("a\nb", "\"a\nb\""),
+            ("#1", "\"#1\""),
+            (" a ", "\" a \""),
+        ] {
+            assert_eq!(field(text), expected, "{text:?}");
+            assert_eq!(text_of(expected), text, "{expected}");
+        }
+    }
+
+    /// Every text of up to five of the relevant characters.
+    #[test]
+    fn names_that_differ_have_fields_that_differ() {
+        let mut texts = vec![String::new()];
+        for _ in 0..5 {
+            let longer: Vec<String> = texts
+                .iter()
+                .flat_map(|text| "='; \"a".chars().map(move |c| format!("{text}{c}")))
+                .collect();
+            texts.extend(longer);
+            texts.sort();
+            texts.dedup();
+        }
+        assert!(texts.len() > 9000, "{}", texts.len());
+        for text in &texts {
+            assert_eq!(&text_of(&field(text)), text, "{}", field(text));
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Canonical TOML of cases and jobs: every key with its value, in the shortest decimals that read
+//! back to the same bits.
+
+use std::fmt::{self, Write as _};
+
+use osteon_common::case::{Case, Setup};
+use osteon_common::elasticity::Elasticity;
+use osteon_common::fields::{DeclaredKey, Key, Section, DeclaredValue, entries};
+use osteon_common::job::{Data, JobSpecification, Prior, Range, Search};
+use osteon_common::parameters::Parameter;
+
+/// Number of velocities per line of an inlined data set.
+const VELOCITIES_PER_LINE: usize = 6;
+
+/// Returns the complete case file of `case`, with `mandel`.
+///
+/// Reading it gives `case` back to the bit, if it passes [`osteon_common::check::setup`] and its density is
+/// finite and above 0.
+pub fn case(case: &Case) -> String {
+    written(|out| {
+        setup(out, &case.setup)?;
+        writeln!(out, "\n[bone]\ndensity = {:?}  # kg/m³", case.bone.density)?;
+        mandel(out, &case.bone.elasticity)
+    })
+}
+
+/// Returns the complete job file of `specification`, with defaults filled in and data inlined.
+///
+/// Reading it as the same kind of job gives `specification` back to the bit, if it passes
+/// [`JobSpecification::check`].
+pub fn job(specification: &JobSpecification) -> String {
+    written(|out| {
+        setup(out, &specification.setup)?;
+        if let Some(given) = &specification.data {
+            data(out, given)?;
+        }
+        for parameter in Parameter::ALL {
+            range(out, parameter, specification.range(parameter))?;
+        }
+        run(out, specification)
+    })
+}
+
+fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
+    let mut out = String::new();
+    // Writing to a string fails only if a value's own formatting does, and none here does.
+    let _infallible = write(&mut out);
+    out
+}
+
+fn setup(out: &mut String, setup: &Setup) -> fmt::Result {
+    let mut setup = *setup;
+    for (index, (key, declared)) in setup.sections().into_iter().enumerate() {
+        if index > 0 {
+            writeln!(out)?;
+        }
+        section(out, key, declared)?;
+    }
+    Ok(())
+}
+
+/// Writes a section: each key on a line, with its unit as a comment.
+fn section(out: &mut String, key: Key, section: &mut dyn Section) -> fmt::Result {
+    writeln!(out, "[{}]", key.name)?;
+    for entry in entries(section).iter().filter(|entry| entry.applies()) {
+        let Some(value) = value(&entry.value) else { continue };
+        write!(out, "{} = {value}", entry.key.name)?;
+        let mut units = Vec::new();
+        units_of(&entry.value, &mut units);
+        if units.is_empty() { writeln!(out)? } else { writeln!(out, "  # {}", units.join(", "))? }
+    }
+    Ok(())
+}
+
+/// Returns the text of a value; `None` if it is absent or written elsewhere.
+pub(crate) fn value(value: &DeclaredValue) -> Option<String> {
+    Some(match value {
+        DeclaredValue::Number(number, _) => format!("{:?}", (*number)?),
+        DeclaredValue::Whole(whole, _) => whole.to_string(),
+        DeclaredValue::Boolean(truth) => truth.to_string(),
+        DeclaredValue::Choice { chosen, .. } => format!("\"{chosen}\""),
+        DeclaredValue::Table(entries) => inline_table(entries),
+        DeclaredValue::CustomTable => return None,
+    })
+}
+
+/// Returns a table on one line.
+fn inline_table(entries: &[DeclaredKey]) -> String {
+    let keys = entries.iter().filter(|entry| entry.applies());
+    let keys = keys.filter_map(|entry| Some((entry.key.name, value(&entry.value)?)));
+    let keys: Vec<_> = keys.map(|(name, value)| format!("{name} = {value}")).collect();
+    format!("{{ {} }}", keys.join(", "))
+}
+
+/// Adds the units of a value, each once.
+fn units_of(value: &DeclaredValue, units: &mut Vec<&'static str>) {
+    match value {
+        DeclaredValue::Number(_, accepted) => {
+            let unit = accepted.interval.unit();
+            if !unit.is_empty() && !units.contains(&unit) {
+                units.push(unit);
+            }
+        }
+        DeclaredValue::Table(entries) => entries.iter().for_each(|entry| units_of(&entry.value, units)),
+        _ => {}
+    }
+}
+
+fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {
+    writeln!(out, "mandel = [  # Pa, Kelvin-Mandel, order 11 22 33 23 31 12")?;
+    for row in elasticity.rows() {
+        writeln!(out, "    {row:?},")?;
+    }
+    writeln!(out, "]")
+}
+
+fn data(out: &mut String, data: &Data) -> fmt::Result {
+    match data {
+        Data::Groups(_) => writeln!(out, "\n[data.groups]  # m/s")?,
+        Data::Velocities(_) | Data::Moments { .. } => writeln!(out, "\n[data]  # m/s")?,
+    }
+    match data {
+        Data::Velocities(measured) => velocities(out, "velocities", measured),
+        Data::Groups(groups) => groups
+            .iter()
+            .try_for_each(|group| velocities(out, &quoted(&group.name), &group.velocities)),
+        Data::Moments { mean, coefficient_of_variation } => {
+            writeln!(out, "mean = {mean:?}")?;
+            writeln!(out, "coefficient_of_variation = {coefficient_of_variation:?}")
+        }
+    }
+}
+
+fn velocities(out: &mut String, key: &str, velocities: &[f64]) -> fmt::Result {
+    writeln!(out, "{key} = [")?;
+    for line in velocities.chunks(VELOCITIES_PER_LINE) {
+        let line: Vec<_> = line.iter().map(|velocity| format!("{velocity:?}")).collect();
+        writeln!(out, "    {},", line.join(", "))?;
+    }
+    writeln!(out, "]")
+}
+
+/// Returns a name as a quoted key; it contains no control characters.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+fn range(out: &mut String, parameter: Parameter, range: Range) -> fmt::Result {
+    write!(out, "\n[parameters.{}]", parameter.name())?;
+    match parameter.unit() {
+        "" => writeln!(out)?,
+        unit => writeln!(out, "  # {unit}")?,
+    }
+    match range {
+        Range::Fixed(value) => writeln!(out, "fixed = {value:?}"),
+        Range::Free { start, lower, upper } => {
+            writeln!(out, "start = {start:?}\nbounds = [{lower:?}, {upper:?}]")
+        }
+    }
+}
+
+fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
+    for (key, declared) in specification.run_settings().sections() {
+        writeln!(out)?;
+        section(out, key, declared)?;
+    }
+    priors(out, &specification.search)
+}
+
+fn priors(out: &mut String, search: &Search) -> fmt::Result {
+    for (parameter, prior) in Parameter::ALL.iter().zip(&search.priors) {
+        if let Some(Prior { value, weight }) = prior {
+            writeln!(out, "\n[search.priors.{}]", parameter.name())?;
+            writeln!(out, "value = {value:?}\nweight = {weight:?}")?;
+        }
+    }
+    Ok(())
+}

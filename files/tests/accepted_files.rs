@@ -1,0 +1,279 @@
+//! Files that are accepted: what they mean, and what is filled in.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a helper of tests fails the test")]
+
+use std::path::{Path, PathBuf};
+
+use osteon_common::case::{Case, Setup};
+use osteon_common::elasticity::EngineeringConstants;
+use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+use osteon_common::job::{Sampling, SearchMethod};
+use osteon_common::layers::{Fluid, Layers};
+use osteon_common::parameters::Parameter;
+use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_files::document::Format;
+use osteon_files::{case_file, job_file};
+
+/// All seven parameters and the data's moments: what has no default.
+const MINIMAL: &str = "
+[data]
+mean = 3906.0
+coefficient_of_variation = 0.027
+[parameters]
+density = { fixed = 1598.8 }
+longitudinal_young_modulus = { start = 15e9, bounds = [12e9, 25e9] }
+longitudinal_poisson_ratio = { fixed = 0.3816 }
+longitudinal_shear_modulus = { fixed = 4.795e9 }
+transverse_young_modulus = { fixed = 9.8254e9 }
+transverse_poisson_ratio = { fixed = 0.4495 }
+dispersion = { start = 0.1, bounds = [0.02, 0.3] }
+";
+
+fn job(text: &str, format: Format, kind: JobKind) -> JobSpecification {
+    job_file::parse(text, format, Path::new(""), kind).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn case(text: &str, format: Format) -> Case {
+    case_file::parse(text, format).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cases").join(name)
+}
+
+/// The setup that documentation promises where a file is silent.
+const DEFAULT_SETUP: Setup = Setup {
+    layers: Layers {
+        coupling: Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0 },
+        bone_thickness: 4e-3,
+        marrow: Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0 },
+    },
+    probe: Probe {
+        center_frequency: 1e6,
+        amplitude: 100.0,
+        source: Source { x1: 0.0, x3: 2e-3 },
+        receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
+    },
+    picking: Picking { extremum: Extremum::First, threshold: 0.05 },
+    solver: SolverSettings {
+        method: Method::Exact,
+        refinement: 1.0,
+        element_size: 0.5e-3,
+        element_order: 8,
+        time_step: None,
+    },
+};
+
+#[test]
+fn a_minimal_job_has_the_documented_defaults() {
+    let given = job(MINIMAL, Format::Toml, JobKind::Identification);
+    let expected = JobSpecification {
+        kind: JobKind::Identification,
+        setup: DEFAULT_SETUP,
+        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        parameters: [
+            Range::Fixed(1598.8),
+            Range::Free { start: 15e9, lower: 12e9, upper: 25e9 },
+            Range::Fixed(0.3816),
+            Range::Fixed(4.795e9),
+            Range::Fixed(9.8254e9),
+            Range::Fixed(0.4495),
+            Range::Free { start: 0.1, lower: 0.02, upper: 0.3 },
+        ],
+        monte_carlo: MonteCarlo {
+            realizations: 2747,
+            seed: 1,
+            sampling: Sampling::MonteCarlo,
+            scrambles: 1,
+            control_variate: false,
+            max_failed_fraction: 0.01,
+        },
+        objective: Objective::Moments,
+        search: Search {
+            method: SearchMethod::Simplex,
+            max_evaluations: 400,
+            cost_tolerance: 1e-10,
+            size_tolerance: 1e-5,
+            initial_step: 0.15,
+            starts: 1,
+            first_start: 0,
+            sensitivities: true,
+            priors: [None; 7],
+        },
+    };
+    assert_eq!(given, expected);
+    assert!(given.check().is_empty());
+}
+
+#[test]
+fn the_default_tolerance_is_that_of_the_method() {
+    let check = |text: &str, expected: Search| {
+        let given = job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification);
+        assert_eq!(given.search, expected);
+        assert!(job_file::to_toml(&given).contains(&format!(
+            "method = \"{}\"\nmax_evaluations = 400\ncost_tolerance = {:?}\n",
+            expected.method.name(),
+            expected.cost_tolerance
+        )));
+    };
+    let newton = Search { cost_tolerance: 1e-12, ..Search::by(SearchMethod::Newton) };
+    check("[search]\nmethod = \"newton\"\n", newton);
+    let loose = Search { cost_tolerance: 1e-6, ..newton };
+    check("[search]\nmethod = \"newton\"\ncost_tolerance = 1e-6\n", loose);
+    check("[search]\nmethod = \"simplex\"\n", Search::default());
+}
+
+#[test]
+fn a_complete_job_means_what_it_says() {
+    let given = job(include_str!("files/job.toml"), Format::Toml, JobKind::Identification);
+    assert_eq!(
+        given.setup,
+        Setup {
+            layers: Layers {
+                coupling: Fluid { thickness: 11e-3, density: 1010.0, sound_speed: 1510.0 },
+                bone_thickness: 3e-3,
+                marrow: Fluid { thickness: 12e-3, density: 950.0, sound_speed: 1450.0 },
+            },
+            probe: Probe {
+                center_frequency: 0.9e6,
+                amplitude: 99.0,
+                source: Source { x1: 1e-3, x3: 3e-3 },
+                receivers: Receivers { first_x1: 13e-3, pitch: 0.9e-3, count: 12, x3: 2.5e-3 },
+            },
+            picking: Picking { extremum: Extremum::Second, threshold: 0.06 },
+            solver: SolverSettings { refinement: 1.5, ..SolverSettings::default() },
+        }
+    );
+    // An integer stands for a number.
+    assert_eq!(given.data, Some(Data::Velocities(vec![3900.5, 4000.0, 3950.25])));
+    assert_eq!(given.range(Parameter::LongitudinalShearModulus), Range::Fixed(4.795e9));
+    assert_eq!(
+        given.range(Parameter::TransversePoissonRatio),
+        Range::Free { start: 0.4, lower: 0.2, upper: 0.5 }
+    );
+    assert_eq!(given.monte_carlo.realizations, 500);
+    assert_eq!(given.monte_carlo.seed, 7);
+    assert_eq!(given.monte_carlo.sampling, Sampling::Sobol);
+    assert_eq!(given.monte_carlo.scrambles, 4);
+    assert!(given.monte_carlo.control_variate);
+    assert_eq!(given.monte_carlo.max_failed_fraction, 0.02);
+    assert_eq!(given.search.max_evaluations, 300);
+    assert_eq!(given.search.cost_tolerance, 1e-9);
+    assert_eq!(given.search.size_tolerance, 1e-4);
+    assert_eq!(given.search.initial_step, 0.1);
+    assert!(!given.search.sensitivities);
+}
+
+#[test]
+fn a_propagation_needs_no_data_and_keeps_none() {
+    for text in [MINIMAL.to_owned(), MINIMAL.split_once("[parameters]").unwrap().1.to_owned()] {
+        let text = if text.contains("[data]") { text } else { format!("[parameters]{text}") };
+        let given = job(&text, Format::Toml, JobKind::Propagation);
+        assert_eq!((given.kind, &given.data), (JobKind::Propagation, &None));
+        assert!(given.check().is_empty());
+    }
+}
+
+#[test]
+fn values_at_the_edges_are_accepted() {
+    for (from, to) in [
+        ("count = 12", "count = 3"),
+        ("count = 12", "count = 64"),
+        ("realizations = 500", "realizations = 4"),
+        ("scrambles = 4", "scrambles = 1"),
+        ("scrambles = 4", "scrambles = 500"),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1024\nsampling = \"sobol\"\nscrambles = 1024",
+        ),
+        (
+            "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4",
+            "realizations = 1\nscrambles = 1",
+        ),
+        ("realizations = 500", "realizations = 10000000"),
+        ("realizations = 500", "realizations = 10_000"),
+        ("seed = 7", "seed = 0"),
+        ("seed = 7", "seed = 9223372036854775807"),
+        ("refinement = 1.5", "refinement = 0.5"),
+        ("refinement = 1.5", "refinement = 16"),
+        ("\"exact\"", "\"hybrid\""),
+        ("\"exact\"", "\"hybrid\"\nelement_size = 1e-6\nelement_order = 2\ntime_step = 1e-300"),
+        ("\"exact\"", "\"hybrid\"\nelement_size = 1e-2\nelement_order = 12"),
+        ("max_failed_fraction = 0.02", "max_failed_fraction = 0"),
+        ("max_failed_fraction = 0.02", "max_failed_fraction = 1"),
+        ("start = 1700.0", "start = 1500"),
+        ("start = 1700.0", "start = 2000"),
+        ("cost_tolerance = 1e-9", "cost_tolerance = 0"),
+        ("initial_step = 0.1", "initial_step = 0.5"),
+        ("bounds = [0.02, 0.3]", "bounds = [1e-3, 0.7977]"),
+        // Receivers on the other side of the source.
+        ("first_x1 = 13e-3", "first_x1 = -21e-3"),
+    ] {
+        let text = include_str!("files/job.toml");
+        assert_eq!(text.matches(from).count(), 1, "{from} must occur once");
+        job(&text.replace(from, to), Format::Toml, JobKind::Identification);
+    }
+}
+
+#[test]
+fn toml_and_json_say_the_same() {
+    for text in [MINIMAL, include_str!("files/job.toml")] {
+        assert_eq!(
+            job(text, Format::Toml, JobKind::Identification),
+            job(&as_json(text), Format::Json, JobKind::Identification)
+        );
+    }
+    for text in [include_str!("files/case.toml"), include_str!("files/mandel.toml")] {
+        assert_eq!(case(text, Format::Toml), case(&as_json(text), Format::Json));
+    }
+}
+
+#[test]
+fn a_byte_order_mark_is_no_mistake() {
+    let text = format!("\u{feff}{}", include_str!("files/case.toml"));
+    assert_eq!(case(&text, Format::Toml), case(&text[3..], Format::Toml));
+}
+
+#[test]
+fn the_example_cases_are_what_they_say() {
+    let optimum = EngineeringConstants {
+        longitudinal_young_modulus: 17.717e9,
+        longitudinal_poisson_ratio: 0.3816,
+        longitudinal_shear_modulus: 4.795e9,
+        transverse_young_modulus: 9.8254e9,
+        transverse_poisson_ratio: 0.4495,
+    };
+    let a = case_file::read(&example("A.toml")).unwrap();
+    assert_eq!(a.setup, DEFAULT_SETUP);
+    assert_eq!(a.bone.density, 1598.8);
+    assert_eq!(a.bone.elasticity, optimum.elasticity().unwrap());
+    for (name, thickness) in [("D", 4e-3), ("G", 3e-3)] {
+        let read = case_file::read(&example(&format!("{name}.toml"))).unwrap();
+        let mut setup = DEFAULT_SETUP;
+        setup.layers.bone_thickness = thickness;
+        assert_eq!(read.setup, setup);
+        let reference = reference(name);
+        assert_eq!(reference["thickness"].as_f64().unwrap(), thickness);
+        assert_eq!(reference["density"].as_f64().unwrap(), read.bone.density);
+        for (i, row) in read.bone.elasticity.rows().iter().enumerate() {
+            for (j, &entry) in row.iter().enumerate() {
+                // The reference's mirrored entries may differ in their last bits.
+                let expected = reference["mandel"][i][j].as_f64().unwrap();
+                assert!((entry - expected).abs() <= 1e-15 * expected.abs(), "{name} {i} {j}");
+            }
+        }
+    }
+}
+
+fn reference(name: &str) -> serde_json::Value {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../solver/tests/reference");
+    let text = std::fs::read_to_string(directory.join(format!("{name}.json"))).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The same keys and nesting in JSON.
+fn as_json(text: &str) -> String {
+    let table: toml::Table = toml::from_str(text).unwrap();
+    serde_json::to_string(&table).unwrap()
+}

@@ -1,0 +1,391 @@
+//! Job files that are refused, each with all that a user reads.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
+mod support;
+
+use std::path::Path;
+
+use osteon_common::job::JobKind;
+use osteon_files::document::Format;
+use osteon_files::job_file;
+
+use support::pin;
+
+const JOB: &str = include_str!("files/job.toml");
+/// How `JOB` samples its 500 realizations.
+const SAMPLING: &str = "sampling = \"sobol\"\nscrambles = 4\ncontrol_variate = true";
+
+/// `JOB` with the one occurrence of `from` replaced by `to`; an empty `from` appends.
+fn edited(from: &str, to: &str) -> String {
+    if from.is_empty() {
+        return format!("{JOB}{to}");
+    }
+    assert_eq!(JOB.matches(from).count(), 1, "{from} must occur once");
+    JOB.replace(from, to)
+}
+
+fn refusal(text: &str, kind: JobKind) -> String {
+    match job_file::parse(text, Format::Toml, Path::new("tests/files"), kind) {
+        Ok(_) => "ACCEPTED".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn check(name: &str, kind: JobKind, edits: &[(&str, &str)]) {
+    let refusals = edits.iter().map(|(from, to)| {
+        let to_shown = if to.is_empty() { "(removed)" } else { to.trim() };
+        (to_shown, refusal(&edited(from, to), kind))
+    });
+    pin(name, refusals);
+}
+
+#[test]
+fn setup() {
+    check(
+        "rejected_setup",
+        JobKind::Identification,
+        &[
+            ("thickness = 11e-3", "thickness = 0.0"),
+            ("density = 1010.0", "density = -1010.0"),
+            ("density = 950.0", "density = nan"),
+            ("sound_speed = 1450.0", "sound_speed = inf"),
+            ("sound_speed = 1510.0", "sound_speed = \"1510\""),
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = -3e-3 }"),
+            ("bone     = { thickness = 3e-3 }", "bone = 3e-3"),
+            ("center_frequency = 0.9e6", "center_frequency = 0"),
+            ("center_frequency = 0.9e6", "center_frequency = 1e12"),
+            ("amplitude        = 99.0", "amplitude = 1e400"),
+            ("x1 = 1e-3, x3 = 3e-3", "x1 = nan, x3 = 0.0"),
+            ("x3 = 3e-3", "x3 = 11e-3"),
+            ("x3 = 2.5e-3", "x3 = -2.5e-3"),
+            ("first_x1 = 13e-3", "first_x1 = -5e-3"),
+            ("first_x1 = 13e-3", "first_x1 = 1e-3"),
+            ("pitch = 0.9e-3", "pitch = 0"),
+            ("pitch = 0.9e-3", "pitch = 1e-30"),
+            ("count = 12", "count = 2"),
+            ("count = 12", "count = 65"),
+            ("count = 12", "count = 12.0"),
+            ("count = 12", "count = -1"),
+            ("count = 12", "count = 99999999999999999999"),
+            ("extremum = \"second\"", "extremum = \"third\""),
+            ("threshold = 0.06", "threshold = 0"),
+            ("threshold = 0.06", "threshold = 1.0"),
+            ("method = \"exact\"", "method = \"spectral\"\ntime_step = 1e-8"),
+            ("method = \"exact\"", "element_size = 0.5e-3"),
+            ("method = \"exact\"", "method = \"exact\"\nelement_order = 4\ntime_step = 1e-8"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_size = 0.9e-6"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_size = 1.1e-2"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_order = 1"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_order = 13"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_order = 8.0"),
+            ("method = \"exact\"", "method = \"hybrid\"\ntime_step = 0"),
+            ("method = \"exact\"", "method = \"hybrid\"\ntime_step = inf"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_sise = 1e-3"),
+            ("method = \"exact\"", "method = 1"),
+            ("refinement = 1.5", "refinement = 0.4"),
+            ("refinement = 1.5", "refinement = 17"),
+        ],
+    );
+}
+
+#[test]
+fn parameters() {
+    check(
+        "rejected_parameters",
+        JobKind::Identification,
+        &[
+            ("[parameters.dispersion]\nstart = 0.1\nbounds = [0.02, 0.3]", ""),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 0.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0\nstart = 1700.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0\nbounds = [1.0, 2.0]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1700.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "bounds = [1500.0, 2000.0]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", ""),
+            ("start = 1700.0", "start = 1400.0"),
+            ("start = 1700.0", "start = -1700.0"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [2000.0, 1500.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1700.0, 1700.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [0.0, 2000.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1500.0]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = [1500.0, \"2000\"]"),
+            ("bounds = [1500.0, 2000.0]", "bounds = 1500.0"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = -1\nbounds = [\"1500\", 2e3]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = \"a\"\nbounds = [-1, 2e3]"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1\nbounds = [2, 3]\nunit = 1"),
+            ("fixed = 4.795e9", "fixed = -4.795e9"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 1.2"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "start = 1.2\nbounds = [0.2, 1.5]"),
+            ("start = 0.35\nbounds = [0.2, 0.45]", "fixed = 0.9"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0.797724035217466"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0"),
+            ("bounds = [0.02, 0.3]", "bounds = [0.0, 0.8]"),
+            (
+                "[parameters.density]\nstart = 1700.0\nbounds = [1500.0, 2000.0]",
+                "parameters.density = 1700.0",
+            ),
+        ],
+    );
+}
+
+/// Numbers in another unit than the one that is asked for, each with the cure.
+#[test]
+fn units() {
+    check(
+        "rejected_units",
+        JobKind::Identification,
+        &[
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = 4 }"),
+            ("bone     = { thickness = 3e-3 }", "bone = { thickness = 4000 }"),
+            ("sound_speed = 1510.0", "sound_speed = 1.51"),
+            ("center_frequency = 0.9e6", "center_frequency = 1"),
+            ("center_frequency = 0.9e6", "center_frequency = 0.25"),
+            ("center_frequency = 0.9e6", "center_frequency = 900"),
+            ("x1 = 1e-3, x3 = 3e-3", "x1 = 1e-3, x3 = 3"),
+            ("first_x1 = 13e-3, pitch = 0.9e-3", "first_x1 = 13, pitch = 0.9"),
+            ("method = \"exact\"", "method = \"hybrid\"\nelement_size = 0.5"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1.7"),
+            ("start = 1700.0\nbounds = [1500.0, 2000.0]", "start = 1.7\nbounds = [1.5, 2.0]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 20\nbounds = [12, 25]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18000\nbounds = [12000, 25000]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18\nbounds = [12e9, 25e9]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 18e9\nbounds = [25e9, 12e9]"),
+            ("start = 18e9\nbounds = [12e9, 25e9]", "start = 30e9\nbounds = [12e9, 25e9]"),
+            ("fixed = 4.795e9", "fixed = 4.795"),
+            ("start = 0.35\nbounds = [0.2, 0.45]", "start = 35\nbounds = [20, 45]"),
+            ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 45"),
+            ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 15"),
+        ],
+    );
+}
+
+/// Measured velocities in another unit, and those that no point within the bounds can reach.
+#[test]
+fn implausible_data() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_implausible_data",
+        JobKind::Identification,
+        &[
+            (given, "velocities = [3.9, 4.0, 3.95]"),
+            (given, "velocities = [3900e3, 4000e3, 3950e3]"),
+            (given, "velocities = [3900.5, 4000, 39000, 3.95]"),
+            (given, "velocities = [39, 40, 41]"),
+            (given, "groups = { a = [3.9, 4.0], b = [3900.0, 4000.0] }"),
+            (given, "mean = 3.8\ncoefficient_of_variation = 2.7"),
+            (given, "mean = 50\ncoefficient_of_variation = 0.027"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.6"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.5"),
+            (given, "mean = 1100.0\ncoefficient_of_variation = 0.027"),
+            (given, "velocities = [1100.0, 1200.0]"),
+            (given, "groups = { a = [1100.0, 1200.0], b = [1000.0, 1200.0] }"),
+        ],
+    );
+    let other = edited(given, "groups = { a = [1100.0, 1200.0], b = [3900.0, 4000.0] }");
+    assert_eq!(refusal(&other, JobKind::Identification), "ACCEPTED", "b can be matched");
+}
+
+#[test]
+fn run() {
+    check(
+        "rejected_run",
+        JobKind::Identification,
+        &[
+            ("realizations = 500", "realizations = 0"),
+            ("realizations = 500", "realizations = 10000001"),
+            ("realizations = 500", "realizations = 1e3"),
+            ("seed = 7", "seed = -1"),
+            (SAMPLING, "sampling = \"halton\"\nscrambles = 4"),
+            (SAMPLING, "sampling = \"monte_carlo\"\nscrambles = 4"),
+            (SAMPLING, "scrambles = 2"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 3"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 0"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 1025"),
+            (SAMPLING, "sampling = \"sobol\"\nscrambles = 2.0"),
+            (SAMPLING, "control_variate = 1"),
+            (SAMPLING, "control_variate = \"yes\""),
+            (SAMPLING, "control_variates = true"),
+            ("max_failed_fraction = 0.02", "max_failed_fraction = 1.5"),
+            ("kind = \"moments\"", "kind = \"entropy\""),
+            (
+                "kind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
+                "kind = \"likelihood\"\n\n[search]\nmethod = \"newton\"",
+            ),
+            (
+                "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4\n\
+                 control_variate = true\nmax_failed_fraction = 0.02\n\n[objective]\nkind = \"moments\"",
+                "realizations = 1\nseed = 7\nmax_failed_fraction = 0.02\n\n[objective]\nkind = \"likelihood\"",
+            ),
+            ("method = \"simplex\"", "method = \"annealing\""),
+            (
+                "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4\n\
+                 control_variate = true\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"simplex\"",
+                "realizations = 1\nseed = 7\nmax_failed_fraction = 0.02\n\n\
+                 [objective]\nkind = \"moments\"\n\n[search]\nmethod = \"newton\"",
+            ),
+            ("max_evaluations = 300", "max_evaluations = 0"),
+            ("cost_tolerance = 1e-9", "cost_tolerance = -1e-9"),
+            ("size_tolerance = 1e-4", "size_tolerance = 1"),
+            ("initial_step = 0.1", "initial_step = 0.6"),
+            ("initial_step = 0.1", "starts = 0"),
+            ("initial_step = 0.1", "starts = 1001"),
+            ("initial_step = 0.1", "first_start = -1"),
+            ("initial_step = 0.1", "first_start = 1001"),
+            ("max_evaluations = 300", "max_evaluations = 10000\nstarts = 200"),
+            ("sensitivities = false", "sensitivities = 1"),
+            ("sensitivities = false", "sensitivity = true"),
+            ("sensitivities = false", "priors = 1"),
+            ("sensitivities = false", "priors = { densty = { value = 1700.0, weight = 1e-3 } }"),
+            ("sensitivities = false", "priors = { dispersion = 0.1 }"),
+            ("sensitivities = false", "priors = { dispersion = { value = 0.1 } }"),
+            ("sensitivities = false", "priors = { dispersion = { value = 0.4, weight = 0.0 } }"),
+            (
+                "sensitivities = false",
+                "priors = { longitudinal_shear_modulus = { value = 4e9, weight = 1.0 } }",
+            ),
+            (
+                "method = \"simplex\"",
+                "method = \"newton\"\npriors = { dispersion = { value = 0.1, weight = 1.0 } }",
+            ),
+            ("sensitivities = false", "speculation = true"),
+        ],
+    );
+}
+
+#[test]
+fn data() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_data",
+        JobKind::Identification,
+        &[
+            ("[data]\nvelocities = [3900.5, 4000, 3950.25]", ""),
+            (given, ""),
+            (given, "velocities = []"),
+            (given, "velocities = [3900.0]"),
+            (given, "velocities = [3900.0, 3900.0]"),
+            (given, "velocities = [3900.0, -1.0, nan, 4000.0]"),
+            (given, "velocities = [3900.0, \"4000\"]"),
+            (given, "velocities = 3900.0"),
+            (given, "velocities = \"missing.csv\""),
+            (given, "mean = 3900.0"),
+            (given, "mean = 3900.0\ncoefficient_of_variation = 0.0"),
+            (given, "mean = 0\ncoefficient_of_variation = 0.03"),
+            (given, "velocities = [3900.0, 4000.0]\nmean = 3900.0"),
+            (given, "groups = { a = [3900.0, 4000.0] }\nmean = 3900.0"),
+            (given, "groups = { a = [3900.0, 4000.0] }\nvelocities = [3900.0, 4000.0]"),
+            (given, "groups = {}"),
+            (given, "groups = [3900.0, 4000.0]"),
+            (given, "groups = { a = [3900.0, 4000.0], b = 3900.0, \"c d\" = [3900.0, \"x\"] }"),
+            (given, "groups = { a = [3900.0], b = [3900.0, -1.0], \"\" = [3900.0, 4000.0] }"),
+            (given, "groups = { a = [3900.0], b = [3950.0, 3950.0] }"),
+            (given, "groups = { a = [], b = [3900.0, 4000.0] }"),
+            (given, "groups = { \"a\\tb\" = [3900.0, 4000.0] }"),
+            (given, "group = \"site\""),
+            (given, "velocities = [3900.0, 4000.0]\ngroup = \"site\""),
+            (given, "velocities = \"v.csv\"\ngroup = 3"),
+        ],
+    );
+}
+
+#[test]
+fn a_likelihood_needs_the_velocities_themselves() {
+    let moments = edited(
+        "velocities = [3900.5, 4000, 3950.25]",
+        "mean = 3900.0\ncoefficient_of_variation = 0.03",
+    );
+    let text = moments.replace("kind = \"moments\"", "kind = \"likelihood\"");
+    let refused = refusal(&text, JobKind::Identification);
+    assert!(refused.contains("objective.kind"), "{refused}");
+    for key in ["data.velocities", "data.mean", "data.coefficient_of_variation"] {
+        assert!(refused.contains(key), "{refused}");
+    }
+    assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");
+    assert_eq!(refusal(&moments, JobKind::Identification), "ACCEPTED");
+}
+
+#[test]
+fn unknown_keys() {
+    check(
+        "rejected_unknown_keys",
+        JobKind::Identification,
+        &[
+            ("", "[serach]\nmax_evaluations = 3\n"),
+            ("", "tolerance = 1e-3\n"),
+            ("", "[bone]\ndensity = 1600.0\n"),
+            ("thickness = 11e-3", "thicknes = 11e-3"),
+            ("amplitude        = 99.0", "Amplitude = 99.0"),
+            ("count = 12", "number = 12"),
+            ("threshold = 0.06", "treshold = 0.06"),
+            ("refinement = 1.5", "refinment = 1.5"),
+            ("realizations = 500", "realisations = 500"),
+            ("sampling = \"sobol\"", "samplng = \"sobol\""),
+            ("start = 0.1", "strat = 0.1"),
+            ("[parameters.dispersion]", "[parameters.dispersoin]"),
+            ("kind = \"moments\"", "\"sur prise\" = 1"),
+        ],
+    );
+}
+
+#[test]
+fn a_propagation_checks_its_data_without_reading_files() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    check(
+        "rejected_propagation_data",
+        JobKind::Propagation,
+        &[
+            (given, "velocities = [3900.0, -1.0]"),
+            (given, "velocity = \"data.csv\""),
+            (given, "velocities = 1"),
+            (given, "mean = 1.0"),
+        ],
+    );
+    let text = edited(given, "velocities = \"missing.csv\"");
+    let job = job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Propagation).unwrap();
+    assert_eq!(job.data, None);
+}
+
+#[test]
+fn all_seven_fixed_leaves_nothing_to_search() {
+    let mut text = JOB.to_owned();
+    for (free, fixed) in [
+        ("start = 1700.0\nbounds = [1500.0, 2000.0]", "fixed = 1700.0"),
+        ("start = 18e9\nbounds = [12e9, 25e9]", "fixed = 18e9"),
+        ("start = 0.35\nbounds = [0.2, 0.45]", "fixed = 0.35"),
+        ("start = 10e9\nbounds = [8e9, 16e9]", "fixed = 10e9"),
+        ("start = 0.4\nbounds = [0.2, 0.5]", "fixed = 0.4"),
+        ("start = 0.1\nbounds = [0.02, 0.3]", "fixed = 0.1"),
+    ] {
+        assert!(text.contains(free));
+        text = text.replace(free, fixed);
+    }
+    assert_eq!(
+        refusal(&text, JobKind::Identification),
+        "1 error\n  parameters: all seven are fixed; an identification searches at least \
+         one: give it start and bounds (a run at fixed parameters is a propagation)"
+    );
+    assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");
+}
+
+#[test]
+fn everything_wrong_is_said_at_once_in_the_order_of_the_lines() {
+    let text = JOB
+        .replace("density = 1010.0", "density = 0, colour = 3")
+        .replace("count = 12", "count = 0")
+        .replace("start = 0.4\n", "start = 1.2\n")
+        .replace("realizations = 500", "realizations = 0")
+        .replace("[parameters.density]\nstart = 1700.0\nbounds = [1500.0, 2000.0]\n", "");
+    pin("rejected_all_at_once", [("six mistakes", refusal(&text, JobKind::Identification))]);
+}
+
+#[test]
+fn an_empty_file_names_the_tables_that_it_lacks() {
+    pin(
+        "rejected_empty_job",
+        [
+            ("identification", refusal("", JobKind::Identification)),
+            ("propagation", refusal("", JobKind::Propagation)),
+        ],
+    );
+}

@@ -1,0 +1,336 @@
+//! What is written reads back to the same bits; what is read never panics; a specification is
+//! judged alike whether it comes as a file or not.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use osteon_common::case::{Bone, Case, Setup};
+use osteon_common::elasticity::Elasticity;
+use osteon_common::job::{
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
+    SearchMethod,
+};
+use osteon_common::layers::{Fluid, Layers};
+use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_files::document::Format;
+use osteon_files::file_error::ContentError;
+use osteon_files::{case_file, job_file};
+use osteon_fuzz::properties;
+use proptest::prelude::*;
+
+const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
+const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
+
+/// Any positive normal or subnormal number.
+fn positive() -> impl Strategy<Value = f64> {
+    use proptest::num::f64::{NORMAL, POSITIVE, SUBNORMAL};
+    POSITIVE | NORMAL | SUBNORMAL
+}
+
+fn fluid() -> impl Strategy<Value = Fluid> {
+    (4e-3..30e-3, positive(), 1200.0..1800.0).prop_map(|(thickness, density, sound_speed)| Fluid {
+        thickness,
+        density,
+        sound_speed,
+    })
+}
+
+fn solver() -> impl Strategy<Value = SolverSettings> {
+    let exact = (0.5..1.5)
+        .prop_map(|refinement| SolverSettings { refinement, ..SolverSettings::default() });
+    let hybrid = (0.5..1.5, 1e-4..1e-3, 2_u32..=12, prop::option::of(1e-9..1e-7)).prop_map(
+        |(refinement, element_size, element_order, time_step)| SolverSettings {
+            method: Method::Hybrid,
+            refinement,
+            element_size,
+            element_order,
+            time_step,
+        },
+    );
+    prop_oneof![exact, hybrid]
+}
+
+fn setup() -> impl Strategy<Value = Setup> {
+    let layers = (fluid(), 0.5e-3..8e-3, fluid());
+    let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
+    let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
+    let pulse = (0.5e6..1.5e6, positive());
+    let settings = (any::<bool>(), 1e-300..1.0, solver());
+    (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
+        |((coupling, bone_thickness, marrow), x1, (x3, receivers_x3), row, pulse, settings)| {
+            let (distance, pitch, count, left) = row;
+            let span = f64::from(count) * pitch;
+            let first_x1 = if left { x1 - distance - span } else { x1 + distance };
+            let (second, threshold, solver) = settings;
+            let extremum = if second { Extremum::Second } else { Extremum::First };
+            Setup {
+                layers: Layers { coupling, bone_thickness, marrow },
+                probe: Probe {
+                    center_frequency: pulse.0,
+                    amplitude: pulse.1,
+                    source: Source { x1, x3 },
+                    receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
+                },
+                picking: Picking { extremum, threshold },
+                solver,
+            }
+        },
+    )
+}
+
+/// Positive definite, of any size between 1 Pa and 1e12 Pa, with all 36 entries.
+fn elasticity() -> impl Strategy<Value = Elasticity> {
+    let entries = prop::array::uniform32(-1.0..1.0);
+    (entries, 1.0..1e12).prop_filter_map("not positive definite", |(entries, scale)| {
+        let mut rows = [[0.0; 6]; 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                let product: f64 = (0..5).map(|m| entries[5 * i + m] * entries[5 * j + m]).sum();
+                rows[i][j] = scale * (product + if i == j { 1.0 } else { 0.0 });
+            }
+        }
+        Elasticity::new(rows).ok()
+    })
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    (setup(), positive(), elasticity())
+        .prop_map(|(setup, density, elasticity)| Case { setup, bone: Bone { density, elasticity } })
+}
+
+fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
+    let width = upper - lower;
+    (any::<bool>(), lower..upper, 0.01..1.0, 0.01..1.0).prop_map(move |(fixed, start, down, up)| {
+        if fixed {
+            Range::Fixed(start)
+        } else {
+            let free = (start - lower, upper - start + 0.01 * width);
+            Range::Free { start, lower: start - down * free.0, upper: start + up * free.1 }
+        }
+    })
+}
+
+/// Data that points within the bounds can come near to.
+fn data() -> impl Strategy<Value = Data> {
+    prop_oneof![
+        prop::collection::vec(2e3..6e3, 2..40).prop_map(Data::Velocities),
+        prop::collection::btree_map(
+            "[ -~äβ骨\"\\\\]{1,20}",
+            prop::collection::vec(2e3..6e3, 2..9),
+            1..5
+        )
+        .prop_map(|groups| {
+            let group = |(name, velocities)| Group { name, velocities };
+            Data::Groups(groups.into_iter().map(group).collect())
+        }),
+        (2e3..6e3, 0.02..0.1).prop_map(|(mean, coefficient_of_variation)| Data::Moments {
+            mean,
+            coefficient_of_variation
+        }),
+    ]
+}
+
+fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
+    let scrambles = prop::option::of(1_u64..=1024);
+    (1_u64..=9765, scrambles, 0_u64..1 << 63, any::<bool>(), 0.0..1.0).prop_map(
+        |(points, scrambles, seed, control_variate, max_failed_fraction)| MonteCarlo {
+            realizations: points * scrambles.unwrap_or(1),
+            seed,
+            sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
+            scrambles: scrambles.unwrap_or(1),
+            control_variate,
+            max_failed_fraction,
+        },
+    )
+}
+
+fn search() -> impl Strategy<Value = Search> {
+    let method = prop::sample::select(SearchMethod::ALL.to_vec());
+    let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
+    let starts = (1_u64..=100, 0_u64..=1000);
+    (method, 1_u64..=1000, numbers, starts, any::<bool>()).prop_map(
+        |(method, max_evaluations, numbers, (starts, first_start), sensitivities)| Search {
+            method,
+            max_evaluations,
+            cost_tolerance: numbers.0,
+            size_tolerance: numbers.1,
+            initial_step: numbers.2,
+            starts,
+            first_start,
+            sensitivities,
+            priors: [None; 7],
+        },
+    )
+}
+
+/// Almost always valid.
+fn job() -> impl Strategy<Value = JobSpecification> {
+    let parameters = (
+        range(1500.0, 2000.0),
+        range(12e9, 25e9),
+        range(0.2, 0.45),
+        range(3e9, 6.5e9),
+        range(8e9, 12e9),
+        range(0.2, 0.5),
+        range(0.02, 0.3),
+    );
+    let objective = prop::sample::select(Objective::ALL.to_vec());
+    (any::<bool>(), setup(), data(), parameters, monte_carlo(), search(), objective).prop_map(
+        |(identification, setup, data, parameters, monte_carlo, mut search, objective)| {
+            let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
+            let parameters = [rho, e_l, nu_l, g_l, e_t, nu_t, delta];
+            let by_simplex = search.method == SearchMethod::Simplex;
+            for (prior, range) in search.priors.iter_mut().zip(parameters) {
+                // Of some that are free.
+                if let (true, Range::Free { start, lower, .. }) = (by_simplex, range)
+                    && start.to_bits().is_multiple_of(3)
+                {
+                    *prior = Some(Prior { value: start, weight: 1.0 + lower.abs() / 7.0 });
+                }
+            }
+            let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
+            let searched = has_law && search.method == SearchMethod::Simplex;
+            let objective = if searched { objective } else { Objective::Moments };
+            JobSpecification {
+                kind: KINDS[usize::from(!identification)],
+                setup,
+                data: identification.then_some(data),
+                parameters,
+                monte_carlo,
+                objective,
+                search,
+            }
+        },
+    )
+}
+
+/// A number of a specification, replaced by another.
+type Edit = fn(&mut JobSpecification, f64);
+
+const EDITS: [Edit; 16] = [
+    |job, x| job.setup.layers.coupling.thickness = x,
+    |job, x| job.setup.layers.bone_thickness = x,
+    |job, x| job.setup.layers.marrow.sound_speed = x,
+    |job, x| job.setup.probe.center_frequency = x,
+    |job, x| job.setup.probe.source.x1 = x,
+    |job, x| job.setup.probe.source.x3 = x,
+    |job, x| job.setup.probe.receivers.first_x1 = x,
+    |job, x| job.setup.probe.receivers.pitch = x,
+    |job, x| job.setup.picking.threshold = x,
+    |job, x| job.setup.solver.refinement = x,
+    |job, x| job.parameters[5] = Range::Fixed(x),
+    |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
+    |job, x| job.search.initial_step = x,
+    |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
+    |job, x| job.monte_carlo.scrambles = x as u64,
+    |job, _| job.monte_carlo.sampling = Sampling::MonteCarlo,
+];
+
+/// Brackets of a text that the test itself may read as TOML.
+const BRACKETS_MAX: usize = 200;
+
+/// A file with some damage.
+fn text_of_a_file() -> impl Strategy<Value = String> {
+    let files = [
+        include_str!("files/job.toml"),
+        include_str!("files/case.toml"),
+        include_str!("files/mandel.toml"),
+    ];
+    osteon_fuzz::damaged_text(files.map(str::to_owned).to_vec())
+}
+
+fn no_panic(text: &str) {
+    for format in FORMATS {
+        let _ = case_file::parse(text, format);
+        for kind in KINDS {
+            let _ = job_file::parse(text, format, Path::new("/nowhere"), kind);
+        }
+    }
+}
+
+fn as_json(toml: &str) -> Result<String, TestCaseError> {
+    let table: toml::Table =
+        toml::from_str(toml).map_err(|error| TestCaseError::fail(error.to_string()))?;
+    serde_json::to_string(&table).map_err(|error| TestCaseError::fail(error.to_string()))
+}
+
+properties! {
+    fn a_case_reads_back_to_the_bit(case in case()) {
+        let text = case_file::to_toml(&case);
+        let read = case_file::parse(&text, Format::Toml).unwrap();
+        // The text tells all bits, a zero's sign among them.
+        prop_assert_eq!(case_file::to_toml(&read), text.clone());
+        prop_assert_eq!(read, case);
+        prop_assert_eq!(case_file::parse(&as_json(&text)?, Format::Json).unwrap(), case);
+    }
+
+    fn a_job_reads_back_to_the_bit(job in job()) {
+        prop_assume!(job.check().is_empty());
+        let text = job_file::to_toml(&job);
+        let read = job_file::parse(&text, Format::Toml, Path::new(""), job.kind).unwrap();
+        prop_assert_eq!(job_file::to_toml(&read), text.clone());
+        prop_assert_eq!(&read, &job);
+        let json = as_json(&text)?;
+        prop_assert_eq!(job_file::parse(&json, Format::Json, Path::new(""), job.kind).unwrap(), job);
+    }
+
+    fn a_file_is_judged_as_the_specification_it_stands_for(
+        mut job in job(),
+        edits in prop::collection::vec(
+            (prop::sample::select(EDITS.to_vec()), prop_oneof![
+                Just(0.0), Just(-0.0), Just(-1.0), Just(1.0), Just(1e-3), Just(1e300), Just(5e-324),
+                Just(f64::INFINITY), Just(f64::NEG_INFINITY), proptest::num::f64::NORMAL,
+            ]),
+            0..4,
+        ),
+    ) {
+        job.kind = JobKind::Identification;
+        job.data.get_or_insert(Data::Moments { mean: 1.0, coefficient_of_variation: 1.0 });
+        for (edit, value) in edits {
+            edit(&mut job, value);
+        }
+        let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();
+        let text = job_file::to_toml(&job);
+        let found = match job_file::parse(&text, Format::Toml, Path::new(""), job.kind) {
+            Ok(_) => BTreeSet::new(),
+            Err(ContentError::Invalid(invalid)) => {
+                invalid.iter().map(|(_, violation)| violation.to_string()).collect()
+            }
+            Err(malformed) => panic!("{malformed}\n{text}"),
+        };
+        prop_assert_eq!(found, expected);
+    }
+
+    fn arbitrary_text_does_not_panic(text in "\\PC*|[\\[\\]{}=.,:\"' \n0-9a-e_-]*") {
+        no_panic(&text);
+    }
+
+    fn damaged_files_do_not_panic(text in text_of_a_file()) {
+        no_panic(&text);
+        // As it stands, the TOML crate takes the whole stack on thousands of open brackets.
+        let is_deep = text.matches(['[', '{']).count() > BRACKETS_MAX;
+        if !is_deep && let Ok(table) = toml::from_str::<toml::Table>(&text) {
+            no_panic(&serde_json::to_string(&table).unwrap());
+        }
+    }
+}
+
+#[test]
+fn the_canonical_text_of_a_job() {
+    let text = include_str!("files/job.toml");
+    let job = job_file::parse(text, Format::Toml, Path::new(""), JobKind::Identification).unwrap();
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("canonical_job", job_file::to_toml(&job));
+    });
+    let job = JobSpecification { kind: JobKind::Propagation, data: None, ..job };
+    assert!(!job_file::to_toml(&job).contains("[data]"));
+}
+
+#[test]
+fn the_canonical_text_of_a_case() {
+    let case = case_file::parse(include_str!("files/mandel.toml"), Format::Toml).unwrap();
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("canonical_case", case_file::to_toml(&case));
+    });
+}

@@ -1,0 +1,199 @@
+//! Files of measured velocities: what is read, and what is refused with which words.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
+use std::fmt::Write as _;
+
+use osteon_common::job::{Data, Group, JobKind, NoVariation};
+use osteon_common::warnings::Warning;
+use osteon_files::document::Format;
+use osteon_files::job_file;
+
+/// What the job of `files/job.toml` gets from a file with these bytes.
+fn read(bytes: &[u8]) -> Result<Option<Data>, String> {
+    read_as(bytes, "")
+}
+
+/// The same with more keys in `[data]`.
+fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::create_dir(directory.path().join("data")).unwrap();
+    std::fs::write(directory.path().join("data/v.csv"), bytes).unwrap();
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let text = include_str!("files/job.toml")
+        .replace(given, &format!("velocities = \"data/v.csv\"\n{more}"));
+    match job_file::parse(&text, Format::Toml, directory.path(), JobKind::Identification) {
+        Ok(job) => Ok(job.data),
+        Err(error) => Err(error.to_string().replace(&*directory.path().to_string_lossy(), "DIR")),
+    }
+}
+
+/// The warnings about a job with these velocities.
+fn warnings(text: &str, more: &str) -> Vec<String> {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("v.csv"), text).unwrap();
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let job =
+        include_str!("files/job.toml").replace(given, &format!("velocities = \"v.csv\"\n{more}"));
+    let path = directory.path().join("job.toml");
+    std::fs::write(&path, job).unwrap();
+    let warnings = job_file::read_with_warnings(&path, JobKind::Identification).unwrap().warnings;
+    let shown = |warning: &Warning| {
+        warning.to_string().replace(&*directory.path().to_string_lossy(), "DIR")
+    };
+    warnings.iter().map(shown).collect()
+}
+
+#[test]
+fn what_is_read() {
+    let expected = Some(Data::Velocities(vec![3900.5, 4000.0]));
+    for text in [
+        "velocity\n3900.5\n4000\n",
+        "velocity\r\n3900.5\r\n4e3",
+        "\u{feff}velocity\n3900.5\n4000\n",
+        "# synthetic\n\nvelocity\n3900.5\n# between\n\n4000\n\n",
+        "index,velocity,failure\n0,3900.5,\n1,4000.0,\n",
+        "\"name\", \"velocity\"\n\"a, \"\"b\"\"\", \"3900.5\"\nc,  4000 \n",
+        " velocity , x\n3900.5,1\n4000,\n",
+    ] {
+        assert_eq!(read(text.as_bytes()), Ok(expected.clone()), "{text}");
+    }
+}
+
+#[test]
+fn groups_stand_in_the_order_in_which_they_begin() {
+    let text = "bone,velocity\nleft,3900.5\nright,4000\n\"left\",3950\nright,4010\n";
+    let groups = [("left", [3900.5, 3950.0]), ("right", [4000.0, 4010.0])];
+    let group = |(name, velocities): (&str, [f64; 2])| Group {
+        name: name.to_owned(),
+        velocities: velocities.to_vec(),
+    };
+    let expected = Data::Groups(groups.map(group).to_vec());
+    assert_eq!(read_as(text.as_bytes(), "group = \"bone\""), Ok(Some(expected)));
+}
+
+#[test]
+fn a_group_of_one_velocity_is_a_group() {
+    let read =
+        read_as(b"bone,velocity\na,3900\na,3950\nb,4000\nc,4010\nc,4010\n", "group = \"bone\"");
+    let Ok(Some(Data::Groups(groups))) = read else { panic!("{read:?}") };
+    let unsearched: Vec<_> = groups.iter().map(Group::no_variation).collect();
+    let equal = NoVariation::AllEqual { count: 2, velocity: 4010.0 };
+    assert_eq!(unsearched, [None, Some(NoVariation::OneVelocity), Some(equal)]);
+}
+
+#[test]
+fn groups_that_are_refused() {
+    let check = |text: &str, expected: &str| {
+        let message = read_as(text.as_bytes(), "group = \"bone\"").unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    check("site,velocity\na,1\na,2\n", "no column `bone`; the header has `site`, `velocity`");
+    check("bone,velocity,bone\na,1,b\n", "the header has the column `bone` twice");
+    check("bone,velocity\na,1\n,2\n", "line 3: bone is empty; it must name the group");
+    let none = "no group of the column `bone` has two velocities that differ";
+    check("bone,velocity\na,1\nb,3\nb,3\n", none);
+    let many: String = (0..1001).map(|i| format!("g{i},1\n")).collect();
+    check(&format!("bone,velocity\n{many}"), "has more than 1000 groups");
+}
+
+#[test]
+fn what_is_refused() {
+    let many_bad = format!("velocity\n{}", "x\n".repeat(30));
+    let long_field = format!("velocity\n{}\n1\n", "y".repeat(200));
+    let mut page = String::new();
+    for text in [
+        "",
+        "# only a comment\n",
+        "3900.5\n4000.0\n",
+        "speed,site\n3900.5,a\n",
+        "Velocity\n3900.5\n",
+        "velocity;site\n3900.5;a\n",
+        "velocity,velocity\n1,2\n",
+        "velocity\n",
+        "velocity\n3900.5\n",
+        "velocity\n3900.5\n0\n4000\n",
+        "velocity\n3900.5\n-4000\n",
+        "velocity\n3900.5\nnan\ninf\n1e999\n",
+        "velocity\n3900.5\n4,000\n",
+        "index,velocity\n0,3900.5\n1\n2,4000,\n",
+        "index,velocity,failure\n0,3900.5,\n1,,no_arrival\n2,3950.0,\n",
+        "velocity\n3900.5\nfast\n",
+        "velocity\n3900.5\n\"4000\n",
+        "velocity\n39\"00.5\n\"4000\"1\n",
+        "velocity\n3900.5\n3900.5\n",
+        &many_bad,
+        &long_field,
+    ] {
+        let message = read(text.as_bytes()).unwrap_err();
+        let shown: String = text.chars().take(60).collect();
+        writeln!(page, "{}\n=> {message}\n", shown.trim_end().replace('\n', "\\n")).unwrap();
+    }
+    writeln!(page, "(not UTF-8)\n=> {}", read(b"velocity\n\xff\n").unwrap_err()).unwrap();
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("rejected_csv", page);
+    });
+}
+
+#[test]
+fn velocities_in_another_unit_are_refused() {
+    let check = |text: &str, more: &str, expected: &[&str]| {
+        let message = read_as(text.as_bytes(), more).unwrap_err();
+        for part in expected {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    };
+    let all = "data.velocities: their median is 3.95; values are in m/s: did you mean 3.95 km/s";
+    check("velocity\n3.9\n3.95\n4.0\n", "", &["1 error", all]);
+    let one = "DIR/data/v.csv, line 5: velocity is 39000.0; no velocity of sound in bone is outside \
+               100 to 20000 (m/s); their median is 3950";
+    check("# one\nvelocity\n3900.5\n\n39000\n3950\n", "", &["1 error", one]);
+    let grouped = "bone,velocity\na,3900.5\nb,3.9\na,3.95\nb,4.0\na,4000\n";
+    let expected = [
+        "2 errors",
+        "data.groups.b: their median is 3.95; values are in m/s: did you mean 3.95 km/s (3.95e3)?",
+        "data.groups.a[1]: DIR/data/v.csv, line 4: velocity is 3.95; no velocity",
+    ];
+    check(grouped, "group = \"bone\"", &expected);
+    let many = format!("velocity\n{}{}", "3900\n4000\n".repeat(20), "39000\n".repeat(12));
+    let expected =
+        ["more than 10 errors", "line 51: velocity is 39000.0", "more velocities out of range"];
+    check(&many, "", &expected);
+}
+
+#[test]
+fn single_velocities_far_from_the_others_are_warned_of_with_their_line() {
+    let one = "velocity\n3900.5\n# comment\n390\n3950\n4000\n3960\n3970\n";
+    assert_eq!(
+        warnings(one, ""),
+        [
+            "data.velocities: DIR/v.csv: 390 (line 4) m/s: more than a factor 3 from the median 3955 m/s; \
+          in other units, or a slip of the decimal point?"
+        ]
+    );
+    let many = format!("velocity\n{}{}", "3900\n4000\n".repeat(20), "390\n".repeat(7));
+    let found = warnings(&many, "");
+    assert_eq!(found.len(), 1, "{found:?}");
+    let listed =
+        "390 (line 42), 390 (line 43), 390 (line 44), 390 (line 45), 390 (line 46) and 2 more m/s";
+    assert!(found[0].contains(listed), "{found:?}");
+    assert_eq!(warnings("velocity\n3900.5\n3950\n2000\n8000\n", ""), [""; 0]);
+    let grouped = "bone,velocity\na,3900\nb,4000\na,3950\na,390\nb,3900\n";
+    assert_eq!(
+        warnings(grouped, "group = \"bone\""),
+        [
+            "data.groups.a: DIR/v.csv: 390 (line 5) m/s: more than a factor 3 from the median 3900 m/s; \
+          in other units, or a slip of the decimal point?"
+        ]
+    );
+}
+
+#[test]
+fn unusual_groups_are_listed_and_counted() {
+    let rows: String = (0..8).map(|i| format!("g{i},900\ng{i},950\n")).collect();
+    let csv = format!("bone,velocity\n{rows}z,3900\nz,3950\n");
+    let found = warnings(&csv, "group = \"bone\"");
+    assert_eq!(found.len(), 6, "{found:?}");
+    assert_eq!(found[0], "data.groups.g0: their median is 925 m/s; usual is 1000 to 8000 m/s");
+    assert_eq!(found[5], "data.groups: 3 more groups are unusual");
+}
