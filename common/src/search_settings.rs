@@ -163,8 +163,10 @@ impl Section for Search {
                              best point, with one evaluation for each free parameter; `identified` in \
                              the result requires them \
                              ([searches.md](searches.md#identifiability-and-intervals))";
-        fields
-            .boolean(Key { name: "sensitivities", meaning: sensitivities }, &mut self.sensitivities);
+        fields.boolean(
+            Key { name: "sensitivities", meaning: sensitivities },
+            &mut self.sensitivities,
+        );
         let priors = "for each free parameter that has one: `{ value = …, weight = … }`; the cost \
                       grows by weight × ((p - value)/(upper - lower))² \
                       ([searches.md](searches.md#priors)). The value must be within the bounds, the \

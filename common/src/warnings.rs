@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::case::{Case, Setup};
 use crate::field_path::entry_path;
-use crate::fields::{self, DeclaredKey, Number, DeclaredValue};
+use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
 use crate::job::{Data, JobSpecification, Range};
 use crate::origin::Origin;
 use crate::parameters::Parameter;

@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
-use osteon_common::fields::{DeclaredKey, Key, Section, DeclaredValue, entries};
+use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
 use osteon_common::job::{Data, JobSpecification, Prior, Range, Search};
 use osteon_common::parameters::Parameter;
 
@@ -101,7 +101,9 @@ fn units_of(value: &DeclaredValue, units: &mut Vec<&'static str>) {
                 units.push(unit);
             }
         }
-        DeclaredValue::Table(entries) => entries.iter().for_each(|entry| units_of(&entry.value, units)),
+        DeclaredValue::Table(entries) => {
+            entries.iter().for_each(|entry| units_of(&entry.value, units))
+        }
         _ => {}
     }
 }

@@ -6,7 +6,8 @@
 use std::sync::LazyLock;
 
 use osteon_common::fields::{
-    self, Choice, Condition, DeclaredKey, Fields, Key, Number, Section, DeclaredValue, Whole, WholeRange,
+    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, Number, Section, Whole,
+    WholeRange,
 };
 use osteon_common::violations::Violations;
 use prost::{Message, Name};
@@ -82,7 +83,10 @@ fn field_value(field: &FieldDescriptor, value: &DeclaredValue) -> Option<FieldVa
             fill(&mut message, entries);
             FieldValue::Message(message)
         }
-        (DeclaredValue::Choice { .. } | DeclaredValue::Table(_) | DeclaredValue::CustomTable, _) => return None,
+        (
+            DeclaredValue::Choice { .. } | DeclaredValue::Table(_) | DeclaredValue::CustomTable,
+            _,
+        ) => return None,
     })
 }
 
@@ -194,7 +198,8 @@ mod tests {
         for DeclaredKey { key, value, .. } in entries {
             let field = message.get_field_by_name(key.name).unwrap();
             match (value, field.kind()) {
-                (DeclaredValue::Number(..), Kind::Double) | (DeclaredValue::Boolean(_), Kind::Bool) => {
+                (DeclaredValue::Number(..), Kind::Double)
+                | (DeclaredValue::Boolean(_), Kind::Bool) => {
                     assert!(field.supports_presence(), "{}", field.full_name());
                 }
                 (DeclaredValue::Whole(_, accepted), kind) => {

@@ -317,7 +317,7 @@ fn every_text_fits_a_terminal_of_80_columns() {
         }
     }
     let shown_jobs = printed(OutputFormat::Text, |output| {
-        let mut failed = jobs();
+        let mut failed = jobs::jobs();
         failed[1].reason = "the searches for 3 of 9 groups failed; ".repeat(5);
         output.jobs(&failed, &[]).unwrap();
         failed.iter().for_each(|job| output.snapshot(job).unwrap());

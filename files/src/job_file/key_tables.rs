@@ -1,7 +1,7 @@
 //! The tables of `docs/job-files.md`, in Markdown.
 
 use osteon_common::case::Setup;
-use osteon_common::fields::{DeclaredKey, Key, DeclaredValue, entries};
+use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
 use osteon_common::job::RunSettings;
 use osteon_common::parameters::Parameter;
 

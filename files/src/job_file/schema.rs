@@ -1,7 +1,7 @@
 //! The JSON Schema of job files, by which editors complete them.
 
 use osteon_common::case::Setup;
-use osteon_common::fields::{Edge, DeclaredKey, Interval, Key, DeclaredValue, entries};
+use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::RunSettings;
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};

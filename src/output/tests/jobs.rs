@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn jobs() -> Vec<JobSnapshot> {
+pub(super) fn jobs() -> Vec<JobSnapshot> {
     let running = JobSnapshot {
         job: "1".to_owned(),
         kind: KindMessage::Identification.into(),
