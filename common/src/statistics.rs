@@ -30,6 +30,13 @@ pub(crate) use self::sum::Sum;
 ///
 /// Two passes, first the mean and then the deviations from it, avoid cancellation. The variance is
 /// that of the set (division by N, as in the paper).
+///
+/// ```
+/// use osteon_common::statistics::moments;
+///
+/// let found = moments(&[3900.0, 4100.0]).unwrap();
+/// assert_eq!((found.mean, found.coefficient_of_variation), (4000.0, 0.025));
+/// ```
 pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
 }

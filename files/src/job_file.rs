@@ -64,6 +64,19 @@ pub fn read_with_warnings(path: &Path, kind: JobKind) -> Result<JobWithWarnings,
 
 /// Reads and validates the text of a job file in `directory`; otherwise the same as [`read`].
 ///
+/// ```
+/// use std::path::Path;
+///
+/// use osteon_common::job::JobKind;
+/// use osteon_files::document::Format;
+/// use osteon_files::job_file;
+///
+/// let text = "[monte_carlo]\nrealisations = 100";
+/// let refused = job_file::parse(text, Format::Toml, Path::new(""), JobKind::Propagation);
+/// let message = refused.unwrap_err().to_string();
+/// assert!(message.contains("monte_carlo.realisations: unknown key; did you mean `realizations`?"));
+/// ```
+///
 /// # Errors
 /// If the text is malformed or violates a rule; all violations are reported at once.
 pub fn parse(

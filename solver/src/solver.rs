@@ -99,6 +99,25 @@ impl Solver {
 
     /// Computes the first arrival of one bone.
     ///
+    /// ```
+    /// use osteon_common::case::{Bone, Setup};
+    /// use osteon_common::elasticity::EngineeringConstants;
+    /// use osteon_solver::{Solver, Workspace};
+    ///
+    /// let constants = EngineeringConstants {
+    ///     longitudinal_young_modulus: 17.717e9,
+    ///     longitudinal_poisson_ratio: 0.3816,
+    ///     longitudinal_shear_modulus: 4.795e9,
+    ///     transverse_young_modulus: 9.8254e9,
+    ///     transverse_poisson_ratio: 0.4495,
+    /// };
+    /// let bone = Bone { density: 1598.8, elasticity: constants.elasticity().unwrap() };
+    /// let solver = Solver::new(&Setup::default());
+    /// let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
+    /// assert!((3900.0..3920.0).contains(&arrival.velocity));
+    /// assert_eq!(arrival.times.len(), 14); // one for each receiver
+    /// ```
+    ///
     /// # Errors
     /// A typed failure if the case has no velocity.
     pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {

@@ -45,6 +45,15 @@ impl DeclaredKey {
 }
 
 /// Returns all keys of a section with their values.
+///
+/// ```
+/// use osteon_common::fields::{DeclaredValue, entries};
+/// use osteon_common::job::MonteCarlo;
+///
+/// let keys = entries(&mut MonteCarlo::default());
+/// assert_eq!(keys[0].key.name, "realizations");
+/// assert!(matches!(keys[0].value, DeclaredValue::Whole(2747, _)));
+/// ```
 pub fn entries(section: &mut dyn Section) -> Vec<DeclaredKey> {
     let mut collector = Collector::default();
     section.declare(&mut collector);
