@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::evaluation::{self, Evaluation};
+use crate::evaluation::{self, EvaluationInput};
 use crate::malformed::Malformed;
 use crate::v1;
 
@@ -21,7 +21,7 @@ pub struct Announced<T> {
 }
 
 /// The evaluations that a worker has received.
-pub type Received = Announced<Arc<Evaluation>>;
+pub type Received = Announced<Arc<EvaluationInput>>;
 
 impl<T> Default for Announced<T> {
     fn default() -> Self {
@@ -74,9 +74,9 @@ mod tests {
     use super::*;
     use crate::batch::{self, Work};
 
-    fn evaluation(id: u64) -> Evaluation {
+    fn evaluation(id: u64) -> EvaluationInput {
         let germs = GermSource::streams(id);
-        Evaluation { id, setup: Setup::default(), point: Point([1.0; 7]), germs }
+        EvaluationInput { id, setup: Setup::default(), point: Point([1.0; 7]), germs }
     }
 
     properties! {

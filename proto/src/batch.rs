@@ -6,7 +6,7 @@ use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX};
 use osteon_common::outcome::{self, RealizationResult};
 
 use crate::announced::Received;
-use crate::evaluation::Evaluation;
+use crate::evaluation::EvaluationInput;
 use crate::malformed::Malformed;
 use crate::realizations;
 use crate::v1;
@@ -16,7 +16,7 @@ use crate::v1;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Work {
     /// The evaluation.
-    pub evaluation: Arc<Evaluation>,
+    pub evaluation: Arc<EvaluationInput>,
     /// Index of the first realization.
     pub first: u64,
     /// Number of realizations, 1 to [`BATCH_REALIZATIONS_MAX`].
@@ -93,7 +93,7 @@ mod tests {
     use crate::evaluation;
 
     fn evaluation(id: u64) -> v1::Evaluation {
-        evaluation::to_message(&Evaluation {
+        evaluation::to_message(&EvaluationInput {
             id,
             setup: Setup::default(),
             point: Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),

@@ -17,7 +17,7 @@ use crate::v1;
 /// The part that all batches of one evaluation have in common. With it, an index determines a
 /// realization.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evaluation {
+pub struct EvaluationInput {
     /// Number of the evaluation, unique for the life of the coordinator.
     pub id: u64,
     /// Layers, probe, picking, solver.
@@ -29,7 +29,7 @@ pub struct Evaluation {
 }
 
 /// Returns the message of an evaluation.
-pub fn to_message(evaluation: &Evaluation) -> v1::Evaluation {
+pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
     let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&evaluation.setup);
     let (sampling, points) = match evaluation.germs.scheme {
         GermScheme::Streams => (Sampling::MonteCarlo, None),
@@ -53,7 +53,7 @@ pub fn to_message(evaluation: &Evaluation) -> v1::Evaluation {
 /// # Errors
 /// If the setup is incomplete (a worker must not fill in its own defaults) or invalid, if the point
 /// does not have seven finite numbers, or if a number is beyond its limit.
-pub fn from_message(message: &v1::Evaluation) -> Result<Evaluation, Malformed> {
+pub fn from_message(message: &v1::Evaluation) -> Result<EvaluationInput, Malformed> {
     if message.seed > SEED_MAX {
         let allowed = "it must be at most 2^63 - 1";
         return Err(Malformed::OutOfRange { field: "seed", value: message.seed as f64, allowed });
@@ -64,7 +64,7 @@ pub fn from_message(message: &v1::Evaluation) -> Result<Evaluation, Malformed> {
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
     let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
     let point = point_from_message(message.point.as_ref())?;
-    Ok(Evaluation { id: message.evaluation, setup, point, germs })
+    Ok(EvaluationInput { id: message.evaluation, setup, point, germs })
 }
 
 /// Returns the scheme by which germs are generated from the seed.
@@ -114,7 +114,7 @@ mod tests {
 
     use super::*;
 
-    const EVALUATION: fn(u64, f64, u64) -> Evaluation = |id, density, seed| Evaluation {
+    const EVALUATION: fn(u64, f64, u64) -> EvaluationInput = |id, density, seed| EvaluationInput {
         id,
         setup: Setup::default(),
         point: Point([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),

@@ -72,9 +72,9 @@ fn check_specification(bytes: &[u8]) {
 }
 
 /// The evaluation at the start of a job.
-fn evaluation_of(job: &JobSpecification) -> evaluation::Evaluation {
+fn evaluation_of(job: &JobSpecification) -> evaluation::EvaluationInput {
     let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
-    evaluation::Evaluation { id: 7, setup, point, germs }
+    evaluation::EvaluationInput { id: 7, setup, point, germs }
 }
 
 fn evaluations() -> Vec<Vec<u8>> {

@@ -216,7 +216,7 @@ impl State {
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
         let evaluation = self.evaluation_of(assignment)?;
         let specification = &self.jobs.get(&assignment.job)?.record.specification;
-        let shared = evaluation::Evaluation {
+        let shared = evaluation::EvaluationInput {
             // Attempts are numbered over all jobs.
             id: evaluation.attempt,
             setup: specification.setup,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use osteon_proto::announced::Announced;
 use osteon_proto::batch::{self, Work};
-use osteon_proto::evaluation::{self, Evaluation};
+use osteon_proto::evaluation::{self, EvaluationInput};
 use osteon_proto::status::resource_exhausted;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::{AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerWelcome};
@@ -80,7 +80,7 @@ pub(crate) fn welcome(worker: WorkerId, lease: LeaseId, config: &Config) -> Atta
 }
 
 /// Returns the message that announces an evaluation.
-fn evaluation(evaluation: &Evaluation) -> AttachResponse {
+fn evaluation(evaluation: &EvaluationInput) -> AttachResponse {
     respond(Response::Evaluation(evaluation::to_message(evaluation)))
 }
 
@@ -139,13 +139,14 @@ mod tests {
     use osteon_common::germ_source::GermSource;
     use osteon_common::parameters::Point;
     use osteon_proto::announced::{EVALUATIONS_KEPT_MAX, Received};
-    use osteon_proto::evaluation::Evaluation;
+    use osteon_proto::evaluation::EvaluationInput;
 
     use super::*;
 
     fn work(id: u64) -> Work {
         let germs = GermSource::streams(id);
-        let evaluation = Evaluation { id, setup: Setup::default(), point: Point([1.0; 7]), germs };
+        let evaluation =
+            EvaluationInput { id, setup: Setup::default(), point: Point([1.0; 7]), germs };
         Work { evaluation: Arc::new(evaluation), first: 0, count: 1 }
     }
 

@@ -16,7 +16,7 @@ use osteon_coordinator::core::event::{Event, Hello, Request};
 use osteon_coordinator::core::ids::{JobId, WorkerId};
 use osteon_coordinator::store::Store;
 use osteon_proto::batch::Work;
-use osteon_proto::evaluation::Evaluation;
+use osteon_proto::evaluation::EvaluationInput;
 use osteon_proto::v1::WorkerHello;
 use osteon_search::{Ending, Search as Driven, Step};
 
@@ -186,7 +186,7 @@ pub(crate) fn evaluation(
     specification: &JobSpecification,
     point: Point,
 ) -> (Arc<[Outcome]>, Option<EstimatedError>) {
-    let evaluation = Arc::new(Evaluation {
+    let evaluation = Arc::new(EvaluationInput {
         id: 1,
         setup: specification.setup,
         point,

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
-use osteon_proto::evaluation::Evaluation;
+use osteon_proto::evaluation::EvaluationInput;
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn work(point: Point, first: u64, count: u32) -> Work {
 }
 
 fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
-    let evaluation = Evaluation { id: 1, setup: Setup::default(), point, germs };
+    let evaluation = EvaluationInput { id: 1, setup: Setup::default(), point, germs };
     Work { evaluation: Arc::new(evaluation), first, count }
 }
 

@@ -11,7 +11,7 @@ use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::RealizationResult;
 use osteon_common::parameters::Point;
 use osteon_proto::batch::{self, Work};
-use osteon_proto::evaluation::{self, Evaluation};
+use osteon_proto::evaluation::{self, EvaluationInput};
 use osteon_proto::v1::attach_response::Message as Reply;
 use osteon_proto::v1::workers_server::{Workers, WorkersServer};
 use osteon_proto::v1::{Batch, BatchRevoke, WorkerDrain, WorkerWelcome};
@@ -114,7 +114,7 @@ async fn take_answers(
 
 fn work() -> Work {
     let (setup, germs) = (Setup::default(), GermSource::streams(5));
-    let evaluation = Evaluation { id: 1, setup, point: Point([1.0; 7]), germs };
+    let evaluation = EvaluationInput { id: 1, setup, point: Point([1.0; 7]), germs };
     Work { evaluation: Arc::new(evaluation), first: 7, count: 2 }
 }
 

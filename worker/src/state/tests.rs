@@ -5,7 +5,7 @@ use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_proto::announced::EVALUATIONS_KEPT_MAX;
-use osteon_proto::evaluation::{self, Evaluation};
+use osteon_proto::evaluation::{self, EvaluationInput};
 
 use super::*;
 
@@ -60,7 +60,7 @@ impl Recorder {
 
     /// Receives an evaluation that can be read.
     fn evaluation(&mut self, id: u64) {
-        let sent = Evaluation { id, ..*work().evaluation };
+        let sent = EvaluationInput { id, ..*work().evaluation };
         self.message(Response::Evaluation(evaluation::to_message(&sent)));
         self.nothing_else();
     }
@@ -91,7 +91,7 @@ impl Recorder {
 
 fn work() -> Work {
     let (setup, germs) = (Setup::default(), GermSource::streams(1));
-    let evaluation = Evaluation { id: EVALUATION, setup, point: POINT, germs };
+    let evaluation = EvaluationInput { id: EVALUATION, setup, point: POINT, germs };
     Work { evaluation: Arc::new(evaluation), first: 10, count: 2 }
 }
 

@@ -7,9 +7,9 @@ use osteon_proto::{specification, v1};
 use prost::Message as _;
 use rusqlite::Row;
 
-use super::columns::{JobColumns, job_checksum};
-use super::{JobRecord, nanoseconds};
+use super::columns::{JobColumns, job_checksum, nanoseconds};
 use crate::core::ids::JobId;
+use crate::store::JobRecord;
 
 /// Returns the job of a row, and its identifier; `None` if the row is damaged.
 pub(super) fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
