@@ -39,7 +39,7 @@ impl Environment {
     /// Reads the variables through the function `variable`.
     ///
     /// # Errors
-    /// Same as [`of_process`](Self::of_process).
+    /// Same as [`from_process`](Self::from_process).
     pub(crate) fn read(
         variable: impl Fn(&str) -> Option<OsString>,
     ) -> Result<Self, CommandFailure> {
