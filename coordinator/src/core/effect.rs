@@ -88,8 +88,8 @@ pub enum Effect {
     },
     /// Write a notice for the operator into the log.
     Note(Notice),
-    /// Give up because the store no longer accepts records.
-    GiveUp {
+    /// Report that the store has failed: it has refused a record for longer than configured.
+    ReportStoreFailure {
         /// Its last error.
         error: String,
         /// Time for which it has refused a record.

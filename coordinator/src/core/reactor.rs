@@ -63,7 +63,7 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
         Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
         Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
-        Event::Stored { job, key } => records::stored(turn, job, key),
+        Event::Stored { job, key } => records::on_record_stored(turn, job, key),
         Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
             bans::store_failed(turn, number, error);
         }

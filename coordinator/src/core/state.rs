@@ -208,7 +208,7 @@ impl State {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
         let banned = self.banned.iter().filter(on_its_way).count();
         let jobs =
-            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_trouble.is_none());
+            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_retry.is_none());
         jobs.count() + banned
     }
 

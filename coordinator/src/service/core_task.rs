@@ -198,7 +198,7 @@ impl Core {
                 }
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
-                Effect::GiveUp { error, waited } => {
+                Effect::ReportStoreFailure { error, waited } => {
                     self.failing.report(ComponentFailure::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),

@@ -438,7 +438,7 @@ impl World {
                 Effect::Prune { token, jobs } => self.within(20, Occurrence::Forget(token, jobs)),
                 Effect::Answer { token, answer } => self.answered(token, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
-                Effect::GiveUp { .. } => panic!("nobody lacks patience"),
+                Effect::ReportStoreFailure { .. } => panic!("nobody lacks patience"),
                 Effect::Stop => self.stopped(),
             }
         }

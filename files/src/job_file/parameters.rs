@@ -82,8 +82,8 @@ fn bounds(reader: &mut Reader, table: &Table<'_>) -> Option<[f64; 2]> {
     let numbers = reader.numbers(&path, elements)?;
     let bounds = <[f64; 2]>::try_from(numbers).ok();
     if bounds.is_none() {
-        let count = elements.len();
-        reader.violations.add(path, format!("is a list of {count}; it must be {expected}"));
+        let found = &table.get("bounds")?.value;
+        reader.violations.add(path, format!("is {found}; it must be {expected}"));
     }
     bounds
 }

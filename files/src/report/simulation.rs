@@ -37,7 +37,7 @@ pub struct Simulation {
 impl Simulation {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        super::text(DocumentContent::Simulation(self))
+        super::to_pretty_json(DocumentContent::Simulation(self))
     }
 }
 

@@ -21,7 +21,7 @@ pub enum Solver<E> {
         period: Option<f64>,
         /// Number of (frequency, wavenumber) pairs.
         pairs: Option<u64>,
-        /// Estimated relative error of the velocity, or of a set of them, by discretisation.
+        /// Estimated relative error of the velocity, or of a set of them, due to discretisation.
         estimated_error: E,
         /// Number of pairs that were computed in all; only of a simulation.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -40,7 +40,7 @@ pub enum Solver<E> {
         element_order: u32,
         /// Time step of the first pass at refinement 1, s; null for the stability limit.
         time_step: Option<f64>,
-        /// Estimated relative error of the velocity, or of a set of them, by discretisation.
+        /// Estimated relative error of the velocity, or of a set of them, due to discretisation.
         estimated_error: E,
     },
 }

@@ -227,7 +227,7 @@ fn described(effect: &Effect) -> String {
         }
         Effect::Answer { token, answer } => format!("answer {token}: {}", answered(answer)),
         Effect::Publish { job, .. } => format!("publish {job}"),
-        Effect::GiveUp { error, waited } => format!("give_up after {waited:?}: {error}"),
+        Effect::ReportStoreFailure { error, waited } => format!("give_up after {waited:?}: {error}"),
         Effect::Stop => "stop".to_owned(),
     }
 }

@@ -90,8 +90,8 @@ fn submit(
         name,
     };
     turn.effects.push(Effect::Store(Record::Job(record.clone())));
-    let mut job = Job::new(record, Stage::Accepting, 0, turn.now);
-    job.tokens.push(token);
+    let mut job = Job::new(record, Stage::StoringSubmission, 0, turn.now);
+    job.pending_requests.push(token);
     turn.state.jobs.insert(id, job);
     Ok(None)
 }
@@ -142,8 +142,8 @@ fn resubmit(
         return Err(Refusal::RequestIdTaken { request_id, job: id });
     }
     match state.jobs.get_mut(&id) {
-        Some(job) if matches!(job.stage, Stage::Accepting) => {
-            job.tokens.push(token);
+        Some(job) if matches!(job.stage, Stage::StoringSubmission) => {
+            job.pending_requests.push(token);
             Ok(None)
         }
         _ => Ok(Some(Answer::Submitted(id))),
@@ -171,8 +171,8 @@ fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Ans
 /// Cancels a job; the client is answered when its end is durable.
 fn cancel(turn: &mut Turn, token: Token, id: JobId) -> Option<Answer> {
     match turn.state.jobs.get_mut(&id) {
-        Some(job) if !matches!(job.stage, Stage::Accepting) => {
-            job.tokens.push(token);
+        Some(job) if !matches!(job.stage, Stage::StoringSubmission) => {
+            job.pending_requests.push(token);
             jobs::cancel(turn, id);
             None
         }
@@ -185,7 +185,7 @@ fn fetch(state: &State, id: JobId) -> Answer {
         return Answer::Ended(ended.end.clone());
     }
     match state.jobs.get(&id).map(|job| &job.stage) {
-        None | Some(Stage::Accepting) => Answer::Refused(Refusal::NoJob { job: id }),
+        None | Some(Stage::StoringSubmission) => Answer::Refused(Refusal::NoJob { job: id }),
         Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
     }
 }
