@@ -34,7 +34,7 @@ pub const ELEMENT_ORDER_MIN: u32 = 2;
 pub const ELEMENT_ORDER_MAX: u32 = 12;
 /// Maximum number of (frequency, wavenumber) pairs of one realization.
 pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
-/// Maximum size of a CSV file of velocities, bytes.
+/// Maximum size of a CSV file of velocities, and of an output file that osteon reads again, bytes.
 pub const FILE_BYTES_MAX: u64 = 64 << 20;
 /// Maximum length of a line of a CSV file of velocities, bytes.
 pub const LINE_BYTES_MAX: usize = 64 << 10;

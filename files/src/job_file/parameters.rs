@@ -10,11 +10,11 @@ use crate::reader::{Reader, Table};
 
 /// The keys of a range.
 pub(super) const KEYS: [Key; 3] = [
-    Key { name: "start", meaning: "first value of a free parameter, within its bounds" },
+    Key { name: "start", meaning: "value at which the search starts, within the bounds" },
     Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
     Key {
         name: "fixed",
-        meaning: "instead of both: the value of a parameter that is not searched",
+        meaning: "instead of both: the value of a parameter that is held fixed",
     },
 ];
 

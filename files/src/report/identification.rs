@@ -255,7 +255,7 @@ pub struct SearchSettings {
     pub starts: u64,
     /// Whether the derivatives of both moments were to be measured.
     pub sensitivities: bool,
-    /// Values that parameters are drawn to; only with priors.
+    /// Values expected from prior knowledge; only with priors.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(transform = keyed_by_parameter)]
     pub priors: BTreeMap<Parameter, Prior>,
