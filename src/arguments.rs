@@ -349,7 +349,7 @@ pub(crate) struct FetchArguments {
 /// Of `certs`.
 #[derive(Debug, Args)]
 pub(crate) struct CertsArguments {
-    /// Directory in which to create the files; existing files are not overwritten
+    /// Directory in which to create the files; if one of them exists already, none is created
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// Host name or IP address of the coordinator, besides localhost, 127.0.0.1 and ::1; may be

@@ -93,7 +93,7 @@ impl Hybrid {
     /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure if the case has no velocity; `NoConvergence` also if the time step is above
+    /// The failure, if the case has no velocity; `NoConvergence` also if the time step is above
     /// the stability limit, or the computation exceeds its limits.
     pub fn arrival(
         &self,

@@ -100,7 +100,7 @@ impl Solver {
     /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure if the case has no velocity.
+    /// The failure, if the case has no velocity.
     pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
         match self.setup.solver.method {
             Method::Exact => self.exact.arrival(bone, &mut workspace.exact),
