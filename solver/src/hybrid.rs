@@ -1,4 +1,4 @@
-//! The paper's own solver: Fourier in x1, spectral elements in x3, time steps.
+//! The paper's own method: Fourier in x1, spectral elements in x3, time steps.
 //!
 //! One wavenumber at a time, the weak form of fluid, solid and fluid (`operator.rs`) is stepped
 //! through time (`stepping.rs`) under the pressure of the source on the bone's face

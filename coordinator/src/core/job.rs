@@ -9,7 +9,7 @@ use osteon_proto::specification;
 use prost::Message as _;
 
 use crate::core::evaluation::PendingEvaluation;
-use crate::core::ids::{BatchId, Token};
+use crate::core::ids::{BatchId, ReplyId};
 use crate::core::rate::Rate;
 use crate::core::realization_time::RealizationTime;
 use crate::core::worker_name::WorkerName;
@@ -48,7 +48,7 @@ pub(crate) struct Job {
     pub(crate) progressed: Duration,
     /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
-    pub(crate) pending_requests: Vec<Token>,
+    pub(crate) pending_replies: Vec<ReplyId>,
     /// The store's refusal of the current record.
     pub(crate) store_retry: Option<StoreRetry>,
 }
@@ -73,7 +73,7 @@ impl Job {
             newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,
-            pending_requests: Vec::new(),
+            pending_replies: Vec::new(),
             store_retry: None,
         }
     }

@@ -53,7 +53,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
 fn apply(turn: &mut Turn, event: Event) {
     match event {
         Event::Tick => tick(turn),
-        Event::Requested { token, request } => requests::requested(turn, token, request),
+        Event::Requested { reply_id, request } => requests::requested(turn, reply_id, request),
         Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
         Event::Answered { worker, batch, solved, elapsed_s } => {
             answers::answered(turn, worker, batch, solved, elapsed_s);
@@ -69,7 +69,7 @@ fn apply(turn: &mut Turn, event: Event) {
         }
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
-        Event::Pruned { token, jobs, outcome } => prune::pruned(turn, token, jobs, outcome),
+        Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
         Event::Drain => workers::drain_all(turn),
     }
 }

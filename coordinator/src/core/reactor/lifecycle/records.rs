@@ -24,8 +24,8 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             job.store_retry = None;
             turn.state.waiting.push_back(id);
             turn.effects.push(Effect::Note(accepted_notice(&job.record)));
-            for token in std::mem::take(&mut job.pending_requests) {
-                turn.effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
+            for reply_id in std::mem::take(&mut job.pending_replies) {
+                turn.effects.push(Effect::Answer { reply_id, answer: Answer::Submitted(id) });
             }
             if jobs::has_room(turn.state, id) {
                 jobs::begin_waiting(turn);
@@ -64,9 +64,9 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
         return;
     };
     if matches!(job.stage, Stage::StoringSubmission) {
-        for token in std::mem::take(&mut job.pending_requests) {
+        for reply_id in std::mem::take(&mut job.pending_replies) {
             let answer = Answer::Refused(Refusal::Store { error: error.clone() });
-            turn.effects.push(Effect::Answer { token, answer });
+            turn.effects.push(Effect::Answer { reply_id, answer });
         }
         if let Some(request) = RequestName::from_record(&job.record) {
             turn.state.requests.remove(&request);
@@ -116,7 +116,7 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
 
 /// Handles the report that the end of a job is durable.
 fn on_end_stored(turn: &mut Turn, id: JobId) {
-    let Some(Job { record, stage: Stage::StoringEnd(end), pending_requests, sequence, .. }) =
+    let Some(Job { record, stage: Stage::StoringEnd(end), pending_replies, sequence, .. }) =
         turn.state.jobs.remove(&id)
     else {
         return;
@@ -134,9 +134,9 @@ fn on_end_stored(turn: &mut Turn, id: JobId) {
     let Some(snapshot) = snapshot::job_snapshot(turn.state, id, turn.now) else {
         return;
     };
-    for token in pending_requests {
+    for reply_id in pending_replies {
         let answer = Answer::Snapshot(snapshot.clone());
-        turn.effects.push(Effect::Answer { token, answer });
+        turn.effects.push(Effect::Answer { reply_id, answer });
     }
     // Published at once instead of with the other jobs, because clients wait for it.
     turn.effects.push(Effect::Publish { job: id, snapshot });
