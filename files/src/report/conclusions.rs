@@ -14,8 +14,8 @@ use super::{MeanModel, Moments, finite_or_null};
 /// What the data determine, to first order around the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identified {
-    /// Whether the model matches the data within three standard errors of all noise; if not, nothing is
-    /// known.
+    /// Whether the model reproduces each moment of the data to within three standard errors (data and
+    /// sampling noise combined), or to within a relative difference of 1e-4; if not, nothing is known.
     pub matched: bool,
     /// Level of all intervals.
     pub level: f64,
