@@ -243,8 +243,8 @@ mod tests {
         bulk_velocity(point).unwrap().logarithm
     }
 
-    /// In random boxes within the usual one, no random point has a lower or a higher bulk velocity than the
-    /// two corners.
+    /// In random boxes within the usual one, no random point has a lower or a higher bulk velocity
+    /// than the two corners.
     #[test]
     fn no_point_is_beyond_the_corners() {
         let mut bounded = 0;

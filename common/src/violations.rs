@@ -29,8 +29,8 @@ impl fmt::Display for Violation {
 
 /// All violations of one specification, in the order in which they were found.
 ///
-/// A check that relates several fields calls [`Violations::has_at_or_below`] first and reports nothing if
-/// one of them is already known to be wrong, so that each mistake is reported once.
+/// A check that relates several fields calls [`Violations::has_at_or_below`] first and reports
+/// nothing if one of them is already known to be wrong, so that each mistake is reported once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Violations(Vec<Violation>);
 

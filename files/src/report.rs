@@ -25,7 +25,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub use self::conclusions::{
     Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solution, Solutions, Spreads,
 };
-pub use self::error::{PointError, ReadError, listed};
+pub use self::error::{BestPointError, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};
 pub use self::moments::{Data, Moment, MomentIntervals, Moments, Velocity};
 pub use self::point::MeanModel;
@@ -120,21 +120,22 @@ impl ResultFile {
     ///
     /// # Errors
     /// If there is no such group, or no point was found.
-    pub fn best_point(&self, group: Option<&str>) -> Result<Point, PointError> {
+    pub fn best_point(&self, group: Option<&str>) -> Result<Point, BestPointError> {
         let (parameters, dispersion) = match (group, self) {
             (Some(name), _) => {
                 let found = self.groups().iter().find(|group| group.name == name);
-                let found = found.ok_or_else(|| PointError::unknown_group(name, self.groups()))?;
+                let found = found.ok_or_else(|| BestPointError::unknown_group(name, self.groups()))?;
                 (&found.parameters, found.dispersion)
             }
             (None, Self::Identification(result)) => (&result.parameters, result.dispersion),
             (None, Self::Propagation(result)) => (&result.parameters, result.dispersion),
         };
-        parameters.point(dispersion).ok_or(PointError::NoPointFound)
+        parameters.point(dispersion).ok_or(BestPointError::NoPointFound)
     }
 }
 
-/// The result of an osteon run, as written to `result.json` and printed by `--json`. Units are SI: m, s, kg/m³, Pa, Hz.
+/// The result of an osteon run, as written to `result.json` and printed by `--json`. Units are SI: m, s,
+/// kg/m³, Pa, Hz.
 #[derive(Serialize, JsonSchema)]
 #[schemars(title = "osteon result")]
 struct Document<'a> {
@@ -157,7 +158,7 @@ enum DocumentContent<'a> {
     Simulation(&'a Simulation),
 }
 
-#[expect(clippy::expect_used, reason = "serialization fails only for map keys that are not strings, and all keys are strings")]
+#[expect(clippy::expect_used, reason = "it fails only for map keys that are not strings")]
 fn to_pretty_json(content: DocumentContent<'_>) -> String {
     let document = Document { schema: RESULT_SCHEMA, content };
     serde_json::to_string_pretty(&document).expect("keys are strings") + "\n"

@@ -334,8 +334,8 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     }
 }
 
-/// Refuses data that no point within the bounds can match even approximately, by the closed form of √(c1111/ρ) and
-/// δ.
+/// Refuses data that no point within the bounds can match even approximately, by the closed form of
+/// √(c1111/ρ) and δ.
 fn within_reach(specification: &JobSpecification, violations: &mut Violations) {
     let fields = ["data", "parameters", "layers", "probe"];
     if fields.iter().any(|field| known_wrong(field, violations)) {

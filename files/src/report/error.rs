@@ -67,7 +67,7 @@ impl From<serde_path_to_error::Error<serde_json::Error>> for ReadError {
 
 /// Why a result has no point to give.
 #[derive(Debug, Error)]
-pub enum PointError {
+pub enum BestPointError {
     /// There is no group of this name.
     #[error("there is no group {name:?}; the groups are {}", listed(.names))]
     UnknownGroup {
@@ -81,7 +81,7 @@ pub enum PointError {
     NoPointFound,
 }
 
-impl PointError {
+impl BestPointError {
     pub(super) fn unknown_group(name: &str, groups: &[Group]) -> Self {
         let names = groups.iter().map(|group| group.name.clone()).collect();
         Self::UnknownGroup { name: name.to_owned(), names }

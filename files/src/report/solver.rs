@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Solver<E> {
-    /// Exact solution of the layered medium for each frequency and wavenumber. In the result of a job the sampling is the nominal
-    /// one, at the usual speeds of bone, and a realization with faster waves may use another.
+    /// Exact solution of the layered medium for each frequency and wavenumber. In the result of a job the
+    /// sampling is the nominal one, at the usual speeds of bone, and a realization with faster waves may
+    /// use another.
     Exact {
         /// Refinement of the sampling; 1 is the default.
         refinement: f64,
