@@ -3,10 +3,10 @@
 //!
 //! They never change a job: the point nearest to such data is a valid result, too.
 
+use osteon_common::attainable_moments::{self, AttainableMoments};
 use osteon_common::case::{Bone, Setup};
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::attainable_moments::{self, AttainableMoments};
 use osteon_common::results::Moments;
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
@@ -108,7 +108,12 @@ impl ClosedFormMoments {
         let slowest = corner(Some(attainable_moments::lowest_bulk_velocity_point(ranges)));
         let fastest = corner(attainable_moments::highest_bulk_velocity_point(ranges));
         let start = velocity(&specification.start()).unwrap_or(Ok(f64::NAN));
-        Self { slowest, fastest, start, variation: AttainableMoments::from_ranges(ranges, setup).variation }
+        Self {
+            slowest,
+            fastest,
+            start,
+            variation: AttainableMoments::from_ranges(ranges, setup).variation,
+        }
     }
 
     /// Returns which moments of data with this number of velocities are out of reach, each with the

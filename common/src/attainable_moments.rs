@@ -100,12 +100,15 @@ pub fn highest_bulk_velocity_point(ranges: &[Range; 7]) -> Option<Point> {
 
 /// If no set of the data can be matched even approximately within the bounds, returns the offending
 /// field and the error message.
-pub(crate) fn unattainable_data(specification: &JobSpecification) -> Option<(&'static str, String)> {
+pub(crate) fn unattainable_data(
+    specification: &JobSpecification,
+) -> Option<(&'static str, String)> {
     let data = specification.data.as_ref()?;
     if specification.kind != JobKind::Identification {
         return None;
     }
-    let attainable = AttainableMoments::from_ranges(&specification.parameters, &specification.setup);
+    let attainable =
+        AttainableMoments::from_ranges(&specification.parameters, &specification.setup);
     let mut first = None;
     for set in 0..data.sets() {
         let count = data.velocities(set).map(<[f64]>::len);

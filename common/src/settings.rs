@@ -106,7 +106,8 @@ impl Default for SolverSettings {
 
 impl Section for Picking {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        let extremum = "whether the first or the second extremum of the packet gives the time of flight";
+        let extremum =
+            "whether the first or the second extremum of the packet gives the time of flight";
         fields.choice(Key { name: "extremum", meaning: extremum }, &mut self.extremum);
         fields.number(
             Key {

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_SECONDS_MAX, JOBS_BYTES_MAX};
+use osteon_common::limits::{
+    ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_SECONDS_MAX, JOBS_BYTES_MAX,
+};
 
 use crate::core::audit::AuditKey;
 

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::{
-    HEADER_BYTES_MAX, SMALL_SUBMISSION_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_PER_CALLER_MAX,
-    WORKER_MESSAGE_BYTES_MAX,
+    HEADER_BYTES_MAX, SMALL_SUBMISSION_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX,
+    SUBMISSIONS_PER_CALLER_MAX, WORKER_MESSAGE_BYTES_MAX,
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};

@@ -10,7 +10,8 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::{
-    BATCH_REALIZATIONS_MAX, FETCHES_PER_CALLER_MAX, READER_STALL_SECONDS_MAX, SUBMISSIONS_AT_ONCE_MAX,
+    BATCH_REALIZATIONS_MAX, FETCHES_PER_CALLER_MAX, READER_STALL_SECONDS_MAX,
+    SUBMISSIONS_AT_ONCE_MAX,
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};

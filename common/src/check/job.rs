@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::accepted::{Interval, written};
+use crate::attainable_moments;
 use crate::field_path::{element_path, entry_path};
 use crate::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
@@ -13,7 +14,6 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::plausible::{self, PlausibleRange, short};
 use crate::quantile::quantile;
-use crate::attainable_moments;
 use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
@@ -162,7 +162,9 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
             None => velocities(&field, measured, (origin, set), violations),
         }
     }
-    if !violations.has_at_or_below("data") && groups.iter().all(|group| group.no_variation().is_some()) {
+    if !violations.has_at_or_below("data")
+        && groups.iter().all(|group| group.no_variation().is_some())
+    {
         violations.add(
             FIELD,
             format!("none of the {count} has two velocities that differ, which {MOMENTS_NEED}"),
@@ -428,7 +430,9 @@ fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
     if !asked || known_wrong(FIELD, violations) {
         return;
     }
-    if matches!(specification.data, Some(Data::Moments { .. })) && !violations.has_at_or_below("data") {
+    if matches!(specification.data, Some(Data::Moments { .. }))
+        && !violations.has_at_or_below("data")
+    {
         violations.add(
             FIELD,
             "is \"likelihood\", which needs the measured velocities as data.velocities; with data.mean and \

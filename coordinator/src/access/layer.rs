@@ -7,7 +7,8 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use osteon_common::limits::{
-    SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_SECONDS_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_PER_CALLER_MAX,
+    SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_SECONDS_MAX, SUBMISSIONS_AT_ONCE_MAX,
+    SUBMISSIONS_PER_CALLER_MAX,
 };
 use tokio::sync::watch;
 use tonic::body::Body;

@@ -129,7 +129,10 @@ pub(crate) enum Stage {
 impl Stage {
     /// Whether a record of the job is not durable yet.
     pub(crate) fn is_storing(&self) -> bool {
-        matches!(self, Self::StoringSubmission | Self::StoringEvaluation { .. } | Self::StoringEnd(_))
+        matches!(
+            self,
+            Self::StoringSubmission | Self::StoringEvaluation { .. } | Self::StoringEnd(_)
+        )
     }
 }
 

@@ -159,9 +159,10 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
                 .unwrap_or_else(|| format!("a worker that takes batches {}", since(job.progressed)))
         }
         Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
-        Stage::StoringSubmission | Stage::Computing(_) | Stage::StoringEvaluation { .. } | Stage::StoringEnd(_) => {
-            String::new()
-        }
+        Stage::StoringSubmission
+        | Stage::Computing(_)
+        | Stage::StoringEvaluation { .. }
+        | Stage::StoringEnd(_) => String::new(),
     }
 }
 

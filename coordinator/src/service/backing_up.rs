@@ -35,7 +35,8 @@ pub(crate) fn streamed(
     tokio::spawn(async move {
         let _place = place;
         let begun = Instant::now();
-        let outgoing = PartSender { sender, until: begun + Duration::from_secs(BACKUP_SECONDS_MAX) };
+        let outgoing =
+            PartSender { sender, until: begun + Duration::from_secs(BACKUP_SECONDS_MAX) };
         match send(copied, &outgoing).await {
             Ok(bytes) => {
                 let elapsed_s = begun.elapsed().as_secs_f64();

@@ -435,7 +435,9 @@ impl World {
                     self.within(20, Occurrence::Write(record));
                 }
                 Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
-                Effect::Prune { reply_id, jobs } => self.within(20, Occurrence::Forget(reply_id, jobs)),
+                Effect::Prune { reply_id, jobs } => {
+                    self.within(20, Occurrence::Forget(reply_id, jobs))
+                }
                 Effect::Answer { reply_id, answer } => self.answered(reply_id, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
                 Effect::ReportStoreFailure { .. } => panic!("nobody lacks patience"),

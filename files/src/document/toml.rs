@@ -59,7 +59,10 @@ impl TreeBuilder {
                 .into_iter()
                 .map(|(key, value)| {
                     let line = Some(self.line_at(key.span().start));
-                    (key.get_ref().to_string(), Node { line, value: self.convert_value(value.get_ref()) })
+                    (
+                        key.get_ref().to_string(),
+                        Node { line, value: self.convert_value(value.get_ref()) },
+                    )
                 })
                 .collect(),
         )
@@ -80,7 +83,10 @@ impl TreeBuilder {
     }
 
     fn convert_element(&self, element: &Spanned<DeValue<'_>>) -> Node {
-        Node { line: Some(self.line_at(element.span().start)), value: self.convert_value(element.get_ref()) }
+        Node {
+            line: Some(self.line_at(element.span().start)),
+            value: self.convert_value(element.get_ref()),
+        }
     }
 }
 

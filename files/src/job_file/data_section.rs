@@ -36,7 +36,10 @@ pub(super) const KEYS: [Key; 5] = [
         meaning: "mean of the velocities, m/s, above 0; replaces `data.velocities` and requires \
                   `data.coefficient_of_variation`",
     },
-    Key { name: MOMENTS[1], meaning: "coefficient of variation of the velocities, above 0; required with `data.mean`" },
+    Key {
+        name: MOMENTS[1],
+        meaning: "coefficient of variation of the velocities, above 0; required with `data.mean`",
+    },
 ];
 
 /// Returns the measured data, or `None` after recording the violation, and their file, if any. For

@@ -12,10 +12,7 @@ use crate::reader::{Reader, Table};
 pub(super) const KEYS: [Key; 3] = [
     Key { name: "start", meaning: "value at which the search starts, within the bounds" },
     Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
-    Key {
-        name: "fixed",
-        meaning: "instead of both: the value of a parameter that is held fixed",
-    },
+    Key { name: "fixed", meaning: "instead of both: the value of a parameter that is held fixed" },
 ];
 
 /// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no

@@ -227,7 +227,9 @@ fn described(effect: &Effect) -> String {
         }
         Effect::Answer { reply_id, answer } => format!("answer {reply_id}: {}", answered(answer)),
         Effect::Publish { job, .. } => format!("publish {job}"),
-        Effect::ReportStoreFailure { error, waited } => format!("give_up after {waited:?}: {error}"),
+        Effect::ReportStoreFailure { error, waited } => {
+            format!("give_up after {waited:?}: {error}")
+        }
         Effect::Stop => "stop".to_owned(),
     }
 }

@@ -86,7 +86,10 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
                 jobs::reopen(turn, id);
             }
         }
-        Stage::StoringSubmission | Stage::Waiting | Stage::Replaying { .. } | Stage::StoringEnd(_) => {}
+        Stage::StoringSubmission
+        | Stage::Waiting
+        | Stage::Replaying { .. }
+        | Stage::StoringEnd(_) => {}
     }
 }
 

@@ -60,7 +60,9 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
 /// record is durable.
 pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
     let retry_at = turn.now + turn.state.config.store_retry;
-    let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| job.record_being_stored() == Some(key)) else {
+    let Some(job) =
+        turn.state.jobs.get_mut(&id).filter(|job| job.record_being_stored() == Some(key))
+    else {
         return;
     };
     if matches!(job.stage, Stage::StoringSubmission) {
@@ -75,8 +77,7 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
         return;
     }
     let since = job.store_retry.as_ref().map_or(turn.now, |retry| retry.since);
-    job.store_retry =
-        Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
+    job.store_retry = Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
     turn.state.changed.insert(id);
     if job.restart_pending && matches!(job.stage, Stage::StoringEnd(_)) {
         jobs::reopen(turn, id);

@@ -93,8 +93,7 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
         return;
     }
     let since = job.store_retry.as_ref().map_or(turn.now, |store_retry| store_retry.since);
-    job.store_retry =
-        Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
+    job.store_retry = Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
     turn.state.changed.insert(id);
     records::report_store_failure_if_persistent(turn, since, error);
 }

@@ -57,7 +57,8 @@ fn a_submission_is_idempotent_by_its_request_id() {
 #[test]
 fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
     let of = |reply_id, client: &str, realizations| {
-        let Event::Requested { reply_id, request } = submit(reply_id, "r", propagation(realizations))
+        let Event::Requested { reply_id, request } =
+            submit(reply_id, "r", propagation(realizations))
         else {
             unreachable!()
         };
