@@ -30,11 +30,11 @@ pub(crate) enum Command {
     Propagate(RunArguments),
     /// Solve one case: picked times, velocity, and with --out the pressure traces
     Simulate(SimulateArguments),
-    /// Print the case file of one realization of a job
+    /// Draw one random realization of a job and print it as a case file
     Draw(DrawArguments),
-    /// Serve jobs to clients and workers, until interrupted
+    /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
-    /// Compute for a coordinator, until interrupted
+    /// Run a worker: compute realizations for a coordinator, until interrupted
     Worker(WorkerArguments),
     /// Submit a job to a coordinator and print its id
     Submit(SubmitArguments),
@@ -48,8 +48,8 @@ pub(crate) enum Command {
     Backup(BackupArguments),
     /// Follow a job until it ends
     ///
-    /// The limit of evaluations that is shown includes those that measure derivatives at the best
-    /// point, one for each free parameter.
+    /// The maximum number of evaluations shown includes the evaluations for the derivatives at the
+    /// best point, one for each free parameter.
     Watch(JobArguments),
     /// Cancel a job
     Cancel(JobArguments),
@@ -59,7 +59,7 @@ pub(crate) enum Command {
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list
     Token(TokenArguments),
-    /// Print the JSON Schema of a file that osteon writes
+    /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
 }
 
@@ -68,18 +68,19 @@ pub(crate) enum Command {
 pub(crate) struct RunArguments {
     /// Job file (TOML or JSON)
     pub(crate) job: PathBuf,
-    /// Worker processes to start here [default: 2]
+    /// Number of worker processes to start on this machine [default: 2]
     #[arg(long, value_name = "N", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(crate) workers: Option<u32>,
-    /// Threads of each worker [default: cores / N, at least 1]
+    /// Number of threads of each worker [default: cores / N, at least 1]
     #[arg(long, value_name = "T", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
-    /// Run on this coordinator instead: https://HOST:PORT, http://HOST:PORT or unix:PATH
+    /// Run the job on this coordinator instead of on this machine: https://HOST:PORT,
+    /// http://HOST:PORT or unix:PATH
     ///
-    /// Without it OSTEON_COORDINATOR of the environment is used, unless --workers or --threads ask
-    /// for a run on this machine.
+    /// If omitted, the environment variable OSTEON_COORDINATOR is used, unless --workers or
+    /// --threads is given, which run the job on this machine.
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
     /// What is shown to the coordinator.
@@ -88,8 +89,8 @@ pub(crate) struct RunArguments {
     /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
     #[arg(long, value_name = "TEXT", value_parser = job_name)]
     pub(crate) name: Option<String>,
-    /// Directory for the results; the same command resumes an interrupted run, or shows the results
-    /// again
+    /// Directory for the results. Repeating the command resumes an interrupted run, or shows the
+    /// results of a complete one
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
@@ -102,20 +103,21 @@ pub(crate) struct RunArguments {
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
     pub(crate) case: PathBuf,
-    /// Directory for the case, the result and the pressure traces (traces.csv, always by the exact
-    /// method); it can hold only one case
+    /// Directory for the case, the result and the pressure traces (traces.csv, always computed with
+    /// the exact method). Each case needs its own directory
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Solve with both methods and with a refined exact method, and show the differences
+    /// Solve with both methods, and with the exact method at higher refinement, and show the
+    /// differences
     #[arg(long)]
     pub(crate) check: bool,
-    /// Duration of the traces, s
+    /// Duration of the traces (seconds)
     #[arg(long, value_name = "S", default_value = "16e-6", value_parser = positive)]
     pub(crate) duration: f64,
-    /// Time step of the traces, s
+    /// Time step of the traces (seconds)
     #[arg(long, value_name = "S", default_value = "1e-8", value_parser = positive)]
     pub(crate) time_step: f64,
 }
@@ -128,10 +130,10 @@ pub(crate) struct DrawArguments {
     /// Index of the realization, from 0
     #[arg(long, value_name = "I")]
     pub(crate) index: u64,
-    /// Draw at the best point of DIR/result.json instead of the fixed/start point
+    /// Use the best point of DIR/result.json instead of the job's fixed and start values
     #[arg(long, value_name = "DIR")]
     pub(crate) at: Option<PathBuf>,
-    /// With --at, draw at the best point of this group of the data
+    /// With --at, use the best point of this group of the data
     #[arg(long, value_name = "NAME", requires = "at")]
     pub(crate) group: Option<String>,
 }
@@ -142,7 +144,8 @@ pub(crate) struct CoordinatorArguments {
     /// Address to listen on: HOST:PORT (port 0 selects a free port) or unix:PATH
     #[arg(long, value_name = "ADDR")]
     pub(crate) listen: String,
-    /// Directory of the store; the URL in use is written to DIR/address
+    /// Directory of the store. The URL at which clients reach the coordinator is written to
+    /// DIR/address
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
     /// Serve on addresses other than loopback without TLS: anyone who can reach the address can use
@@ -158,31 +161,32 @@ pub(crate) struct CoordinatorArguments {
     /// Private key of the certificate (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
     pub(crate) tls_key: Option<PathBuf>,
-    /// List of the tokens that clients may use: lines of NAME ROLE HASH, made by `osteon token`;
-    /// SIGHUP makes the coordinator read it and the certificates again
+    /// List of the tokens that clients may use, one line NAME ROLE HASH each (see `osteon token`).
+    /// On SIGHUP the coordinator reads the list and the certificates again
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
-    /// File with one more client token, of role admin
+    /// File with an additional client token, which has the role admin
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
-    /// Fraction of the batches that a second worker computes too, 0 to 1: different answers reveal
-    /// a worker that computes wrongly
+    /// Fraction (0 to 1) of the batches that a second worker also computes, to detect workers that
+    /// return wrong results
     #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
           value_parser = fraction)]
     pub(crate) audit_fraction: f64,
-    /// Do not use idle threads for points that a search may request next; does not change any
-    /// result
+    /// Do not compute in advance, on idle threads, points that a search may request next. Results
+    /// are the same either way
     #[arg(long)]
     pub(crate) no_speculation: bool,
-    /// Delete finished jobs after this long: a number with s, min, h or d [default: never]
+    /// Delete ended jobs (converged, failed or cancelled) after this long: number and unit, e.g. 90d
+    /// (s, min, h or d) [default: never]
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) keep_ended: Option<Duration>,
     /// Start even if the store has lost accepted jobs; without this option the coordinator refuses
     /// to start
     #[arg(long)]
     pub(crate) accept_lost_jobs: bool,
-    /// Time without a message after which a worker's batches are reassigned, s, 1 to 3600;
-    /// heartbeats are sent five times per lease
+    /// Time without a message after which a worker's batches are reassigned (seconds, 1 to 3600).
+    /// Heartbeats are sent five times per lease
     #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
     pub(crate) lease: Duration,
 }
@@ -196,18 +200,18 @@ pub(crate) struct WorkerArguments {
     /// What is shown to the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
-    /// Threads to compute on [default: all cores]
+    /// Number of threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
-    /// End after this long without a coordinator, s [default: never]
+    /// Exit if no coordinator can be reached for this many seconds [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) give_up_after: Option<f64>,
-    /// After this long, finish the current work and end, s [default: never]
+    /// Finish the current work and exit after this many seconds [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) time_limit: Option<f64>,
 }
 
-/// What is shown to a coordinator, and how it is known.
+/// Credentials for a coordinator, and the authorities that certify it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CredentialArguments {
     /// Certificates of the authorities that may sign the coordinator's certificate (PEM); for https
@@ -274,7 +278,7 @@ pub(crate) struct SubmitArguments {
     #[arg(long, value_name = "P", default_value_t = 0,
           value_parser = clap::value_parser!(u32).range(0..=i64::from(osteon_common::limits::PRIORITY_MAX)))]
     pub(crate) priority: u32,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -288,7 +292,7 @@ pub(crate) struct JobsArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -296,7 +300,7 @@ pub(crate) struct JobsArguments {
 /// What can be done with jobs.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
-    /// Delete finished jobs (without options, all of them) and print their ids
+    /// Delete ended jobs (without options, all of them) and print their ids
     Prune(PruneArguments),
 }
 
@@ -306,13 +310,13 @@ pub(crate) struct PruneArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Delete only jobs that ended longer ago than this: a number with s, min, h or d
+    /// Delete only jobs that ended longer ago than this: number and unit, e.g. 90d (s, min, h or d)
     #[arg(long, value_name = "AGE", value_parser = age)]
     pub(crate) older_than: Option<Duration>,
     /// Keep the N jobs that ended last
     #[arg(long, value_name = "N")]
     pub(crate) keep_last: Option<u64>,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -345,7 +349,7 @@ pub(crate) struct FetchArguments {
 /// Of `certs`.
 #[derive(Debug, Args)]
 pub(crate) struct CertsArguments {
-    /// Directory for the files, none of which may exist already
+    /// Directory in which to create the files; if one of them exists already, none is created
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// Host name or IP address of the coordinator, besides localhost, 127.0.0.1 and ::1; may be
@@ -364,17 +368,17 @@ pub(crate) struct CertsArguments {
 /// Of `token`.
 #[derive(Debug, Args)]
 pub(crate) struct TokenArguments {
-    /// Holder's name (letters, digits and . _ - @), for logs
+    /// Name of the token's holder, shown in logs (letters, digits and . _ - @)
     #[arg(value_name = "NAME")]
     pub(crate) name: String,
-    /// Permissions of the token: read (see jobs, fetch results), submit (also submit and cancel),
-    /// admin (everything)
+    /// Permissions of the token. read: list jobs and fetch results; submit: the same, and submit and
+    /// cancel jobs; admin: everything
     #[arg(long, value_name = "ROLE", value_parser = ["read", "submit", "admin"])]
     pub(crate) role: String,
     /// Write the token to this new file, which only you can read
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// Add the line to this file for the coordinator's --tokens instead of printing it
+    /// Append the entry to this token list (the coordinator's --tokens file) instead of printing it
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
 }
@@ -382,7 +386,7 @@ pub(crate) struct TokenArguments {
 /// Of `schema`.
 #[derive(Debug, Args)]
 pub(crate) struct SchemaArguments {
-    /// The file: `job` stands for a job file, `result` for result.json and for the output of a run with --json
+    /// `job`: job files; `result`: result.json and the output of a run with --json
     #[arg(value_enum, value_name = "FILE")]
     pub(crate) file: SchemaFile,
 }

@@ -3,10 +3,10 @@
 //!
 //! They never change a job: the point nearest to such data is a valid result, too.
 
+use osteon_common::attainable_moments::{self, AttainableMoments};
 use osteon_common::case::{Bone, Setup};
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::reach::{self, Reach};
 use osteon_common::results::Moments;
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
@@ -46,8 +46,8 @@ pub(crate) fn say_all(warnings: &[Warning]) {
     }
 }
 
-/// Returns which data of an identification cannot be reached by any point within the bounds,
-/// according to the solver's velocities of the slowest and the fastest mean model.
+/// Returns which data of an identification lie outside the moments that points within the bounds can
+/// have, according to the solver's velocities of the mean models of smallest and largest √(c1111/ρ).
 fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     let Some(data) = &specification.data else { return Vec::new() };
     let solver = SolverSettings::default();
@@ -105,10 +105,15 @@ impl ClosedFormMoments {
             let point = point?;
             Some((point, velocity(&point)?.ok()?))
         };
-        let (slowest, fastest) =
-            (corner(Some(reach::slowest(ranges))), corner(reach::fastest(ranges)));
+        let slowest = corner(Some(attainable_moments::lowest_bulk_velocity_point(ranges)));
+        let fastest = corner(attainable_moments::highest_bulk_velocity_point(ranges));
         let start = velocity(&specification.start()).unwrap_or(Ok(f64::NAN));
-        Self { slowest, fastest, start, variation: Reach::from_ranges(ranges, setup).variation }
+        Self {
+            slowest,
+            fastest,
+            start,
+            variation: AttainableMoments::from_ranges(ranges, setup).variation,
+        }
     }
 
     /// Returns which moments of data with this number of velocities are out of reach, each with the

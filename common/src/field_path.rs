@@ -1,6 +1,6 @@
 //! Paths of fields, and quotations of a user's text, for messages.
 
-/// Longest part of a user's text that is quoted in a message.
+/// Maximum number of characters of a user's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
 /// Returns the path of the entry `key` of the table at `table`; the root's path is empty.

@@ -89,8 +89,8 @@ pub fn inference(
 /// accurate.
 const EXACT: f64 = 1e-4;
 
-/// Returns whether the moments differ by at most three standard errors of all noise, or by a
-/// negligible amount.
+/// Returns whether the moments differ by at most three standard errors (of data and sampling
+/// together), or by a negligible amount.
 fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
     let covariance = noise.covariance();
     let within = |axis: usize| {

@@ -21,14 +21,15 @@ pub struct Fluid {
 pub struct Layers {
     /// Fluid 1: coupling gel, skin and muscle; source and receivers lie in it.
     pub coupling: Fluid,
-    /// Thickness of the cortical bone, m (h).
+    /// Thickness h of the cortical bone, m.
     pub bone_thickness: f64,
-    /// Fluid 2.
+    /// The marrow: the fluid below the bone (fluid 2 in docs/physics.md).
     pub marrow: Fluid,
 }
 
 impl Default for Layers {
-    /// The paper's geometry: 10 mm of fluid, 4 mm of bone, 10 mm of fluid, both fluids water-like.
+    /// The geometry of the paper: 10 mm of fluid, 4 mm of bone, 10 mm of fluid, both fluids
+    /// water-like.
     fn default() -> Self {
         let water = Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0 };
         Self { coupling: water, bone_thickness: 4e-3, marrow: water }

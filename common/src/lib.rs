@@ -6,9 +6,12 @@
 //! writes the files. This crate uses no file, network, clock or thread; everything in it is a pure
 //! function of its input.
 //!
-//! Units are SI throughout: m, s, kg/m³, Pa, Hz.
+//! Units are SI throughout: m, s, kg/m³, Pa, Hz. "The paper" is Desceliers, Soize, Grimal, Talmant and
+//! Naili, "Experimental identification in the ultrasonic range of a mechanical model for cortical
+//! bones"; see `docs/physics.md`.
 
 mod accepted;
+pub mod attainable_moments;
 pub mod bulk_velocity;
 pub mod case;
 pub mod check;
@@ -32,7 +35,6 @@ pub mod parameters;
 pub mod plausible;
 pub mod probe;
 pub mod quantile;
-pub mod reach;
 pub mod realization;
 pub mod results;
 pub mod sampling;

@@ -1,5 +1,5 @@
-//! Limits that several crates share, with the unit in the name. Other limits are beside the code
-//! that uses them.
+//! Limits that several crates share. The unit is in the name or in the comment. Other limits are beside
+//! the code that uses them.
 
 /// Minimum number of receivers of a probe: with fewer, the fit of a line leaves no residuals.
 pub const RECEIVERS_MIN: u32 = 3;
@@ -10,7 +10,7 @@ pub const REALIZATIONS_MAX: u64 = 10_000_000;
 /// Maximum number of scrambles of one evaluation: enough to estimate an error, and quick to
 /// generate.
 pub const SCRAMBLES_MAX: u64 = 1024;
-/// Largest seed: 2⁶³ - 1, so that every tool can hold it in a signed integer.
+/// Largest seed: 2⁶³ - 1, so that it fits in a signed 64-bit integer.
 pub const SEED_MAX: u64 = (1 << 63) - 1;
 /// Maximum number of evaluations of one job.
 pub const EVALUATIONS_MAX: u64 = 1_000_000;
@@ -24,9 +24,9 @@ pub const STARTS_MAX: u64 = 1000;
 pub const REFINEMENT_MIN: f64 = 0.5;
 /// Largest refinement of the solver's sampling.
 pub const REFINEMENT_MAX: f64 = 16.0;
-/// Smallest element of the hybrid method, m.
+/// Smallest accepted `solver.element_size`, m.
 pub const ELEMENT_SIZE_MIN: f64 = 1e-6;
-/// Largest element of the hybrid method, m.
+/// Largest accepted `solver.element_size`, m.
 pub const ELEMENT_SIZE_MAX: f64 = 1e-2;
 /// Lowest polynomial degree of the hybrid method's elements.
 pub const ELEMENT_ORDER_MIN: u32 = 2;
@@ -34,9 +34,9 @@ pub const ELEMENT_ORDER_MIN: u32 = 2;
 pub const ELEMENT_ORDER_MAX: u32 = 12;
 /// Maximum number of (frequency, wavenumber) pairs of one realization.
 pub const SAMPLING_PAIRS_MAX: f64 = 1e7;
-/// Longest file of measured velocities, and longest file of a run that is read back, bytes.
+/// Maximum size of a CSV file of velocities, and of an output file that osteon reads again, bytes.
 pub const FILE_BYTES_MAX: u64 = 64 << 20;
-/// Longest line of a file of measured velocities, bytes.
+/// Maximum length of a line of a CSV file of velocities, bytes.
 pub const LINE_BYTES_MAX: usize = 64 << 10;
 /// Longest job file, bytes. (A million velocities inlined take 20 MB, or 24 MB with one on each
 /// line.)
@@ -46,12 +46,11 @@ pub const CASE_FILE_BYTES_MAX: u64 = 1 << 20;
 /// Maximum number of values in a job or case file: measured velocities, and room for everything
 /// else.
 pub const DOCUMENT_VALUES_MAX: usize = DATA_VELOCITIES_MAX + 100_000;
-/// Maximum number of keys, tables and lists in a job or case file: two for each group, and room for
-/// everything else. Each may take a kilobyte of memory.
+/// Maximum number of keys, tables and lists in a job or case file: a key and a list for each of
+/// [`GROUPS_MAX`] groups, and ample room for the rest. Each may take a kilobyte of memory.
 pub const DOCUMENT_KEYS_MAX: usize = 10_000;
-/// Maximum number of words, punctuation marks, spaces, comments and line ends in a TOML file: six
-/// for each value, which is how many `    3900.5,` on a line of its own has. A parser stores each
-/// of them.
+/// Maximum number of tokens in a TOML file (words, punctuation marks, spaces, comments, line ends): six
+/// for each value, since the line `    3900.5,` consists of six. A parser stores each of them.
 pub const TOML_TOKENS_MAX: usize = 6 * DOCUMENT_VALUES_MAX;
 /// Longest message on the wire, bytes.
 pub const MESSAGE_BYTES_MAX: usize = 64 << 20;
@@ -65,48 +64,50 @@ pub const WORKERS_MAX: usize = 4096;
 pub const JOBS_MAX: usize = 10_000;
 /// Maximum total size of the specifications of jobs that wait or run, bytes.
 pub const JOBS_BYTES_MAX: u64 = 1 << 30;
-/// The jobs of one client may take one part in this many of [`JOBS_BYTES_MAX`].
+/// The specifications of the jobs of one client may take at most [`JOBS_BYTES_MAX`] divided by this
+/// number.
 pub const JOBS_BYTES_CLIENT_DIVISOR: u64 = 4;
-/// Maximum number of realizations of all jobs that are computed at the same time; each takes some
-/// 50 bytes.
+/// Maximum total number of realizations in the evaluations under way, over all jobs; each takes about
+/// 50 bytes of memory.
 pub const ACTIVE_REALIZATIONS_MAX: u64 = 2 * REALIZATIONS_MAX;
 /// Default maximum number of jobs that are computed at the same time.
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;
-/// Longest message of a worker, bytes: the answer to a batch has 1.1 MB.
+/// Longest message from a worker, bytes; the largest answer to a batch takes 1.1 MB.
 pub const WORKER_MESSAGE_BYTES_MAX: usize = 4 << 20;
 /// Longest file of certificates, keys or tokens, bytes.
 pub const CREDENTIAL_FILE_BYTES_MAX: u64 = 4 << 20;
-/// Longest wait for the end of a pipe that replaces such a file, s.
-pub const CREDENTIAL_PIPE_S_MAX: u64 = 10;
+/// Longest time to read credentials from a pipe that is given instead of a file, s.
+pub const CREDENTIAL_PIPE_SECONDS_MAX: u64 = 10;
 /// Maximum number of tokens in a coordinator's list.
 pub const TOKENS_MAX: usize = 10_000;
 /// Maximum number of connections to a coordinator at the same time.
 pub const CONNECTIONS_MAX: usize = 3 * WORKERS_MAX;
 /// Maximum number of TLS handshakes of a coordinator at the same time.
 pub const HANDSHAKES_MAX: usize = 256;
-/// Longest submission that is read without a permit of the concurrency limiter, bytes.
+/// Longest submission that is read without a permit of the concurrency limiter, bytes; longer ones
+/// are large.
 pub const SMALL_SUBMISSION_BYTES_MAX: u64 = 64 << 10;
-/// Maximum number of larger submissions that a coordinator reads at the same time; others wait.
+/// Maximum number of large submissions that a coordinator reads at the same time; others wait.
 pub const SUBMISSIONS_AT_ONCE_MAX: usize = 16;
-/// Maximum number of these from one caller.
-pub const SUBMISSIONS_OF_ONE_MAX: usize = 4;
-/// Longest time for reading such a submission, s.
-pub const SUBMISSION_S_MAX: u64 = 10;
+/// Maximum number of large submissions that a coordinator reads from one caller at the same time.
+pub const SUBMISSIONS_PER_CALLER_MAX: usize = 4;
+/// Longest time to read one large submission, s.
+pub const SUBMISSION_SECONDS_MAX: u64 = 10;
 /// Longest time from a call to the beginning of its answer, s.
-pub const CALL_S_MAX: u64 = 60;
+pub const CALL_SECONDS_MAX: u64 = 60;
 /// Maximum size of the headers of a call, bytes.
 pub const HEADER_BYTES_MAX: u32 = 16 << 10;
 /// Maximum number of fetches for which a coordinator holds results at the same time; others wait.
 pub const FETCHES_AT_ONCE_MAX: usize = 8;
-/// Maximum number of these for one caller.
-pub const FETCHES_OF_ONE_MAX: usize = 2;
+/// Maximum number of concurrent fetches of one caller.
+pub const FETCHES_PER_CALLER_MAX: usize = 2;
 /// Longest duration of a fetch, s.
-pub const FETCH_S_MAX: u64 = 300;
+pub const FETCH_SECONDS_MAX: u64 = 300;
 /// Longest duration of a backup, s.
-pub const BACKUP_S_MAX: u64 = 3600;
-/// A fetch is cancelled if its reader accepts no data for this long, s.
-pub const READER_PATIENCE_S: u64 = 30;
-/// Highest priority of a job among those of its client.
+pub const BACKUP_SECONDS_MAX: u64 = 3600;
+/// A fetch or a backup is cancelled if the client reads no data for this long, s.
+pub const READER_STALL_SECONDS_MAX: u64 = 30;
+/// Largest priority value of a job. Priorities order only the jobs of one client.
 pub const PRIORITY_MAX: u32 = 9;

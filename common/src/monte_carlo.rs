@@ -91,7 +91,7 @@ impl Section for MonteCarlo {
             WholeRange::new(1, REALIZATIONS_MAX),
         );
         fields.whole(
-            Key { name: "seed", meaning: "seed of the germs" },
+            Key { name: "seed", meaning: "seed of the random numbers ([germs](glossary.md))" },
             &mut self.seed,
             WholeRange::new(0, SEED_MAX),
         );
@@ -101,7 +101,7 @@ impl Section for MonteCarlo {
         fields.choice(Key { name: "sampling", meaning: sampling }, &mut self.sampling);
         let scrambles = "with `\"sobol\"`: number of independent scrambles over which the \
                          realizations are divided evenly; with several, standard errors come from \
-                         their scatter. A divisor of `realizations`; 1 with `\"monte_carlo\"`";
+                         their scatter. Must divide `realizations`; must be 1 with `\"monte_carlo\"`";
         fields.whole(
             Key { name: "scrambles", meaning: scrambles },
             &mut self.scrambles,
@@ -109,7 +109,7 @@ impl Section for MonteCarlo {
         );
         let control_variate = "`true`: the moments are corrected by those of √(c1111/ρ), which are \
                                known exactly ([physics.md](physics.md#the-control-variate)); not used \
-                               where a realization failed";
+                               at a point at which any realization failed";
         fields.boolean(
             Key { name: "control_variate", meaning: control_variate },
             &mut self.control_variate,

@@ -1,10 +1,10 @@
-//! Outcome of one realization: a velocity, or a typed failure.
+//! Outcome of one realization: a velocity, or the kind of failure.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Reason why a realization has no velocity. The discriminant is the code byte of the digest, of
-/// the wire format and of the store; 0 is success. Codes are never reused.
+/// Reason why a realization has no velocity. The discriminant is the byte that encodes the failure
+/// in the digest, on the wire and in the store, where 0 encodes success. Codes are never reused.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
 )]
@@ -13,13 +13,15 @@ use serde::{Deserialize, Serialize};
 pub enum FailureKind {
     /// At some receiver no extremum qualifies as the first arrival.
     NoArrival = 1,
-    /// The picked extrema differ in sign, or do not lie on one line.
+    /// The picked extrema differ in sign, or their times do not lie on a straight line over the
+    /// receiver positions.
     InconsistentArrival = 2,
     /// The direct wave in the coupling fluid arrives before the wave through the bone.
     DirectWaveFirst = 3,
     /// The computation produced a number that is not finite.
     NotFinite = 4,
-    /// An iteration, or the sampling, did not reach its tolerance within its limits.
+    /// The computation would need more frequencies and wavenumbers, a larger mesh or more time steps
+    /// than are allowed, or the given time step exceeds the stability limit.
     NoConvergence = 5,
 }
 
@@ -79,7 +81,7 @@ pub fn decode(code: u8, velocity: f64) -> Option<Outcome> {
 pub struct RealizationResult {
     /// The outcome.
     pub outcome: Outcome,
-    /// Estimated relative error of the velocity by discretisation, ≥ 0; 0 on failure.
+    /// Estimated relative error of the velocity due to discretisation, ≥ 0; 0 on failure.
     pub estimated_error: f64,
 }
 
@@ -89,8 +91,9 @@ impl RealizationResult {
         Self { outcome: Err(kind), estimated_error: 0.0 }
     }
 
-    /// Returns whether the estimated error is allowed for such an outcome.
-    pub fn is_sound(&self) -> bool {
+    /// Returns whether the estimated error is valid: finite and not negative for a velocity, exactly 0
+    /// for a failure.
+    pub fn is_consistent(&self) -> bool {
         match self.outcome {
             Ok(_) => self.estimated_error.is_finite() && self.estimated_error >= 0.0,
             Err(_) => self.estimated_error.to_bits() == 0,
@@ -151,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_outcome_encodes_to_is_refused() {
+    fn decode_refuses_invalid_pairs() {
         for (code, velocity) in [
             (0, 0.0),
             (0, -1.0),
@@ -167,15 +170,16 @@ mod tests {
 
     #[test]
     fn an_estimate_is_finite_and_a_failure_has_none() {
-        let sound =
-            |outcome, estimated_error| RealizationResult { outcome, estimated_error }.is_sound();
-        assert!(sound(Ok(3900.0), 0.0) && sound(Ok(3900.0), 2e-5));
-        assert!(RealizationResult::failed(FailureKind::NoArrival).is_sound());
+        let consistent = |outcome, estimated_error| {
+            RealizationResult { outcome, estimated_error }.is_consistent()
+        };
+        assert!(consistent(Ok(3900.0), 0.0) && consistent(Ok(3900.0), 2e-5));
+        assert!(RealizationResult::failed(FailureKind::NoArrival).is_consistent());
         for estimate in [-1e-9, f64::NAN, f64::INFINITY] {
-            assert!(!sound(Ok(3900.0), estimate), "{estimate}");
+            assert!(!consistent(Ok(3900.0), estimate), "{estimate}");
         }
         for estimate in [-0.0, 1e-5, f64::NAN] {
-            assert!(!sound(Err(FailureKind::NoArrival), estimate), "{estimate}");
+            assert!(!consistent(Err(FailureKind::NoArrival), estimate), "{estimate}");
         }
     }
 

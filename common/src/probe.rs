@@ -5,6 +5,10 @@ use crate::fields::{Fields, Key, Number, Section};
 use crate::limits::{RECEIVERS_MAX, RECEIVERS_MIN};
 use crate::plausible::{FREQUENCY, HEIGHT, PITCH};
 
+/// Meaning of the key `amplitude`.
+const AMPLITUDE: &str = "amplitude F1 of the pulse (the paper gives it in N; \
+                         [physics.md](physics.md#the-medium) explains the dimension)";
+
 const RECEIVERS: WholeRange = WholeRange::new(RECEIVERS_MIN as u64, RECEIVERS_MAX as u64);
 
 /// A line source, invariant along x2.
@@ -32,8 +36,8 @@ pub struct Receivers {
 impl Receivers {
     /// Returns the position of receiver `j` (from 0) along the bone, m.
     ///
-    /// The product and the sum are rounded once each, so that the position has the same bits
-    /// wherever it is computed.
+    /// Product and sum are rounded separately (no fused multiply-add), so that the position has the
+    /// same bits wherever it is computed.
     pub fn x1(&self, j: u32) -> f64 {
         self.first_x1 + f64::from(j) * self.pitch
     }
@@ -79,7 +83,7 @@ impl Section for Probe {
             Number::above_zero(&FREQUENCY),
         );
         fields.number(
-            Key { name: "amplitude", meaning: "amplitude F1 of the pulse" },
+            Key { name: "amplitude", meaning: AMPLITUDE },
             &mut self.amplitude,
             Number::within(Interval::above(0.0, "N")),
         );
@@ -94,15 +98,15 @@ impl Section for Probe {
     }
 }
 
-/// Positions along the bone: only differences matter.
-const ANYWHERE: Number = Number::within(Interval::finite("m"));
+/// Accepted positions along the bone: any finite number, since only differences matter.
+const POSITION: Number = Number::within(Interval::finite("m"));
 
 impl Section for Source {
     fn declare(&mut self, fields: &mut dyn Fields) {
         fields.number(
             Key { name: "x1", meaning: "position along the bone" },
             &mut self.x1,
-            ANYWHERE,
+            POSITION,
         );
         fields.number(
             Key { name: "x3", meaning: "height above the bone" },
@@ -117,7 +121,7 @@ impl Section for Receivers {
         fields.number(
             Key { name: "first_x1", meaning: "position of the first receiver along the bone" },
             &mut self.first_x1,
-            ANYWHERE,
+            POSITION,
         );
         fields.number(
             Key { name: "pitch", meaning: "distance between neighbours" },

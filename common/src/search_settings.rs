@@ -58,12 +58,12 @@ impl SearchMethod {
     }
 }
 
-/// A value towards which a free parameter is pulled.
+/// A value of a free parameter that is expected from prior knowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Prior {
     /// The value, within the parameter's bounds, in its unit.
     pub value: f64,
-    /// Increase of the cost if the parameter is off by the whole width of its bounds, above 0; for
+    /// Increase of the cost if the parameter is off by the full width of its bounds, above 0; for
     /// smaller distances it decreases with their square.
     pub weight: f64,
 }
@@ -86,13 +86,14 @@ pub struct Search {
     /// Number of searches of each set of data: the first begins at the start of the parameters, the
     /// others at random points of the box; 1 to [`crate::limits::STARTS_MAX`].
     pub starts: u64,
-    /// Number of the first start: 0 is the start of the parameters, k the k-th random point.
+    /// Index of the first start: 0 is the point given by the parameters' `start`, k the k-th random
+    /// point.
     pub first_start: u64,
     /// Whether the derivatives of both moments are measured at the end, by one evaluation for each
     /// free parameter.
     pub sensitivities: bool,
-    /// Values towards which the free ones of
-    /// [`Parameter::ALL`](crate::parameters::Parameter::ALL) are pulled, in that order.
+    /// Values that are expected for the free ones of
+    /// [`Parameter::ALL`](crate::parameters::Parameter::ALL), in that order.
     pub priors: [Option<Prior>; 7],
 }
 
@@ -135,25 +136,25 @@ impl Section for Objective {
 impl Section for Search {
     fn declare(&mut self, fields: &mut dyn Fields) {
         self.declare_method(fields);
-        let max_evaluations = "largest number of evaluations in each search (from one start, for one \
-                               group); all searches of a job together are limited likewise";
+        let max_evaluations = "maximum number of evaluations of each search (from one start, for one \
+                               group); all searches of a job together may have at most 1 000 000";
         fields.whole(
             Key { name: "max_evaluations", meaning: max_evaluations },
             &mut self.max_evaluations,
             WholeRange::new(1, EVALUATIONS_MAX),
         );
         self.declare_tolerances(fields);
-        let starts = "number of searches for each set of data: the first from the starts of the \
-                      parameters, the others from random points of the box \
+        let starts = "number of searches for each set of data: the first from the point given by \
+                      the parameters' `start`, the others from random points of the box \
                       ([searches.md](searches.md#several-starts))";
         fields.whole(
             Key { name: "starts", meaning: starts },
             &mut self.starts,
             WholeRange::new(1, STARTS_MAX),
         );
-        let first_start = "number of the first start: 0 is the start of the parameters, k the k-th \
-                           random point. With `first_start = 10` a job goes on where one with \
-                           `starts = 10` ended";
+        let first_start = "index of the first start: 0 is the point given by the parameters' `start`, k \
+                           the k-th random point. `first_start = 10` continues a job that had \
+                           `starts = 10`";
         fields.whole(
             Key { name: "first_start", meaning: first_start },
             &mut self.first_start,
@@ -189,14 +190,16 @@ impl Search {
 
     fn declare_tolerances(&mut self, fields: &mut dyn Fields) {
         let cost_tolerance = "the search ends at a cost of at most this (default with `\"newton\"`: \
-                              1e-12); `\"likelihood\"` ignores it, and ends by `size_tolerance`";
+                              1e-12); with `\"likelihood\"` it has no effect: the search ends when \
+                              `size_tolerance` is reached";
         fields.number(
             Key { name: "cost_tolerance", meaning: cost_tolerance },
             &mut self.cost_tolerance,
             Number::within(Interval::from(0.0, "")),
         );
-        let size_tolerance = "the search also ends when the simplex has shrunk to this fraction of \
-                              the box, or a step of `\"newton\"` is this short, without improvement";
+        let size_tolerance = "the search also ends if it no longer improves and the simplex has shrunk \
+                              to this fraction of the box, or the step of `\"newton\"` is at most \
+                              this long";
         fields.number(
             Key { name: "size_tolerance", meaning: size_tolerance },
             &mut self.size_tolerance,
@@ -206,7 +209,7 @@ impl Search {
         fields.number(
             Key {
                 name: "initial_step",
-                meaning: "edge of the first simplex; `\"newton\"` ignores it",
+                meaning: "edge of the first simplex; it has no effect with `\"newton\"`",
             },
             &mut self.initial_step,
             Number::within(Interval::above_to(0.0, 0.5, "of the box")),

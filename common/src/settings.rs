@@ -10,7 +10,7 @@ use crate::plausible::{ELEMENT_SIZE, TIME_STEP};
 
 fields::choices!(Extremum, Method);
 
-/// The extremum of the first arriving packet that gives the time of flight.
+/// Which extremum of the first arriving packet gives the time of flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Extremum {
@@ -39,8 +39,8 @@ impl Extremum {
 pub struct Picking {
     /// The extremum of the packet.
     pub extremum: Extremum,
-    /// An extremum opens the packet if its ratio to the packet's peak, in the median over the
-    /// receivers, is above this threshold; 0 < threshold < 1.
+    /// An extremum can be the first arrival only if its size relative to its packet's peak, in the
+    /// median over the receivers, is above this threshold; 0 < threshold < 1.
     pub threshold: f64,
 }
 
@@ -54,7 +54,7 @@ impl Default for Picking {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Exact layers in the (frequency, wavenumber) domain.
+    /// Exact solution of the layered medium for each frequency and wavenumber.
     #[default]
     Exact,
     /// The paper's method: Fourier in x1, spectral elements in x3, time steps.
@@ -79,8 +79,8 @@ impl Method {
 pub struct SolverSettings {
     /// The method.
     pub method: Method,
-    /// 0.5 to 16: larger is more accurate and slower. For the hybrid method, its square root
-    /// divides element size and time step.
+    /// 0.5 to 16: larger is more accurate and slower. With the hybrid method,
+    /// element size and time step are divided by its square root.
     pub refinement: f64,
     /// Largest element of the hybrid method along x3 at refinement 1, m, 1e-6 to 1e-2. Other
     /// methods have the default.
@@ -106,13 +106,14 @@ impl Default for SolverSettings {
 
 impl Section for Picking {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        let extremum = "the extremum of the packet that gives the time of flight";
+        let extremum =
+            "whether the first or the second extremum of the packet gives the time of flight";
         fields.choice(Key { name: "extremum", meaning: extremum }, &mut self.extremum);
         fields.number(
             Key {
                 name: "threshold",
-                meaning: "an extremum opens the packet if its ratio to the packet's peak is above \
-                          this",
+                meaning: "an extremum can be the first arrival only if its size relative to its \
+                          packet's peak, in the median over the receivers, is above this",
             },
             &mut self.threshold,
             Number::within(Interval::between(0.0, 1.0, "of the packet's peak")),
@@ -122,11 +123,12 @@ impl Section for Picking {
 
 impl Section for SolverSettings {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        let method = "`\"exact\"`: exact layers in (frequency, wavenumber); `\"hybrid\"`: the \
-                      paper's solver, Fourier along the bone, spectral elements across it, time steps";
+        let method = "`\"exact\"`: exact solution of the layered medium for each frequency and \
+                      wavenumber; `\"hybrid\"`: the paper's method, Fourier transform along the bone, \
+                      spectral elements across it, time steps";
         fields.choice(Key { name: "method", meaning: method }, &mut self.method);
-        let refinement = "larger is more accurate and slower; for `\"hybrid\"` it divides element \
-                          size and time step by its square root";
+        let refinement = "larger is more accurate and slower; with `\"hybrid\"`, element size and \
+                          time step are divided by the square root of this value";
         let accepted = Interval::from_to(limits::REFINEMENT_MIN, limits::REFINEMENT_MAX, "");
         fields.number(
             Key { name: "refinement", meaning: refinement },
@@ -143,7 +145,8 @@ impl SolverSettings {
         fields.number(
             Key {
                 name: "element_size",
-                meaning: "largest element across the layers, in all passes except the first",
+                meaning: "largest element size at refinement 1, measured through the thickness; the \
+                          first pass uses elements up to a third larger",
             },
             &mut self.element_size,
             Number::plausible(size, &ELEMENT_SIZE),
@@ -157,8 +160,8 @@ impl SolverSettings {
             Key {
                 name: "time_step",
                 meaning: "time step of the first pass; later passes use proportionally smaller \
-                          ones. Default: the stability limit of each bone. A larger step causes the \
-                          failure `no_convergence`",
+                          ones. Default: the stability limit of each bone. A step above the stability \
+                          limit of a bone makes it fail with `no_convergence`",
             },
             &mut self.time_step,
             Number::above_zero(&TIME_STEP),

@@ -29,8 +29,8 @@ impl fmt::Display for Violation {
 
 /// All violations of one specification, in the order in which they were found.
 ///
-/// A check that relates several fields calls [`Violations::touches`] first and reports nothing if
-/// one of them is already known to be wrong, so that each mistake is reported once.
+/// A check that relates several fields calls [`Violations::has_at_or_below`] first and reports
+/// nothing if one of them is already known to be wrong, so that each mistake is reported once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Violations(Vec<Violation>);
 
@@ -51,7 +51,7 @@ impl Violations {
     }
 
     /// Returns whether `field`, or a field inside it, is already known to be wrong.
-    pub fn touches(&self, field: &str) -> bool {
+    pub fn has_at_or_below(&self, field: &str) -> bool {
         self.0.iter().any(|violation| {
             violation.field.strip_prefix(field).is_some_and(|rest| {
                 rest.is_empty() || rest.starts_with('.') || rest.starts_with('[')

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use osteon_common::limits::{ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_S_MAX, JOBS_BYTES_MAX};
+use osteon_common::limits::{
+    ACTIVE_JOBS_MAX, ACTIVE_REALIZATIONS_MAX, CALL_SECONDS_MAX, JOBS_BYTES_MAX,
+};
 
 use crate::core::audit::AuditKey;
 
@@ -73,7 +75,7 @@ impl Default for Config {
             jobs_bytes_max: JOBS_BYTES_MAX,
             store_retry: Duration::from_secs(2),
             store_give_up_after: None,
-            call_timeout: Duration::from_secs(CALL_S_MAX),
+            call_timeout: Duration::from_secs(CALL_SECONDS_MAX),
             shutdown_timeout: Duration::from_secs(5),
         }
     }

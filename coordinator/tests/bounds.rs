@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::{
-    HEADER_BYTES_MAX, SMALL_SUBMISSION_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX,
-    WORKER_MESSAGE_BYTES_MAX,
+    HEADER_BYTES_MAX, SMALL_SUBMISSION_BYTES_MAX, SUBMISSIONS_AT_ONCE_MAX,
+    SUBMISSIONS_PER_CALLER_MAX, WORKER_MESSAGE_BYTES_MAX,
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
@@ -103,9 +103,9 @@ async fn more_submissions_than_are_read_at_a_time_wait_their_turn() {
     let specification = specification::to_message(&large());
     assert!(specification.encoded_len() as u64 > SMALL_SUBMISSION_BYTES_MAX);
     let mut calls = tokio::task::JoinSet::new();
-    for _ in 0..10 * SUBMISSIONS_AT_ONCE_MAX / SUBMISSIONS_OF_ONE_MAX {
+    for _ in 0..10 * SUBMISSIONS_AT_ONCE_MAX / SUBMISSIONS_PER_CALLER_MAX {
         let channel = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
-        for _ in 0..SUBMISSIONS_OF_ONE_MAX {
+        for _ in 0..SUBMISSIONS_PER_CALLER_MAX {
             let mut client = jobs_client(channel.clone());
             let specification = Some(specification.clone());
             calls.spawn(async move {

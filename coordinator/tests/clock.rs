@@ -14,7 +14,7 @@ use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::{Answer, Effect};
 use osteon_coordinator::core::event::{Event, Request};
-use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::ids::{JobId, ReplyId};
 use osteon_coordinator::core::reactor::{Restored, react};
 use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::Store as _;
@@ -37,7 +37,7 @@ fn live(
     let (mut state, effects) = State::restore(Config::default(), restored, now);
     let mut effects = VecDeque::from(effects);
     let request = fake::submission(specification, "the one");
-    let submitted = Event::Requested { token: Token(1), request };
+    let submitted = Event::Requested { reply_id: ReplyId(1), request };
     for event in [submitted, fake::attached(1)] {
         effects.extend(react(&mut state, event, now));
     }
@@ -59,7 +59,7 @@ fn live(
             break;
         }
     }
-    let get = Event::Requested { token: Token(2), request: Request::Get(JOB) };
+    let get = Event::Requested { reply_id: ReplyId(2), request: Request::Get(JOB) };
     let answers = react(&mut state, get, now);
     let snapshot = answers.into_iter().find_map(|effect| match effect {
         Effect::Answer { answer: Answer::Snapshot(snapshot), .. } => Some(snapshot),

@@ -17,7 +17,7 @@ use osteon_common::version;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::Effect;
 use osteon_coordinator::core::event::Event;
-use osteon_coordinator::core::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::{Restored, react};
 use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::job_output;
@@ -338,7 +338,7 @@ fn live_with(
 /// workers attach.
 fn beginning(specification: &JobSpecification, crew: Crew) -> Vec<Event> {
     let request = fake::submission(specification, "the one");
-    let submitted = Event::Requested { token: Token(1), request };
+    let submitted = Event::Requested { reply_id: ReplyId(1), request };
     [submitted].into_iter().chain((1..=crew.workers).map(fake::attached)).collect()
 }
 

@@ -10,7 +10,8 @@ use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::{
-    BATCH_REALIZATIONS_MAX, FETCHES_OF_ONE_MAX, READER_PATIENCE_S, SUBMISSIONS_AT_ONCE_MAX,
+    BATCH_REALIZATIONS_MAX, FETCHES_PER_CALLER_MAX, READER_STALL_SECONDS_MAX,
+    SUBMISSIONS_AT_ONCE_MAX,
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
@@ -38,7 +39,7 @@ const LONG: u32 = 1 << 20;
 async fn coordinator() -> (Coordinator, Channel) {
     let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
     let config = Config { tick: Duration::from_millis(10), ..Config::default() };
-    assert!(config.call_timeout > TIMEOUT && READER_PATIENCE_S > TIMEOUT.as_secs());
+    assert!(config.call_timeout > TIMEOUT && READER_STALL_SECONDS_MAX > TIMEOUT.as_secs());
     let coordinator = start(listener, Box::new(MemoryStore::new()), config).await.unwrap();
     let channel = connect(&coordinator.url().parse().unwrap(), TIMEOUT).await.unwrap();
     (coordinator, channel)
@@ -128,7 +129,7 @@ async fn a_reader_that_goes_frees_the_place_of_a_fetch() {
     while tokio::time::timeout(TIMEOUT, stream.message()).await.unwrap().unwrap().is_some() {}
 
     let mut held = Vec::new();
-    for _ in 0..FETCHES_OF_ONE_MAX {
+    for _ in 0..FETCHES_PER_CALLER_MAX {
         held.push(fetch(&channel, &job).await.unwrap());
     }
     // Its deadline passes before another fetch releases its permit.

@@ -12,7 +12,7 @@ use std::time::Duration;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::Event;
-use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::ids::{JobId, ReplyId};
 use osteon_coordinator::core::reactor::{Restored, react};
 use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::Store;
@@ -24,7 +24,7 @@ fn next(store: &mut dyn Store) -> JobId {
     let restored = Restored::load(store).unwrap();
     let (mut state, _) = State::restore(Config::default(), restored, Duration::ZERO);
     let request = fake::submission(&fake::propagation(10, 1), "");
-    let submitted = Event::Requested { token: Token(1), request };
+    let submitted = Event::Requested { reply_id: ReplyId(1), request };
     let effects = react(&mut state, submitted, Duration::ZERO);
     let [Effect::Store(Record::Job(record))] = effects.as_slice() else { panic!("{effects:?}") };
     store.put_job(record).unwrap();

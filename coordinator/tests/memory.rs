@@ -13,7 +13,7 @@ use osteon_common::job::Data;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::Effect;
 use osteon_coordinator::core::event::{Event, Request};
-use osteon_coordinator::core::ids::Token;
+use osteon_coordinator::core::ids::ReplyId;
 use osteon_coordinator::core::reactor::react;
 use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::sqlite::SqliteStore;
@@ -26,7 +26,7 @@ fn resident() -> u64 {
 
 /// Computes a job to its end.
 fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
-    let requested = Event::Requested { token: Token(1), request };
+    let requested = Event::Requested { reply_id: ReplyId(1), request };
     let mut effects = VecDeque::from(react(state, requested, Duration::ZERO));
     while let Some(effect) = effects.pop_front() {
         let event = match effect {

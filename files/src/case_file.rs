@@ -122,7 +122,7 @@ fn required(
     } else {
         check::number(&path, value, accepted, &mut reader.violations);
     }
-    (!reader.violations.touches(&path)).then_some(value)
+    (!reader.violations.has_at_or_below(&path)).then_some(value)
 }
 
 fn from_constants(reader: &mut Reader, table: &Table<'_>) -> Option<Elasticity> {

@@ -114,7 +114,7 @@ pub(crate) struct Bound {
 
 /// Returns the text of the file at `path` and its format.
 pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileError> {
-    let Some(format) = Format::of(path) else {
+    let Some(format) = Format::from_extension(path) else {
         return Err(FileError::UnknownFormat { path: path.to_owned() });
     };
     match user_file::read(path, bound.bytes) {

@@ -1,7 +1,7 @@
-//! `result.json` and the output of `--json` as types: one definition of what is written, what is read
-//! back, and what the published schema says.
+//! The types behind `result.json` and the output of `--json`. Writing, reading and the published schema
+//! all follow from these definitions.
 //!
-//! The keys of an object stand in the order of the fields. A number that is not finite, or that is not
+//! Keys are written in the order of the struct's fields. A number that is not finite, or that is not
 //! known, is null; every other one is the shortest decimal that reads back to the same bits.
 
 mod conclusions;
@@ -25,7 +25,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub use self::conclusions::{
     Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solution, Solutions, Spreads,
 };
-pub use self::error::{NoPoint, ReadError, listed};
+pub use self::error::{BestPointError, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};
 pub use self::moments::{Data, Moment, MomentIntervals, Moments, Velocity};
 pub use self::point::MeanModel;
@@ -52,10 +52,10 @@ impl ResultFile {
         }
     }
 
-    /// Reads the text of a `result.json`. Keys that are not known are passed over.
+    /// Reads the text of a `result.json`. Unknown keys are ignored.
     ///
     /// # Errors
-    /// When the text is no JSON, or not the result of a job, or one of another schema.
+    /// If the text is not JSON, is not the result of a job, or has another schema revision.
     pub fn from_json(text: &str) -> Result<Self, ReadError> {
         let Head { schema, kind } = parse(text)?;
         if schema != u64::from(RESULT_SCHEMA) {
@@ -70,9 +70,9 @@ impl ResultFile {
 
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        text(match self {
-            Self::Identification(found) => DocumentContent::Identification(found),
-            Self::Propagation(found) => DocumentContent::Propagation(found),
+        to_pretty_json(match self {
+            Self::Identification(result) => DocumentContent::Identification(result),
+            Self::Propagation(result) => DocumentContent::Propagation(result),
         })
     }
 
@@ -84,18 +84,18 @@ impl ResultFile {
         }
     }
 
-    /// How the search ended; `None` for a propagation, which has none.
+    /// How the search ended; `None` for a propagation, which does not search.
     pub fn status(&self) -> Option<Status> {
         match self {
-            Self::Identification(found) => Some(found.status),
+            Self::Identification(result) => Some(result.status),
             Self::Propagation(_) => None,
         }
     }
 
-    /// The kind of failure and the reason in words; `None` for a result that is no failure.
+    /// The kind of failure and the reason in words; `None` if the job did not fail.
     pub fn failure(&self) -> Option<(JobFailure, Option<&str>)> {
         match self {
-            Self::Identification(found) => Some((found.failure?, found.reason.as_deref())),
+            Self::Identification(result) => Some((result.failure?, result.reason.as_deref())),
             Self::Propagation(_) => None,
         }
     }
@@ -103,42 +103,44 @@ impl ResultFile {
     /// BLAKE3 digest of the evaluations.
     pub fn digest(&self) -> &str {
         match self {
-            Self::Identification(found) => &found.digest,
-            Self::Propagation(found) => &found.digest,
+            Self::Identification(result) => &result.digest,
+            Self::Propagation(result) => &result.digest,
         }
     }
 
     /// Returns the result of each group of the data; empty where the data are not grouped.
     pub fn groups(&self) -> &[Group] {
         match self {
-            Self::Identification(found) => found.groups.as_deref().unwrap_or_default(),
+            Self::Identification(result) => result.groups.as_deref().unwrap_or_default(),
             Self::Propagation(_) => &[],
         }
     }
 
-    /// The best point, or with a name that of the group.
+    /// Returns the best point of the job, or that of the group named `group` if one is given.
     ///
     /// # Errors
-    /// When there is no such group, or no point was found.
-    pub fn best_point(&self, group: Option<&str>) -> Result<Point, NoPoint> {
+    /// If there is no such group, or no point was found.
+    pub fn best_point(&self, group: Option<&str>) -> Result<Point, BestPointError> {
         let (parameters, dispersion) = match (group, self) {
             (Some(name), _) => {
                 let found = self.groups().iter().find(|group| group.name == name);
-                let found = found.ok_or_else(|| NoPoint::no_group(name, self.groups()))?;
+                let found =
+                    found.ok_or_else(|| BestPointError::unknown_group(name, self.groups()))?;
                 (&found.parameters, found.dispersion)
             }
-            (None, Self::Identification(found)) => (&found.parameters, found.dispersion),
-            (None, Self::Propagation(found)) => (&found.parameters, found.dispersion),
+            (None, Self::Identification(result)) => (&result.parameters, result.dispersion),
+            (None, Self::Propagation(result)) => (&result.parameters, result.dispersion),
         };
-        parameters.point(dispersion).ok_or(NoPoint::NoPoint)
+        parameters.point(dispersion).ok_or(BestPointError::NoPointFound)
     }
 }
 
-/// The result of an osteon run, as `result.json` and `--json` have it. Units are SI: m, s, kg/m³, Pa, Hz.
+/// The result of an osteon run, as written to `result.json` and printed by `--json`. Units are SI: m, s,
+/// kg/m³, Pa, Hz.
 #[derive(Serialize, JsonSchema)]
 #[schemars(title = "osteon result")]
 struct Document<'a> {
-    /// Revision of the keys. Keys may be added to a revision, so a reader should ignore those that it
+    /// Schema revision. It does not change when keys are added, so a reader should ignore keys that it
     /// does not know.
     #[schemars(extend("const" = RESULT_SCHEMA))]
     schema: u32,
@@ -157,8 +159,8 @@ enum DocumentContent<'a> {
     Simulation(&'a Simulation),
 }
 
-#[expect(clippy::expect_used, reason = "only a key that is no string could fail, and none is")]
-fn text(content: DocumentContent<'_>) -> String {
+#[expect(clippy::expect_used, reason = "it fails only for map keys that are not strings")]
+fn to_pretty_json(content: DocumentContent<'_>) -> String {
     let document = Document { schema: RESULT_SCHEMA, content };
     serde_json::to_string_pretty(&document).expect("keys are strings") + "\n"
 }
@@ -178,13 +180,13 @@ fn parse<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
     Ok(value)
 }
 
-/// A number as it is written: null where it is not finite.
-fn finite(number: f64) -> Option<f64> {
+/// Returns a number as it is written: null if it is not finite.
+fn finite_or_null(number: f64) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-/// Reads a key that only some results have, and that may be null where it stands.
-fn present<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+/// Reads a key that may be absent (`None`) or null (`Some(None)`).
+fn absent_or_nullable<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Option<Option<T>>, D::Error> {
     Option::deserialize(deserializer).map(Some)

@@ -75,7 +75,7 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationR
         .map(|(index, (outcome, &estimated_error))| {
             let solved = RealizationResult { outcome, estimated_error };
             let unsound = Malformed::EstimatedError { index, value: estimated_error };
-            solved.is_sound().then_some(solved).ok_or(unsound)
+            solved.is_consistent().then_some(solved).ok_or(unsound)
         })
         .collect()
 }

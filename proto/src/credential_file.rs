@@ -7,7 +7,7 @@ use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use osteon_common::limits::{CREDENTIAL_FILE_BYTES_MAX, CREDENTIAL_PIPE_S_MAX};
+use osteon_common::limits::{CREDENTIAL_FILE_BYTES_MAX, CREDENTIAL_PIPE_SECONDS_MAX};
 use osteon_common::visible;
 use osteon_files::user_file;
 use thiserror::Error;
@@ -318,7 +318,7 @@ fn read(path: &Path, kind: FileAccess) -> Result<Vec<u8>, CredentialError> {
     let max = CREDENTIAL_FILE_BYTES_MAX;
     let piped = metadata.file_type().is_fifo();
     let bytes = match piped {
-        true => pipe::read(&file, max, Duration::from_secs(CREDENTIAL_PIPE_S_MAX)),
+        true => pipe::read(&file, max, Duration::from_secs(CREDENTIAL_PIPE_SECONDS_MAX)),
         false => user_file::read_opened(&file, max),
     };
     match bytes.map_err(unreadable)? {

@@ -168,7 +168,7 @@ impl Fields for MessageReader<'_> {
             return declare(self);
         }
         // If the deciding field is unknown, so is whether these fields are meaningful.
-        if self.violations.touches(&self.path(condition.decided_by)) {
+        if self.violations.has_at_or_below(&self.path(condition.decided_by)) {
             return;
         }
         for name in fields::names(declare) {

@@ -178,7 +178,7 @@ fn solve<E>(
 
 fn is_sound(solved: &RealizationResult) -> bool {
     let (code, velocity) = encode(solved.outcome);
-    decode(code, velocity).is_some() && solved.is_sound()
+    decode(code, velocity).is_some() && solved.is_consistent()
 }
 
 /// The outcomes of the best point of each group so far. A search keeps only those of its current

@@ -1,4 +1,4 @@
-//! Comparison of both methods with a refined exact solution of one case.
+//! Comparison of both methods with one solution of a case by the exact method at higher refinement.
 
 mod difference;
 

@@ -1,4 +1,4 @@
-//! The paper's own solver: Fourier in x1, spectral elements in x3, time steps.
+//! The paper's own method: Fourier in x1, spectral elements in x3, time steps.
 //!
 //! One wavenumber at a time, the weak form of fluid, solid and fluid (`operator.rs`) is stepped
 //! through time (`stepping.rs`) under the pressure of the source on the bone's face
@@ -93,7 +93,7 @@ impl Hybrid {
     /// Computes the first arrival of one bone.
     ///
     /// # Errors
-    /// A typed failure if the case has no velocity; `NoConvergence` also if the time step is above
+    /// The failure, if the case has no velocity; `NoConvergence` also if the time step is above
     /// the stability limit, or the computation exceeds its limits.
     pub fn arrival(
         &self,

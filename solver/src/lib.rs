@@ -1,8 +1,10 @@
 //! Velocity of the first arriving signal of a fluid / anisotropic solid / fluid plate: the map
-//! g_velo of the paper's Eq. (10).
+//! g_velo of the paper's Eq. (10). ("The paper" is Desceliers, Soize, Grimal, Talmant and Naili; see
+//! `docs/physics.md`.)
 //!
-//! Exact layers in the (frequency, wavenumber) domain: the plate's admittance by doubling
-//! (`plate.rs`, no roots, no branches, no degenerate solids), the fluids in closed form, a cosine
+//! The exact method solves the layered medium for each frequency and wavenumber: the plate's
+//! admittance by doubling (`plate.rs`, no roots, no branches, no degenerate solids), the fluids in
+//! closed form, a cosine
 //! transform over wavenumbers and a damped Fourier series over frequencies, extrema of the
 //! resulting trigonometric polynomial, and one picked extremum for the whole array.
 //!

@@ -119,7 +119,7 @@ impl Solver {
     /// ```
     ///
     /// # Errors
-    /// A typed failure if the case has no velocity.
+    /// The failure, if the case has no velocity.
     pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
         match self.setup.solver.method {
             Method::Exact => self.exact.arrival(bone, &mut workspace.exact),

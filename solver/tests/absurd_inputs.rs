@@ -1,4 +1,4 @@
-//! Whatever passes validation gives a velocity or a typed failure: never a panic, never a NaN,
+//! Whatever passes validation gives a velocity or a kind of failure: never a panic, never a NaN,
 //! with bits that depend on the case alone.
 
 use faer::{Mat, Side};

@@ -246,7 +246,7 @@ fn work_is_bounded_per_bone() {
 fn a_mesh_that_resolves_nothing_says_so() {
     let bone = bone(0.1, 7, 0);
     let exact = Solver::new(&Setup::default()).arrival(&bone, &mut Workspace::default()).unwrap();
-    // With the least estimate that is honest; `None` where a typed failure is, too.
+    // With the least estimate that is honest; `None` where a failure is, too.
     for (element_size, element_order, least) in
         [(1e-2, 2, Some(1.0)), (1e-2, 4, None), (2e-3, 2, None), (1e-3, 2, None), (5e-3, 8, None)]
     {

@@ -15,7 +15,7 @@ pub(crate) struct WorkersArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -23,7 +23,7 @@ pub(crate) struct WorkersArguments {
 /// What can be done with workers.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WorkersCommand {
-    /// Drain a worker: it gets no new batches, answers those it holds, and ends
+    /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
     Drain(DrainArguments),
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct DrainArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -47,10 +47,10 @@ pub(crate) struct HealthArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Maximum time to wait for the answer, s, 0.1 to 60
+    /// Maximum time to wait for the answer (seconds, 0.1 to 60)
     #[arg(long, value_name = "S", default_value = "5", value_parser = probe_seconds)]
     pub(crate) timeout: f64,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -58,13 +58,13 @@ pub(crate) struct HealthArguments {
 /// Of `backup`.
 #[derive(Debug, Args)]
 pub(crate) struct BackupArguments {
-    /// Directory for the copy, osteon.sqlite, which must not exist there yet
+    /// Directory in which the copy is written as osteon.sqlite; that file must not exist
     #[arg(value_name = "DIR")]
     pub(crate) directory: PathBuf,
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
-    /// Print JSON
+    /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }

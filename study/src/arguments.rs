@@ -1,6 +1,7 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand};
+
 /// Compares the solvers, samplings and searches of osteon, and prints a table in Markdown
 #[derive(Debug, Parser)]
 #[command(name = "osteon-study", version, max_term_width = 80)]
@@ -13,12 +14,13 @@ pub(crate) struct Arguments {
 /// The study to run.
 #[derive(Debug, Clone, Copy, Subcommand)]
 pub(crate) enum Study {
-    /// Measure how often a realization has no velocity, by kind of failure, dispersion and plate
+    /// Measure how often a realization has no velocity, for each kind of failure, dispersion and bone
+    /// thickness
     Failures(DrawsArguments),
-    /// Compare the exact method with itself at refinement 5, and its estimated errors with the
-    /// actual ones
+    /// Measure the errors of the exact method at refinement 1 against refinement 5, and compare them
+    /// with its estimated errors
     Accuracy(DrawsArguments),
-    /// Compare both methods with the exact method at refinement 5
+    /// Measure the errors of the exact and the hybrid method against the exact method at refinement 5
     Methods(DrawsArguments),
     /// Measure how the error of the exact method falls with refinement
     Refinement(DrawsArguments),
@@ -31,13 +33,13 @@ pub(crate) enum Study {
     /// Count the evaluations that each search method needs from ten starts with all seven
     /// parameters free
     Searches(DrawsArguments),
-    /// Print the digest of a batch for every instruction set of this machine
+    /// Print the digest of a set of realizations for each instruction set that this machine supports
     Digest(DrawsArguments),
-    /// Measure how moments scatter between seeds, by sampling and control variate, and how accurate
-    /// their standard errors are
+    /// Measure how moments scatter between seeds, for each sampling method, with and without control
+    /// variate, and how accurate their standard errors are
     Variance(RepetitionsArguments),
-    /// Check whether identifications recover the known parameter sets from which their data were
-    /// made
+    /// Twin experiments: check whether identifications from simulated data recover the parameters
+    /// used for the simulation
     Twins(TwinsArguments),
     /// Count how many confidence intervals contain the true value, over data sets of 100 velocities
     Coverage(TwinsArguments),
@@ -45,10 +47,10 @@ pub(crate) enum Study {
     Convergence,
 }
 
-/// The arguments of every study over draws.
+/// The arguments of the studies that draw random realizations.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct DrawsArguments {
-    /// Realizations of each row [default: depends on the study]
+    /// Number of realizations for each row of the table [default: depends on the study]
     #[arg(long, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=osteon_common::limits::REALIZATIONS_MAX))]
     pub(crate) realizations: Option<u64>,
@@ -58,7 +60,7 @@ pub(crate) struct DrawsArguments {
     pub(crate) seed: u64,
 }
 
-/// The arguments of a study over seeds.
+/// The arguments of the study that repeats a computation with different seeds.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct RepetitionsArguments {
     /// Number of seeds
@@ -72,7 +74,7 @@ pub(crate) struct RepetitionsArguments {
     pub(crate) seed: u64,
 }
 
-/// The arguments of a study of data that are made.
+/// The arguments of the studies with simulated data.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct TwinsArguments {
     /// Number of parameter sets or data sets [default: depends on the study]
@@ -101,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_meant_is_refused() {
+    fn invalid_arguments_are_refused() {
         for (line, expected) in [
             ("osteon-study", "Usage"),
             ("osteon-study nothing", "unrecognized subcommand"),

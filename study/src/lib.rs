@@ -1,5 +1,6 @@
 //! Studies that compare the solvers, the sampling methods ([`variance`]) and the search methods
-//! ([`searches`]); each returns a [`MarkdownTable`]. The program `osteon-study` prints them.
+//! ([`searches`]); each returns a [`MarkdownTable`]. The program `osteon-study` prints them. "The
+//! paper" is Desceliers, Soize, Grimal, Talmant and Naili; see `docs/physics.md`.
 //!
 //! A study is a function of its draws alone: realizations are computed on all cores and processed
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.

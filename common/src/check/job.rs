@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::accepted::{Interval, written};
+use crate::attainable_moments;
 use crate::field_path::{element_path, entry_path};
 use crate::job::{
     Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
@@ -13,7 +14,6 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::plausible::{self, PlausibleRange, short};
 use crate::quantile::quantile;
-use crate::reach;
 use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
@@ -53,10 +53,10 @@ pub fn job_from(
     setup(&specification.setup, violations);
     match (specification.kind, &specification.data) {
         (JobKind::Identification, Some(given)) => data_from(given, origin, violations),
-        (JobKind::Identification, None) if !violations.touches("data") => {
+        (JobKind::Identification, None) if !violations.has_at_or_below("data") => {
             violations.add("data", no_data());
         }
-        (JobKind::Propagation, Some(_)) if !violations.touches("data") => {
+        (JobKind::Propagation, Some(_)) if !violations.has_at_or_below("data") => {
             violations.add("data", "a propagation has no data; leave it out");
         }
         _ => {}
@@ -96,7 +96,7 @@ fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut Violations) 
         Data::Groups(measured) => groups(measured, origin, violations),
         Data::Moments { mean, coefficient_of_variation } => {
             quantity("data.mean", *mean, VELOCITY, &plausible::VELOCITY, violations);
-            if !violations.touches("data.mean")
+            if !violations.has_at_or_below("data.mean")
                 && let Some(refusal) = no_velocity(*mean)
             {
                 violations.add("data.mean", refusal);
@@ -162,7 +162,9 @@ fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations
             None => velocities(&field, measured, (origin, set), violations),
         }
     }
-    if !violations.touches("data") && groups.iter().all(|group| group.no_variation().is_some()) {
+    if !violations.has_at_or_below("data")
+        && groups.iter().all(|group| group.no_variation().is_some())
+    {
         violations.add(
             FIELD,
             format!("none of the {count} has two velocities that differ, which {MOMENTS_NEED}"),
@@ -190,7 +192,7 @@ fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> 
         }
         violations.add(element_path(field, index), VELOCITY.refusal(velocity));
     }
-    !violations.touches(field)
+    !violations.has_at_or_below(field)
 }
 
 /// Checks the velocities of one set, given its number in the file that they come from.
@@ -217,7 +219,7 @@ fn velocities(
     } else {
         impossible(field, measured, (origin, set), violations);
     }
-    if violations.touches(field) {
+    if violations.has_at_or_below(field) {
         return;
     }
     if let Some(moments) = statistics::moments(measured) {
@@ -298,7 +300,7 @@ fn bounds(
             violations.add(path, format!("the {name} bound {}", accepted.refusal(value)));
         }
     }
-    if violations.touches(path) {
+    if violations.has_at_or_below(path) {
         return;
     }
     if lower >= upper {
@@ -334,14 +336,14 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     }
 }
 
-/// Refuses data that no point within the bounds can approach, by the closed form of √(c1111/ρ) and
-/// δ.
+/// Refuses data that no point within the bounds can match even approximately, by the closed form of
+/// √(c1111/ρ) and δ.
 fn within_reach(specification: &JobSpecification, violations: &mut Violations) {
     let fields = ["data", "parameters", "layers", "probe"];
     if fields.iter().any(|field| known_wrong(field, violations)) {
         return;
     }
-    if let Some((field, message)) = reach::unreachable(specification) {
+    if let Some((field, message)) = attainable_moments::unattainable_data(specification) {
         violations.add(field, message);
     }
 }
@@ -350,7 +352,7 @@ fn something_to_search(specification: &JobSpecification, violations: &mut Violat
     let fixed = |range: &Range| matches!(range, Range::Fixed(_));
     if specification.kind == JobKind::Identification
         && specification.parameters.iter().all(fixed)
-        && !violations.touches("parameters")
+        && !violations.has_at_or_below("parameters")
     {
         violations.add(
             "parameters",
@@ -428,7 +430,9 @@ fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
     if !asked || known_wrong(FIELD, violations) {
         return;
     }
-    if matches!(specification.data, Some(Data::Moments { .. })) && !violations.touches("data") {
+    if matches!(specification.data, Some(Data::Moments { .. }))
+        && !violations.has_at_or_below("data")
+    {
         violations.add(
             FIELD,
             "is \"likelihood\", which needs the measured velocities as data.velocities; with data.mean and \
@@ -468,7 +472,7 @@ fn priors(specification: &JobSpecification, violations: &mut Violations) {
                     number(&format!("{path}.value"), value, within, violations);
                 }
             }
-            Range::Fixed(_) if !violations.touches(&path) => {
+            Range::Fixed(_) if !violations.has_at_or_below(&path) => {
                 violations
                     .add(path, "is for a parameter that is fixed; only free ones have priors");
             }

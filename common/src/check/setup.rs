@@ -96,7 +96,7 @@ fn sampling(setup: &Setup, violations: &mut Violations) {
         return;
     }
     let fields = ["layers", "probe", "picking", "solver"];
-    if fields.iter().any(|field| violations.touches(field)) {
+    if fields.iter().any(|field| violations.has_at_or_below(field)) {
         return;
     }
     let pairs = pair_count(setup);

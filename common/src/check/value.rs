@@ -44,5 +44,5 @@ pub(super) fn whole(field: &str, value: u64, accepted: WholeRange, violations: &
 pub(super) fn known_wrong(field: &str, violations: &Violations) -> bool {
     let around =
         |table: &str| field.strip_prefix(table).is_some_and(|rest| rest.starts_with(['.', '[']));
-    violations.touches(field) || violations.iter().any(|violation| around(&violation.field))
+    violations.has_at_or_below(field) || violations.iter().any(|violation| around(&violation.field))
 }

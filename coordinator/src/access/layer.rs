@@ -7,7 +7,8 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use osteon_common::limits::{
-    SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_S_MAX, SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX,
+    SMALL_SUBMISSION_BYTES_MAX, SUBMISSION_SECONDS_MAX, SUBMISSIONS_AT_ONCE_MAX,
+    SUBMISSIONS_PER_CALLER_MAX,
 };
 use tokio::sync::watch;
 use tonic::body::Body;
@@ -41,7 +42,7 @@ pub(crate) struct AccessService<S> {
 
 impl AccessLayer {
     pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>) -> Self {
-        let submissions = Limiter::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_OF_ONE_MAX);
+        let submissions = Limiter::new(SUBMISSIONS_AT_ONCE_MAX, SUBMISSIONS_PER_CALLER_MAX);
         Self { policy, submissions }
     }
 
@@ -125,7 +126,7 @@ where
                 Ok(place) => place,
                 Err(status) => return Ok(status.into_http()),
             };
-            let message = message.within(Duration::from_secs(SUBMISSION_S_MAX));
+            let message = message.within(Duration::from_secs(SUBMISSION_SECONDS_MAX));
             inner.call(http::Request::from_parts(head, Body::new(message))).await
         })
     }

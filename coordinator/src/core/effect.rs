@@ -9,7 +9,7 @@ use osteon_search::Summary;
 use thiserror::Error;
 
 use crate::core::close_reason::CloseReason;
-use crate::core::ids::{BatchId, JobId, LeaseId, Token, WorkerId};
+use crate::core::ids::{BatchId, JobId, LeaseId, ReplyId, WorkerId};
 use crate::core::notice::Notice;
 use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
 
@@ -68,14 +68,14 @@ pub enum Effect {
     /// Delete ended jobs, then report it with an event.
     Prune {
         /// The request, if a client sent one.
-        token: Option<Token>,
+        reply_id: Option<ReplyId>,
         /// The jobs.
         jobs: Vec<JobId>,
     },
     /// Answer a request.
     Answer {
         /// The request.
-        token: Token,
+        reply_id: ReplyId,
         /// The answer.
         answer: Answer,
     },
@@ -88,8 +88,8 @@ pub enum Effect {
     },
     /// Write a notice for the operator into the log.
     Note(Notice),
-    /// Give up because the store no longer accepts records.
-    GiveUp {
+    /// Report that the store has failed: it has refused a record for longer than configured.
+    ReportStoreFailure {
         /// Its last error.
         error: String,
         /// Time for which it has refused a record.

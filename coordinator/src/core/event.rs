@@ -8,7 +8,7 @@ use osteon_common::outcome::RealizationResult;
 
 use crate::core::close_reason::CloseReason;
 use crate::core::effect::RecordKey;
-use crate::core::ids::{BatchId, JobId, Token, WorkerId};
+use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use crate::store::EvaluationRecord;
 
 /// An event.
@@ -16,10 +16,10 @@ use crate::store::EvaluationRecord;
 pub enum Event {
     /// Time has passed.
     Tick,
-    /// A client sent a request; its answer goes to `token`.
+    /// A client sent a request; its reply carries `reply_id`.
     Requested {
         /// Destination of the answer.
-        token: Token,
+        reply_id: ReplyId,
         /// The request.
         request: Request,
     },
@@ -91,7 +91,7 @@ pub enum Event {
     /// Ended jobs were deleted, or could not be.
     Pruned {
         /// The request, if a client sent one.
-        token: Option<Token>,
+        reply_id: Option<ReplyId>,
         /// The jobs.
         jobs: Vec<JobId>,
         /// Error text for people, if they could not be deleted.

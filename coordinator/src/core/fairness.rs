@@ -22,7 +22,7 @@ struct Share {
 }
 
 impl Shares {
-    /// Notes that a job of `client` begins.
+    /// Records that a job of `client` begins.
     pub(crate) fn begin(&mut self, client: &str) {
         if let Some(share) = self.0.get_mut(client) {
             share.jobs += 1;
@@ -32,7 +32,7 @@ impl Shares {
         self.0.insert(client.to_owned(), Share { jobs: 1, used });
     }
 
-    /// Notes that a job of `client` is no longer under way.
+    /// Records that a job of `client` is no longer under way.
     pub(crate) fn end(&mut self, client: &str) {
         if let Some(share) = self.0.get_mut(client) {
             share.jobs = share.jobs.saturating_sub(1);

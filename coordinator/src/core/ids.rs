@@ -34,8 +34,8 @@ id! {
     BatchId
 }
 id! {
-    /// A request that waits for its answer.
-    Token
+    /// A request of a client that waits for its reply.
+    ReplyId
 }
 
 impl JobId {

@@ -9,7 +9,7 @@ use osteon_proto::specification;
 use prost::Message as _;
 
 use crate::core::evaluation::PendingEvaluation;
-use crate::core::ids::{BatchId, Token};
+use crate::core::ids::{BatchId, ReplyId};
 use crate::core::rate::Rate;
 use crate::core::realization_time::RealizationTime;
 use crate::core::worker_name::WorkerName;
@@ -48,9 +48,9 @@ pub(crate) struct Job {
     pub(crate) progressed: Duration,
     /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
-    pub(crate) tokens: Vec<Token>,
+    pub(crate) pending_replies: Vec<ReplyId>,
     /// The store's refusal of the current record.
-    pub(crate) store_trouble: Option<StoreRetry>,
+    pub(crate) store_retry: Option<StoreRetry>,
 }
 
 impl Job {
@@ -73,8 +73,8 @@ impl Job {
             newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,
-            tokens: Vec::new(),
-            store_trouble: None,
+            pending_replies: Vec::new(),
+            store_retry: None,
         }
     }
 
@@ -104,8 +104,8 @@ impl Job {
 /// Progress of a job.
 #[derive(Debug)]
 pub(crate) enum Stage {
-    /// Its record is being stored; no client has had an answer.
-    Accepting,
+    /// Its submission is being stored; no client has had an answer.
+    StoringSubmission,
     /// It waits for its turn.
     Waiting,
     /// A stored evaluation is being read for its search.
@@ -116,20 +116,23 @@ pub(crate) enum Stage {
     /// Batches of its evaluation are sent to workers.
     Computing(PendingEvaluation),
     /// A complete evaluation is being stored.
-    Storing {
+    StoringEvaluation {
         /// The evaluation.
         record: EvaluationRecord,
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
     /// Its end is being stored.
-    Finishing(EndRecord),
+    StoringEnd(EndRecord),
 }
 
 impl Stage {
     /// Whether a record of the job is not durable yet.
     pub(crate) fn is_storing(&self) -> bool {
-        matches!(self, Self::Accepting | Self::Storing { .. } | Self::Finishing(_))
+        matches!(
+            self,
+            Self::StoringSubmission | Self::StoringEvaluation { .. } | Self::StoringEnd(_)
+        )
     }
 }
 
@@ -148,8 +151,8 @@ pub(crate) struct StoreRetry {
     pub(crate) since: Duration,
     pub(crate) retry_at: Duration,
     pub(crate) error: String,
-    /// The record is on its way to the store again.
-    pub(crate) on_its_way: bool,
+    /// The record has been sent to the store again.
+    pub(crate) in_flight: bool,
 }
 
 /// A job whose end is durable, as far as lists show it.

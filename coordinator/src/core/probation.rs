@@ -46,7 +46,7 @@ impl Probation {
         self.0.get(name).is_some_and(|trial| now < trial.rests_until)
     }
 
-    /// Notes that a worker has not answered the batch that was sent at `sent`, and returns whether
+    /// Records that a worker has not answered the batch that was sent at `sent`, and returns whether
     /// its probation begins with that. A batch sent before the last reason is not counted as a
     /// further one.
     pub(crate) fn miss(&mut self, name: &WorkerName, sent: Duration, now: Duration) -> bool {

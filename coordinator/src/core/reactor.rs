@@ -53,7 +53,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
 fn apply(turn: &mut Turn, event: Event) {
     match event {
         Event::Tick => tick(turn),
-        Event::Requested { token, request } => requests::requested(turn, token, request),
+        Event::Requested { reply_id, request } => requests::requested(turn, reply_id, request),
         Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
         Event::Answered { worker, batch, solved, elapsed_s } => {
             answers::answered(turn, worker, batch, solved, elapsed_s);
@@ -63,13 +63,13 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
         Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
         Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
-        Event::Stored { job, key } => records::stored(turn, job, key),
+        Event::Stored { job, key } => records::on_record_stored(turn, job, key),
         Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
             bans::store_failed(turn, number, error);
         }
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
-        Event::Pruned { token, jobs, outcome } => prune::pruned(turn, token, jobs, outcome),
+        Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
         Event::Drain => workers::drain_all(turn),
     }
 }

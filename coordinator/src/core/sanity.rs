@@ -98,10 +98,10 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
         let active = state.active.contains(&id);
         let fits = match &job.stage {
             Stage::Waiting => waiting == 1 && !active,
-            Stage::Replaying { .. } | Stage::Computing(_) | Stage::Storing { .. } => {
+            Stage::Replaying { .. } | Stage::Computing(_) | Stage::StoringEvaluation { .. } => {
                 waiting == 0 && active
             }
-            Stage::Accepting | Stage::Finishing(_) => waiting == 0 && !active,
+            Stage::StoringSubmission | Stage::StoringEnd(_) => waiting == 0 && !active,
         };
         if !fits || state.ended.contains_key(&id) {
             return Err(Inconsistency::JobList(id));
@@ -136,7 +136,7 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
 /// is under way.
 fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let Speculation { candidates, evaluations } = &job.speculation;
-    let under_way = matches!(job.stage, Stage::Computing(_) | Stage::Storing { .. });
+    let under_way = matches!(job.stage, Stage::Computing(_) | Stage::StoringEvaluation { .. });
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
     let known = |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));

@@ -39,14 +39,14 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
         ..JobSnapshot::default()
     };
     match &job.stage {
-        Stage::Accepting => return None,
+        Stage::StoringSubmission => return None,
         Stage::Waiting => snapshot.set_state(JobState::Waiting),
         Stage::Replaying { .. } => snapshot.set_state(JobState::Running),
         Stage::Computing(evaluation) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
         }
-        Stage::Storing { .. } | Stage::Finishing(_) => {
+        Stage::StoringEvaluation { .. } | Stage::StoringEnd(_) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = realizations;
         }
@@ -106,15 +106,15 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
 /// Describes what a job that has not ended waits for; empty if it does not wait.
 fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
-    if let Some(store_trouble) = &job.store_trouble {
+    if let Some(store_retry) = &job.store_retry {
         let does = match job.stage {
             Stage::Replaying { .. } => "read",
             _ => "write",
         };
         return format!(
             "the store cannot {does} a record; retrying: {} {}",
-            store_trouble.error,
-            since(store_trouble.since)
+            store_retry.error,
+            since(store_retry.since)
         );
     }
     if state.draining {
@@ -159,9 +159,10 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
                 .unwrap_or_else(|| format!("a worker that takes batches {}", since(job.progressed)))
         }
         Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
-        Stage::Accepting | Stage::Computing(_) | Stage::Storing { .. } | Stage::Finishing(_) => {
-            String::new()
-        }
+        Stage::StoringSubmission
+        | Stage::Computing(_)
+        | Stage::StoringEvaluation { .. }
+        | Stage::StoringEnd(_) => String::new(),
     }
 }
 

@@ -208,7 +208,7 @@ impl State {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
         let banned = self.banned.iter().filter(on_its_way).count();
         let jobs =
-            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_trouble.is_none());
+            self.jobs.values().filter(|job| job.stage.is_storing() && job.store_retry.is_none());
         jobs.count() + banned
     }
 
@@ -275,7 +275,7 @@ impl State {
         self.lost_in_a_row.get(host).is_some_and(|lost| lost.workers.len() >= LOST_IN_A_ROW_MAX)
     }
 
-    /// Notes that a worker has answered.
+    /// Records that a worker has answered.
     pub(crate) fn note_answer(&mut self, worker: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&worker) {
             worker.has_answered = true;
@@ -283,7 +283,7 @@ impl State {
         }
     }
 
-    /// Notes that a worker was lost while it held batches.
+    /// Records that a worker was lost while it held batches.
     pub(crate) fn count_loss(&mut self, name: &WorkerName, now: Duration) {
         let host = name.host();
         if self.lost_in_a_row.len() >= WORKERS_MAX && !self.lost_in_a_row.contains_key(host) {

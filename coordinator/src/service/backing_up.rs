@@ -4,7 +4,7 @@ use std::fs::File;
 use std::time::Duration;
 
 use futures::Stream;
-use osteon_common::limits::{BACKUP_S_MAX, READER_PATIENCE_S};
+use osteon_common::limits::{BACKUP_SECONDS_MAX, READER_STALL_SECONDS_MAX};
 use osteon_proto::v1::backup_response::Part;
 use osteon_proto::v1::{BackupEnd, BackupResponse};
 use tokio::io::AsyncReadExt as _;
@@ -35,7 +35,8 @@ pub(crate) fn streamed(
     tokio::spawn(async move {
         let _place = place;
         let begun = Instant::now();
-        let outgoing = PartSender { sender, until: begun + Duration::from_secs(BACKUP_S_MAX) };
+        let outgoing =
+            PartSender { sender, until: begun + Duration::from_secs(BACKUP_SECONDS_MAX) };
         match send(copied, &outgoing).await {
             Ok(bytes) => {
                 let elapsed_s = begun.elapsed().as_secs_f64();
@@ -70,14 +71,14 @@ struct PartSender {
 impl PartSender {
     async fn part(&self, part: Part) -> Result<(), Unsent> {
         let left = self.until.saturating_duration_since(Instant::now());
-        let patience = Duration::from_secs(READER_PATIENCE_S).min(left);
+        let patience = Duration::from_secs(READER_STALL_SECONDS_MAX).min(left);
         let message = Ok(BackupResponse { part: Some(part) });
         match timeout(patience, self.sender.send(message)).await {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) => Err(Unsent::Gone),
             Err(_) => Err(Unsent::Refused(Status::deadline_exceeded(format!(
-                "the client read nothing of the backup for {READER_PATIENCE_S} s, or not all of \
-                 it within {BACKUP_S_MAX} s; start the backup again"
+                "the client read nothing of the backup for {READER_STALL_SECONDS_MAX} s, or not all of \
+                 it within {BACKUP_SECONDS_MAX} s; start the backup again"
             )))),
         }
     }

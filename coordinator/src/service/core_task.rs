@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Answer, Effect, Refusal};
 use crate::core::event::{Event, Hello, ReadFailure, Request};
-use crate::core::ids::{JobId, Token, WorkerId};
+use crate::core::ids::{JobId, ReplyId, WorkerId};
 use crate::core::reactor::react;
 use crate::core::snapshot;
 use crate::core::state::State;
@@ -54,8 +54,8 @@ pub(crate) struct Core {
     state: State,
     clock: Clock,
     commands: mpsc::Sender<StoreCommand>,
-    next_token: u64,
-    waiting: BTreeMap<Token, oneshot::Sender<Answer>>,
+    next_reply_id: u64,
+    waiting: BTreeMap<ReplyId, oneshot::Sender<Answer>>,
     /// Newest snapshots of the jobs that are being watched.
     watching: BTreeMap<JobId, watch::Sender<v1::JobSnapshot>>,
     outbound: BTreeMap<WorkerId, Outbound>,
@@ -77,7 +77,7 @@ impl Core {
             state,
             clock,
             commands,
-            next_token: 0,
+            next_reply_id: 0,
             waiting: BTreeMap::new(),
             watching: BTreeMap::new(),
             outbound: BTreeMap::new(),
@@ -114,12 +114,12 @@ impl Core {
         match message {
             Message::Event(event) => self.handle(VecDeque::from([event])),
             Message::Ask(request, reply) => {
-                let token = Token(self.next_token);
-                self.next_token += 1;
+                let reply_id = ReplyId(self.next_reply_id);
+                self.next_reply_id += 1;
                 // Requests whose clients have gone are dropped.
                 self.waiting.retain(|_, reply| !reply.is_closed());
-                self.waiting.insert(token, reply);
-                self.handle(VecDeque::from([Event::Requested { token, request }]));
+                self.waiting.insert(reply_id, reply);
+                self.handle(VecDeque::from([Event::Requested { reply_id, request }]));
             }
             Message::Watch(job, reply) => self.watch(job, reply),
             Message::Attach { worker, hello, outbound } => {
@@ -183,22 +183,22 @@ impl Core {
                         followups.push_back(Event::Read { job, number, found });
                     }
                 }
-                Effect::Prune { token, jobs } => {
-                    let command = StoreCommand::Prune { token, jobs: jobs.clone() };
+                Effect::Prune { reply_id, jobs } => {
+                    let command = StoreCommand::Prune { reply_id, jobs: jobs.clone() };
                     if let Err(refused) = self.commands.try_send(command) {
                         let outcome = Err(refused.to_string());
-                        followups.push_back(Event::Pruned { token, jobs, outcome });
+                        followups.push_back(Event::Pruned { reply_id, jobs, outcome });
                     }
                 }
-                Effect::Answer { token, answer } => {
-                    if let Some(reply) = self.waiting.remove(&token) {
+                Effect::Answer { reply_id, answer } => {
+                    if let Some(reply) = self.waiting.remove(&reply_id) {
                         // The client may have gone.
                         let _ = reply.send(answer);
                     }
                 }
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
-                Effect::GiveUp { error, waited } => {
+                Effect::ReportStoreFailure { error, waited } => {
                     self.failing.report(ComponentFailure::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),

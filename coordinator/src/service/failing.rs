@@ -62,7 +62,7 @@ impl FailureReporter {
         self.leave_well(Health::Failed(failed));
     }
 
-    /// Notes that the coordinator is about to be stopped.
+    /// Records that the coordinator is about to be stopped.
     pub(crate) fn disarm(&self) {
         self.leave_well(Health::Stopping);
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
-use osteon_common::limits::{FETCH_S_MAX, READER_PATIENCE_S};
+use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
 use osteon_common::outcome::Outcome;
 use osteon_common::results::BestPoint;
 use osteon_proto::v1::fetch_response::Part;
@@ -215,7 +215,7 @@ where
 {
     let (parts, sent) = mpsc::channel(AHEAD);
     let (told, ending) = oneshot::channel();
-    let until = Instant::now() + Duration::from_secs(FETCH_S_MAX);
+    let until = Instant::now() + Duration::from_secs(FETCH_SECONDS_MAX);
     let producing = produce(FetchStream { parts, until, permit: Arc::new(permit) });
     tokio::spawn(async move {
         // The reader's permit is released with it.
@@ -230,19 +230,19 @@ where
 }
 
 fn patience() -> Duration {
-    Duration::from_secs(READER_PATIENCE_S)
+    Duration::from_secs(READER_STALL_SECONDS_MAX)
 }
 
 fn too_late() -> Status {
     Status::deadline_exceeded(format!(
-        "the client read nothing of the results for {READER_PATIENCE_S} s, or not all of them \
-         within {FETCH_S_MAX} s; fetch them again"
+        "the client read nothing of the results for {READER_STALL_SECONDS_MAX} s, or not all of them \
+         within {FETCH_SECONDS_MAX} s; fetch them again"
     ))
 }
 
 fn too_slow() -> Status {
     Status::deadline_exceeded(format!(
-        "the results were not read and computed within {FETCH_S_MAX} s; fetch them again when the \
+        "the results were not read and computed within {FETCH_SECONDS_MAX} s; fetch them again when the \
          coordinator has less to do"
     ))
 }
@@ -311,7 +311,7 @@ mod tests {
             sleep(patience() * 9 / 10).await;
         }
         let held = begun.elapsed();
-        assert!(held < Duration::from_secs(FETCH_S_MAX) + 4 * patience(), "{held:?}");
+        assert!(held < Duration::from_secs(FETCH_SECONDS_MAX) + 4 * patience(), "{held:?}");
         drop(permit(&semaphore).await);
     }
 
@@ -372,7 +372,7 @@ mod tests {
         let semaphore = Arc::new(Semaphore::new(1));
         let permit = permit(&semaphore).await;
         let stream = paced(permit, |reader| send_all(store.downgrade(), end, reader));
-        let limit = Duration::from_secs(FETCH_S_MAX) + patience();
+        let limit = Duration::from_secs(FETCH_SECONDS_MAX) + patience();
         let parts: Vec<_> = timeout(limit, stream.collect()).await.unwrap();
         let last = parts.last().unwrap().as_ref().unwrap_err();
         assert_eq!(last.code(), Code::DeadlineExceeded);
@@ -384,7 +384,7 @@ mod tests {
     async fn next(
         stream: &mut (impl Stream<Item = Result<FetchResponse, Status>> + Unpin),
     ) -> Option<Result<FetchResponse, Status>> {
-        for _ in 0..2 * FETCH_S_MAX {
+        for _ in 0..2 * FETCH_SECONDS_MAX {
             if let Some(next) = stream.next().now_or_never() {
                 return next;
             }

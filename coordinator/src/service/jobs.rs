@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use futures::Stream;
 use osteon_common::limits::{
-    FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
+    FETCHES_AT_ONCE_MAX, FETCHES_PER_CALLER_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
 };
 use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
@@ -61,7 +61,7 @@ type BoxStream<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 impl JobsService {
     pub(crate) fn new(messages: mpsc::Sender<Message>, store: mpsc::Sender<StoreCommand>) -> Self {
-        let fetches = Limiter::new(FETCHES_AT_ONCE_MAX, FETCHES_OF_ONE_MAX);
+        let fetches = Limiter::new(FETCHES_AT_ONCE_MAX, FETCHES_PER_CALLER_MAX);
         Self { messages, store, fetches, backups: Arc::new(Semaphore::new(1)) }
     }
 

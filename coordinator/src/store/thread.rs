@@ -12,7 +12,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::core::effect::Record;
 use crate::core::event::{Event, ReadFailure};
-use crate::core::ids::{JobId, Token};
+use crate::core::ids::{JobId, ReplyId};
 use crate::service::failing::Guard;
 use crate::store::job_output::ReadRequest;
 use crate::store::{BanRecord, Store, StoreError};
@@ -30,7 +30,7 @@ pub(crate) enum StoreCommand {
     /// Read an evaluation of a job.
     Read { job: JobId, number: u64 },
     /// Delete ended jobs.
-    Prune { token: Option<Token>, jobs: Vec<JobId> },
+    Prune { reply_id: Option<ReplyId>, jobs: Vec<JobId> },
     /// Read a record of an ended job's output.
     Fetch(ReadRequest),
     /// Copy the whole store.
@@ -105,9 +105,9 @@ impl PendingWork<'_> {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
                 drop(self.events.blocking_send(Event::Read { job, number, found }));
             }
-            StoreCommand::Prune { token, jobs } => {
+            StoreCommand::Prune { reply_id, jobs } => {
                 let outcome = store.delete_jobs(&jobs).map_err(|error| error.to_string());
-                drop(self.events.blocking_send(Event::Pruned { token, jobs, outcome }));
+                drop(self.events.blocking_send(Event::Pruned { reply_id, jobs, outcome }));
             }
             StoreCommand::Fetch(reading) => self.readings.push_back(reading),
             StoreCommand::Copy { reply } => self.copies.push_back(reply),

@@ -9,7 +9,7 @@ use osteon_common::results::JobResult;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
-use osteon_coordinator::core::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::react;
 use osteon_coordinator::core::sanity::sanity_check;
 use osteon_coordinator::core::state::State;
@@ -154,7 +154,7 @@ impl Clockwork {
             if let Request::Submit { client, .. } = &mut request {
                 *client = format!("client {number}");
             }
-            self.react(Event::Requested { token: Token(number), request });
+            self.react(Event::Requested { reply_id: ReplyId(number), request });
         }
         while !self.unfinished.is_empty() {
             let ((at, _), happening) = self.agenda.pop_first().expect("something is to happen");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobFailure, JobResult, Status};
 use osteon_coordinator::core::effect::Answer;
-use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::ids::{JobId, ReplyId};
 use osteon_coordinator::store::job_output;
 use osteon_coordinator::store::{EndRecord, JobRecord, Store as _, StoredJob};
 use osteon_proto::v1::JobState;
@@ -16,8 +16,8 @@ use super::{World, point_key};
 use crate::fake;
 
 impl World {
-    pub(super) fn answered(&mut self, token: Token, answer: &Answer) {
-        if let Some(client) = self.submissions.remove(&token) {
+    pub(super) fn answered(&mut self, reply_id: ReplyId, answer: &Answer) {
+        if let Some(client) = self.submissions.remove(&reply_id) {
             match answer {
                 Answer::Submitted(job) => {
                     assert!(self.stored(*job).is_some(), "not durable");
@@ -27,7 +27,7 @@ impl World {
                 Answer::Refused(_) => {}
                 other => panic!("{other:?} to a submission"),
             }
-        } else if let Some(client) = self.cancellations.remove(&token) {
+        } else if let Some(client) = self.cancellations.remove(&reply_id) {
             if self.clients[client].pruned {
                 return;
             }

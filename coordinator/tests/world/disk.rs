@@ -2,7 +2,7 @@
 
 use osteon_coordinator::core::effect::Record;
 use osteon_coordinator::core::event::{Event, ReadFailure, Request, Retention};
-use osteon_coordinator::core::ids::{JobId, Token};
+use osteon_coordinator::core::ids::{JobId, ReplyId};
 use osteon_coordinator::store::Store as _;
 
 use super::{Occurrence, World};
@@ -96,21 +96,21 @@ impl World {
     /// Requests the deletion of ended jobs, once every client has been answered.
     pub(super) fn prune(&mut self) {
         if self.clients.iter().all(|client| client.job.is_some()) {
-            let token = Token(self.number());
+            let reply_id = ReplyId(self.number());
             let retention = Retention::default();
-            self.react(Event::Requested { token, request: Request::Prune(retention) });
+            self.react(Event::Requested { reply_id, request: Request::Prune(retention) });
         }
         self.within(3000, Occurrence::Prune);
     }
 
-    pub(super) fn forget(&mut self, token: Option<Token>, jobs: Vec<JobId>) {
+    pub(super) fn forget(&mut self, reply_id: Option<ReplyId>, jobs: Vec<JobId>) {
         let outcome = if self.refuses() {
             Err("the disk is full".to_owned())
         } else {
             self.forget_now(&jobs);
             Ok(())
         };
-        self.within(5, Occurrence::Report(Event::Pruned { token, jobs, outcome }));
+        self.within(5, Occurrence::Report(Event::Pruned { reply_id, jobs, outcome }));
     }
 
     /// Checks the output of ended jobs, and deletes it.

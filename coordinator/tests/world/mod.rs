@@ -8,7 +8,7 @@ use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
-use osteon_coordinator::core::ids::{BatchId, JobId, Token, WorkerId};
+use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::{Restored, react};
 use osteon_coordinator::core::sanity::sanity_check;
 use osteon_coordinator::core::state::{BATCHES_IN_FLIGHT_MAX, State};
@@ -67,7 +67,7 @@ enum Occurrence {
     /// An evaluation is read.
     Read(JobId, u64),
     /// Ended jobs are deleted.
-    Forget(Option<Token>, Vec<JobId>),
+    Forget(Option<ReplyId>, Vec<JobId>),
     /// A client requests the deletion of ended jobs.
     Prune,
     /// A report of the store arrives.
@@ -101,8 +101,8 @@ pub(crate) struct World {
     config: Config,
     store: MemoryStore,
     clients: Vec<Client>,
-    submissions: BTreeMap<Token, usize>,
-    cancellations: BTreeMap<Token, usize>,
+    submissions: BTreeMap<ReplyId, usize>,
+    cancellations: BTreeMap<ReplyId, usize>,
     /// Maximum simulated time.
     most: Duration,
     /// Period in which the store refuses everything.
@@ -293,7 +293,7 @@ impl World {
             Occurrence::Lie(worker, batch, work) => self.lie(worker, batch, &work),
             Occurrence::Cancel(client) => self.cancel(client),
             Occurrence::Read(job, number) => self.read(job, number),
-            Occurrence::Forget(token, jobs) => self.forget(token, jobs),
+            Occurrence::Forget(reply_id, jobs) => self.forget(reply_id, jobs),
             Occurrence::Prune => self.prune(),
         }
     }
@@ -321,8 +321,8 @@ impl World {
 
     fn submit(&mut self, client: usize) {
         if self.clients[client].job.is_none() {
-            let token = Token(self.number());
-            self.submissions.insert(token, client);
+            let reply_id = ReplyId(self.number());
+            self.submissions.insert(reply_id, client);
             let Client { specification, request_id, .. } = &self.clients[client];
             let mut request = fake::submission(specification, request_id);
             if let Request::Submit { client: name, priority, .. } = &mut request {
@@ -330,7 +330,7 @@ impl World {
                 *priority = client as u32;
             }
             // A client repeats its request until the job is accepted.
-            self.react(Event::Requested { token, request });
+            self.react(Event::Requested { reply_id, request });
             self.within(2000, Occurrence::Submit(client));
         }
     }
@@ -356,9 +356,9 @@ impl World {
             return;
         }
         if let Some(job) = self.clients[client].job {
-            let token = Token(self.number());
-            self.cancellations.insert(token, client);
-            self.react(Event::Requested { token, request: Request::Cancel(job) });
+            let reply_id = ReplyId(self.number());
+            self.cancellations.insert(reply_id, client);
+            self.react(Event::Requested { reply_id, request: Request::Cancel(job) });
         }
         self.within(2000, Occurrence::Cancel(client));
     }
@@ -435,10 +435,12 @@ impl World {
                     self.within(20, Occurrence::Write(record));
                 }
                 Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
-                Effect::Prune { token, jobs } => self.within(20, Occurrence::Forget(token, jobs)),
-                Effect::Answer { token, answer } => self.answered(token, &answer),
+                Effect::Prune { reply_id, jobs } => {
+                    self.within(20, Occurrence::Forget(reply_id, jobs))
+                }
+                Effect::Answer { reply_id, answer } => self.answered(reply_id, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}
-                Effect::GiveUp { .. } => panic!("nobody lacks patience"),
+                Effect::ReportStoreFailure { .. } => panic!("nobody lacks patience"),
                 Effect::Stop => self.stopped(),
             }
         }

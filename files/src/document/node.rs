@@ -1,4 +1,5 @@
-//! The tree of a file, with paths and lines for messages.
+//! The values of a TOML or JSON file as a tree, with the key path and the line number of each value for
+//! error messages.
 
 use std::fmt;
 use std::path::Path;
@@ -19,7 +20,7 @@ pub enum Format {
 impl Format {
     /// Returns the format that the extension of `path` denotes; `None` if it is neither `toml` nor
     /// `json`.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_extension(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?;
         if extension.eq_ignore_ascii_case("toml") {
             Some(Self::Toml)
@@ -39,7 +40,7 @@ impl Format {
     }
 }
 
-/// Syntax error of a text.
+/// A syntax error in the text of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
 pub struct SyntaxError {
@@ -69,7 +70,8 @@ pub(crate) enum Value {
     Null,
     /// true or false.
     Boolean(bool),
-    /// A number written without fraction or exponent, within ±2⁶³ or so.
+    /// A number written without fraction or exponent; TOML: any that fits in 128 bits, JSON: from -2⁶³
+    /// to 2⁶⁴ - 1.
     Integer(i128),
     /// Any other number; may be NaN or infinite.
     Number(f64),
@@ -84,8 +86,8 @@ pub(crate) enum Value {
 }
 
 impl Node {
-    /// Returns the line of the field with this path, or else of the innermost table around it that
-    /// has one.
+    /// Returns the line of the field with this path. If the field is absent, returns the line of the
+    /// innermost existing table on the path; `None` if that table has no header line of its own.
     ///
     /// Paths have the form of [`entry_path`](osteon_common::field_path::entry_path) and
     /// [`element_path`](osteon_common::field_path::element_path).
@@ -93,16 +95,17 @@ impl Node {
         let mut node = self;
         let mut rest = path;
         let mut line = None;
-        while let Some((child, after)) = node.child_on(rest) {
+        while let Some((child, after_child)) = node.next_on_path(rest) {
             line = if child.is_implied() { None } else { child.line };
             node = child;
-            rest = after;
+            rest = after_child;
         }
         line
     }
 
-    /// Returns whether this is a table that no line of the file opens by itself, as `parameters` in
-    /// `[parameters.density]`: the parser gives it the line of its first entry.
+    /// Returns whether this is a table without a header of its own, which exists only because a nested
+    /// table does, like `parameters` in `[parameters.density]`. The parser gives it the line of its
+    /// first entry.
     fn is_implied(&self) -> bool {
         let Value::Table(entries) = &self.value else { return false };
         let first = entries.first().map(|(_, node)| node);
@@ -110,7 +113,7 @@ impl Node {
     }
 
     /// Returns the child that the first segment of `path` names, and the rest of the path.
-    fn child_on<'a, 'p>(&'a self, path: &'p str) -> Option<(&'a Node, &'p str)> {
+    fn next_on_path<'a, 'p>(&'a self, path: &'p str) -> Option<(&'a Node, &'p str)> {
         match &self.value {
             Value::Table(entries) => entries.iter().find_map(|(key, node)| {
                 let path = path.strip_prefix('.').unwrap_or(path);
@@ -127,7 +130,7 @@ impl Node {
 }
 
 impl fmt::Display for Value {
-    /// Formats the value for a message, after "is" or "found".
+    /// Formats the value as it appears in messages such as `is 3` or `expected a table, found 3`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Null => f.write_str("null"),
@@ -138,7 +141,8 @@ impl fmt::Display for Value {
             Self::Date => f.write_str("a date or time"),
             Self::List(elements) => match elements.len() {
                 0 => f.write_str("an empty list"),
-                count => write!(f, "a list of {count}"),
+                1 => f.write_str("a list of 1 value"),
+                count => write!(f, "a list of {count} values"),
             },
             Self::Table(_) => f.write_str("a table"),
         }

@@ -1,6 +1,6 @@
 //! Parses TOML text into a tree, with the line of every key and element.
 
-mod extent;
+mod size_limits;
 
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
@@ -9,21 +9,21 @@ use super::node::{Format, Node, SyntaxError, Value, position};
 
 /// Parses a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
-    if let Err((offset, excess)) = extent::check(text) {
+    if let Err((offset, exceeded)) = size_limits::check(text) {
         let (line, column) = position(text, offset);
         return Err(SyntaxError {
             format: Format::Toml,
             line,
             column,
-            message: excess.to_string(),
+            message: exceeded.to_string(),
         });
     }
-    let table = DeTable::parse(text).map_err(|error| malformed(text, &error))?;
-    let lines = LineStarts::new(text);
-    Ok(Node { line: None, value: lines.table(table.get_ref()) })
+    let table = DeTable::parse(text).map_err(|error| syntax_error(text, &error))?;
+    let builder = TreeBuilder::new(text);
+    Ok(Node { line: None, value: builder.convert_table(table.get_ref()) })
 }
 
-fn malformed(text: &str, error: &toml::de::Error) -> SyntaxError {
+fn syntax_error(text: &str, error: &toml::de::Error) -> SyntaxError {
     let (line, column) = position(text, error.span().map_or(0, |span| span.start));
     SyntaxError {
         format: Format::Toml,
@@ -33,21 +33,24 @@ fn malformed(text: &str, error: &toml::de::Error) -> SyntaxError {
     }
 }
 
-/// Byte offsets at which the lines of a text begin.
-struct LineStarts(Vec<usize>);
+/// Converts the parser's tree into ours, with line numbers.
+struct TreeBuilder {
+    /// Byte offsets at which the lines of the text begin.
+    line_starts: Vec<usize>,
+}
 
-impl LineStarts {
+impl TreeBuilder {
     fn new(text: &str) -> Self {
         let after_newline =
             text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
-        Self(std::iter::once(0).chain(after_newline).collect())
+        Self { line_starts: std::iter::once(0).chain(after_newline).collect() }
     }
 
-    fn at(&self, offset: usize) -> usize {
-        self.0.partition_point(|&start| start <= offset)
+    fn line_at(&self, offset: usize) -> usize {
+        self.line_starts.partition_point(|&start| start <= offset)
     }
 
-    fn table(&self, table: &DeTable<'_>) -> Value {
+    fn convert_table(&self, table: &DeTable<'_>) -> Value {
         let mut entries: Vec<_> = table.iter().collect();
         // The parser sorts by name; restore the order of the file.
         entries.sort_by_key(|(key, _)| key.span().start);
@@ -55,14 +58,17 @@ impl LineStarts {
             entries
                 .into_iter()
                 .map(|(key, value)| {
-                    let line = Some(self.at(key.span().start));
-                    (key.get_ref().to_string(), Node { line, value: self.value(value.get_ref()) })
+                    let line = Some(self.line_at(key.span().start));
+                    (
+                        key.get_ref().to_string(),
+                        Node { line, value: self.convert_value(value.get_ref()) },
+                    )
                 })
                 .collect(),
         )
     }
 
-    fn value(&self, value: &DeValue<'_>) -> Value {
+    fn convert_value(&self, value: &DeValue<'_>) -> Value {
         match value {
             DeValue::String(text) => Value::Text(text.to_string()),
             DeValue::Integer(digits) => integer(digits),
@@ -70,18 +76,22 @@ impl LineStarts {
             DeValue::Boolean(value) => Value::Boolean(*value),
             DeValue::Datetime(_) => Value::Date,
             DeValue::Array(elements) => {
-                Value::List(elements.iter().map(|element| self.element(element)).collect())
+                Value::List(elements.iter().map(|element| self.convert_element(element)).collect())
             }
-            DeValue::Table(table) => self.table(table),
+            DeValue::Table(table) => self.convert_table(table),
         }
     }
 
-    fn element(&self, element: &Spanned<DeValue<'_>>) -> Node {
-        Node { line: Some(self.at(element.span().start)), value: self.value(element.get_ref()) }
+    fn convert_element(&self, element: &Spanned<DeValue<'_>>) -> Node {
+        Node {
+            line: Some(self.line_at(element.span().start)),
+            value: self.convert_value(element.get_ref()),
+        }
     }
 }
 
-/// Parses an integer of any size: one beyond 128 bits becomes a floating-point number.
+/// Parses an integer of any size. Beyond 128 bits a decimal one becomes a floating-point number, any
+/// other one infinity.
 fn integer(digits: &DeInteger<'_>) -> Value {
     match i128::from_str_radix(digits.as_str(), digits.radix()) {
         Ok(value) => Value::Integer(value),

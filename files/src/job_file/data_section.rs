@@ -18,13 +18,13 @@ const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 pub(super) const KEYS: [Key; 5] = [
     Key {
         name: "velocities",
-        meaning: "for `identify`: a CSV file relative to the job file, with a header and a column \
-                  `velocity` in m/s (other columns, and lines that start with `#`, are ignored); or \
-                  a list of the numbers",
+        meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
+                  header and a column `velocity` in m/s (other columns, and lines that start with \
+                  `#`, are ignored); or a list of velocities",
     },
     Key {
         name: "group",
-        meaning: "the column of that file that names the group (bone, patient, site) of each \
+        meaning: "name of the CSV column that holds the group name (bone, patient, site) of each \
                   velocity; at most 1000 groups, see [below](#groups-of-velocities)",
     },
     Key {
@@ -33,9 +33,13 @@ pub(super) const KEYS: [Key; 5] = [
     },
     Key {
         name: MOMENTS[0],
-        meaning: "instead of velocities, together with the next key: their mean, m/s, above 0",
+        meaning: "mean of the velocities, m/s, above 0; replaces `data.velocities` and requires \
+                  `data.coefficient_of_variation`",
     },
-    Key { name: MOMENTS[1], meaning: "their coefficient of variation, above 0" },
+    Key {
+        name: MOMENTS[1],
+        meaning: "coefficient of variation of the velocities, above 0; required with `data.mean`",
+    },
 ];
 
 /// Returns the measured data, or `None` after recording the violation, and their file, if any. For

@@ -22,7 +22,7 @@ pub fn job_table() -> String {
         keys.iter().map(|key| row(&format!("{path}.{}", key.name), "", "", key.meaning)).collect()
     };
     let names = Parameter::ALL.map(|parameter| format!("`{}`", parameter.name())).join(", ");
-    let each = format!("a range for each of {names}");
+    let each = format!("either `start` and `bounds`, or `fixed`, for each of {names}");
     let mut settings = RunSettings::default();
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&format!(

@@ -10,12 +10,9 @@ use crate::reader::{Reader, Table};
 
 /// The keys of a range.
 pub(super) const KEYS: [Key; 3] = [
-    Key { name: "start", meaning: "first value of a free parameter, within its bounds" },
+    Key { name: "start", meaning: "value at which the search starts, within the bounds" },
     Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
-    Key {
-        name: "fixed",
-        meaning: "instead of both: the value of a parameter that is not searched",
-    },
+    Key { name: "fixed", meaning: "instead of both: the value of a parameter that is held fixed" },
 ];
 
 /// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no
@@ -82,8 +79,8 @@ fn bounds(reader: &mut Reader, table: &Table<'_>) -> Option<[f64; 2]> {
     let numbers = reader.numbers(&path, elements)?;
     let bounds = <[f64; 2]>::try_from(numbers).ok();
     if bounds.is_none() {
-        let count = elements.len();
-        reader.violations.add(path, format!("is a list of {count}; it must be {expected}"));
+        let found = &table.get("bounds")?.value;
+        reader.violations.add(path, format!("is {found}; it must be {expected}"));
     }
     bounds
 }

@@ -10,11 +10,13 @@ use crate::reader::{Reader, Table};
 pub(super) const KEYS: [Key; 2] = [
     Key {
         name: "value",
-        meaning: "value towards which the parameter is pulled; within its bounds",
+        meaning: "value expected from prior knowledge, within the bounds; the cost grows with the \
+                  distance from it",
     },
     Key {
         name: "weight",
-        meaning: "increase of the cost at a distance of the whole width of the bounds; above 0",
+        meaning: "increase of the cost if the parameter is off by the full width of its bounds; \
+                  above 0",
     },
 ];
 

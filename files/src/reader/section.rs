@@ -1,4 +1,5 @@
-//! Reads the declared keys of a section from a table of a file.
+//! Reads a section of a file: an implementation of [`Fields`] that, for each key that the section
+//! declares, reads its value from a table of the file.
 
 use osteon_common::fields::{
     self, Choice, Condition, Fields, Key, Number, Section, Whole, WholeRange,
@@ -45,8 +46,8 @@ impl Fields for TableReader<'_, '_> {
     }
 
     fn boolean(&mut self, key: Key, field: &mut bool) {
-        if let Some(truth) = self.reader.boolean(&self.table, key.name) {
-            *field = truth;
+        if let Some(boolean) = self.reader.boolean(&self.table, key.name) {
+            *field = boolean;
         }
     }
 
@@ -65,7 +66,7 @@ impl Fields for TableReader<'_, '_> {
             return declare(self);
         }
         // If the deciding key cannot be read, it is unknown whether these keys are meaningful.
-        if self.reader.violations.touches(&self.table.path(condition.decided_by)) {
+        if self.reader.violations.has_at_or_below(&self.table.path(condition.decided_by)) {
             return;
         }
         for name in fields::names(declare).into_iter().filter(|name| self.table.has(name)) {
@@ -73,5 +74,6 @@ impl Fields for TableReader<'_, '_> {
         }
     }
 
+    /// Such a table is read by its own code, see `crate::job_file`.
     fn custom_table(&mut self, _: Key) {}
 }

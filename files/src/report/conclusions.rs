@@ -9,13 +9,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::schema::keyed_by_parameter;
-use super::{MeanModel, Moments, finite};
+use super::{MeanModel, Moments, finite_or_null};
 
 /// What the data determine, to first order around the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identified {
-    /// Whether the model matches the data within three standard errors of all noise; if not, nothing is
-    /// known.
+    /// Whether the model reproduces each moment of the data to within three standard errors (data and
+    /// sampling noise combined), or to within a relative difference of 1e-4; if not, nothing is known.
     pub matched: bool,
     /// Level of all intervals.
     pub level: f64,
@@ -97,10 +97,10 @@ impl From<&DerivedQuantity> for QuantityEstimate {
     fn from(quantity: &DerivedQuantity) -> Self {
         let known = quantity.known;
         Self {
-            value: finite(quantity.value),
-            standard_error: known.and_then(|known| finite(known.standard_error)),
-            interval: known.map(|known| known.interval.map(finite)),
-            free_share: known.and_then(|known| finite(known.free_share)),
+            value: finite_or_null(quantity.value),
+            standard_error: known.and_then(|known| finite_or_null(known.standard_error)),
+            interval: known.map(|known| known.interval.map(finite_or_null)),
+            free_share: known.and_then(|known| finite_or_null(known.free_share)),
         }
     }
 }
@@ -136,7 +136,7 @@ pub struct ParameterProfile {
 /// The profiles by their parameters.
 pub(super) fn profiles(conclusions: &Conclusions) -> BTreeMap<Parameter, ParameterProfile> {
     let profiles = conclusions.profiles.iter().map(|profile| {
-        let costs = profile.costs.iter().copied().map(finite).collect();
+        let costs = profile.costs.iter().copied().map(finite_or_null).collect();
         (profile.parameter, ParameterProfile { values: profile.values.clone(), costs })
     });
     profiles.collect()
@@ -205,10 +205,10 @@ impl From<&osteon_common::inference::Solution> for Solution {
     fn from(solution: &osteon_common::inference::Solution) -> Self {
         Self {
             start: solution.start,
-            cost: finite(solution.cost),
+            cost: finite_or_null(solution.cost),
             evaluations: solution.evaluations,
             parameters: (&solution.point).into(),
-            dispersion: finite(solution.point.dispersion()),
+            dispersion: finite_or_null(solution.point.dispersion()),
         }
     }
 }

@@ -12,7 +12,7 @@ const CAUSE_CHARACTERS_MAX: usize = 300;
 /// Why a text is not the result of a job.
 #[derive(Debug, Error)]
 pub enum ReadError {
-    /// The text is no JSON.
+    /// The text is not JSON.
     #[error("not valid JSON: {0}")]
     Syntax(serde_json::Error),
     /// The keys are those of another revision.
@@ -24,7 +24,7 @@ pub enum ReadError {
         /// The revision of the file.
         found: u64,
     },
-    /// The file is the result of something that is no job.
+    /// The file is the result of something that is not a job.
     #[error("`kind` is {found}; it must be identification or propagation")]
     Kind {
         /// The kind, in quotes.
@@ -67,10 +67,10 @@ impl From<serde_path_to_error::Error<serde_json::Error>> for ReadError {
 
 /// Why a result has no point to give.
 #[derive(Debug, Error)]
-pub enum NoPoint {
+pub enum BestPointError {
     /// There is no group of this name.
     #[error("there is no group {name:?}; the groups are {}", listed(.names))]
-    NoGroup {
+    UnknownGroup {
         /// The name.
         name: String,
         /// The names of the groups.
@@ -78,13 +78,13 @@ pub enum NoPoint {
     },
     /// A number of the point is null.
     #[error("the result has no best point: no evaluated point was feasible")]
-    NoPoint,
+    NoPointFound,
 }
 
-impl NoPoint {
-    pub(super) fn no_group(name: &str, groups: &[Group]) -> Self {
+impl BestPointError {
+    pub(super) fn unknown_group(name: &str, groups: &[Group]) -> Self {
         let names = groups.iter().map(|group| group.name.clone()).collect();
-        Self::NoGroup { name: name.to_owned(), names }
+        Self::UnknownGroup { name: name.to_owned(), names }
     }
 }
 

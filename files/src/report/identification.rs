@@ -12,7 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
-use super::{Data, EstimatedErrors, MeanModel, Moments, Solver, Velocity, finite, present};
+use super::{
+    Data, EstimatedErrors, MeanModel, Moments, Solver, Velocity, absent_or_nullable, finite_or_null,
+};
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
 /// group has its own point, and the keys of the best point are null.
@@ -33,7 +35,11 @@ pub struct Identification {
     /// Cost of the best point.
     pub cost: Option<f64>,
     /// Standard error of the cost by sampling; only of a likelihood.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub cost_standard_error: Option<Option<f64>>,
     /// The mean model at the best point.
     pub parameters: MeanModel,
@@ -63,12 +69,20 @@ pub struct Identification {
     pub search: SearchSettings,
     /// Relative changes of the moments for a relative change of each free parameter; null where they
     /// were not measured, not there where the data are groups.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     #[schemars(transform = keyed_by_parameter)]
     pub sensitivities: Option<Option<BTreeMap<Parameter, Moments>>>,
     /// What the data determine; null where the derivatives were not measured, not there where the data
     /// are groups.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub identified: Option<Option<Identified>>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -161,12 +175,12 @@ struct BestPointKeys {
 impl BestPointKeys {
     fn new(objective: Objective, best: Option<&BestPoint>) -> Self {
         let point: Option<Point> = best.map(|best| best.point);
-        let error = || best.and_then(|best| best.cost_error).and_then(finite);
+        let error = || best.and_then(|best| best.cost_error).and_then(finite_or_null);
         Self {
-            cost: best.and_then(|best| best.cost).and_then(finite),
+            cost: best.and_then(|best| best.cost).and_then(finite_or_null),
             cost_standard_error: (objective == Objective::Likelihood).then(error),
             parameters: point.as_ref().map(MeanModel::from).unwrap_or_default(),
-            dispersion: point.map(|point| point.dispersion()).and_then(finite),
+            dispersion: point.map(|point| point.dispersion()).and_then(finite_or_null),
             failures: best.map(|best| best.failures.iter().collect()).unwrap_or_default(),
         }
     }
@@ -185,7 +199,11 @@ pub struct Group {
     /// Cost of the best point.
     pub cost: Option<f64>,
     /// Standard error of the cost by sampling; only of a likelihood.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub cost_standard_error: Option<Option<f64>>,
     /// The mean model at the best point.
     pub parameters: MeanModel,
@@ -255,12 +273,16 @@ pub struct SearchSettings {
     pub starts: u64,
     /// Whether the derivatives of both moments were to be measured.
     pub sensitivities: bool,
-    /// Values that parameters are drawn to; only with priors.
+    /// Values expected from prior knowledge; only with priors.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(transform = keyed_by_parameter)]
     pub priors: BTreeMap<Parameter, Prior>,
     /// Part of the cost that the priors have added; only with priors.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub penalty: Option<Option<f64>>,
     /// The choice that made this point the best one; null if no point was feasible.
     pub point: Option<PointMeaning>,
@@ -275,7 +297,7 @@ impl From<&JobResult> for SearchSettings {
         let priors = Parameter::ALL.into_iter().zip(search.priors);
         let priors: BTreeMap<_, _> =
             priors.filter_map(|(parameter, prior)| Some((parameter, prior?))).collect();
-        let penalty = || best.and_then(|best| best.penalty).and_then(finite);
+        let penalty = || best.and_then(|best| best.penalty).and_then(finite_or_null);
         let stepped = search.method == SearchMethod::Simplex;
         Self {
             method: search.method,

@@ -5,7 +5,7 @@ use osteon_common::results::{self, BestPoint, DataSummary};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{finite, present};
+use super::{absent_or_nullable, finite_or_null};
 
 /// One of the two moments of a set of velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,8 +44,8 @@ impl Moments {
 impl From<results::Moments> for Moments {
     fn from(moments: results::Moments) -> Self {
         Self {
-            mean: finite(moments.mean),
-            coefficient_of_variation: finite(moments.coefficient_of_variation),
+            mean: finite_or_null(moments.mean),
+            coefficient_of_variation: finite_or_null(moments.coefficient_of_variation),
         }
     }
 }
@@ -90,14 +90,26 @@ pub struct Data {
     pub moments: Moments,
     /// Confidence intervals of the moments of the law that the velocities were drawn from; not there
     /// where only moments are known, null where the velocities give none.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub interval: Option<Option<MomentIntervals>>,
     /// Kolmogorov–Smirnov test of the velocities against the model's; not there where only moments are
     /// known, null where there is no best point.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub kolmogorov: Option<Option<KolmogorovTest>>,
     /// Number of the velocities; only of groups.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "present")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
     pub count: Option<Option<u64>>,
 }
 

@@ -38,7 +38,7 @@ impl MeanModel {
 
 impl From<&Point> for MeanModel {
     fn from(point: &Point) -> Self {
-        let value = |parameter| super::finite(point.get(parameter));
+        let value = |parameter| super::finite_or_null(point.get(parameter));
         Self {
             density: value(Parameter::Density),
             longitudinal_young_modulus: value(Parameter::LongitudinalYoungModulus),

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::schema::keyed_by_failure;
-use super::{EstimatedErrors, MeanModel, Solver, Velocity, finite};
+use super::{EstimatedErrors, MeanModel, Solver, Velocity, finite_or_null};
 
 /// The moments of the velocities at one point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -61,7 +61,7 @@ impl From<&JobResult> for Propagation {
             scrambles: result.scrambles,
             control_variate: result.control_variate,
             parameters: point.as_ref().map(MeanModel::from).unwrap_or_default(),
-            dispersion: point.map(|point| point.dispersion()).and_then(finite),
+            dispersion: point.map(|point| point.dispersion()).and_then(finite_or_null),
             failures: best.map(|best| best.failures.iter().collect()).unwrap_or_default(),
             velocity: best.into(),
             solver: Solver::new(&result.solver, result.nominal, estimated_error.into()),

@@ -37,7 +37,7 @@ pub struct Simulation {
 impl Simulation {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        super::text(DocumentContent::Simulation(self))
+        super::to_pretty_json(DocumentContent::Simulation(self))
     }
 }
 
@@ -62,8 +62,8 @@ pub struct CheckedSolution {
     pub failure: Option<FailureKind>,
     /// Whether the same extremum was picked.
     pub same_pick: bool,
-    /// Largest difference of a picked time, s.
+    /// Largest difference of any picked time from that of the refined solution, s.
     pub time_difference: Option<f64>,
-    /// Relative difference of the velocity.
+    /// Relative difference of the velocity from that of the refined solution.
     pub relative_difference: Option<f64>,
 }

@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case")]
 pub enum Solver<E> {
-    /// Exact layers in (frequency, wavenumber). In the result of a job the sampling is the nominal
-    /// one, at the usual speeds of bone, and a realization with faster waves may use another.
+    /// Exact solution of the layered medium for each frequency and wavenumber. In the result of a job the
+    /// sampling is the nominal one, at the usual speeds of bone, and a realization with faster waves may
+    /// use another.
     Exact {
         /// Refinement of the sampling; 1 is the default.
         refinement: f64,
@@ -21,7 +22,7 @@ pub enum Solver<E> {
         period: Option<f64>,
         /// Number of (frequency, wavenumber) pairs.
         pairs: Option<u64>,
-        /// Estimated relative error of the velocity, or of a set of them, by discretisation.
+        /// Estimated relative error of the velocity, or of a set of them, due to discretisation.
         estimated_error: E,
         /// Number of pairs that were computed in all; only of a simulation.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -40,7 +41,7 @@ pub enum Solver<E> {
         element_order: u32,
         /// Time step of the first pass at refinement 1, s; null for the stability limit.
         time_step: Option<f64>,
-        /// Estimated relative error of the velocity, or of a set of them, by discretisation.
+        /// Estimated relative error of the velocity, or of a set of them, due to discretisation.
         estimated_error: E,
     },
 }

@@ -73,7 +73,7 @@ impl Passes<'_> {
     /// Computes the first arrival.
     ///
     /// # Errors
-    /// A typed failure if the case has no velocity in three passes, or if the computation exceeds
+    /// The failure, if the case has no velocity in three passes, or if the computation exceeds
     /// its limits.
     pub(super) fn arrival(&mut self) -> Result<Arrival, Failure> {
         let mut last = self.pass(self.fineness(0), None);

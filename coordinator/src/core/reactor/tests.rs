@@ -14,7 +14,7 @@ use crate::config::Config;
 use crate::core::effect::{Answer, Effect, Record, RecordKey};
 
 use crate::core::event::{Hello, Request};
-use crate::core::ids::{BatchId, JobId, Token, WorkerId};
+use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use crate::core::sanity::sanity_check;
 
 mod checks;
@@ -139,7 +139,7 @@ fn identification(realizations: u64) -> JobSpecification {
     job
 }
 
-fn submit(token: u64, request_id: &str, specification: JobSpecification) -> Event {
+fn submit(reply_id: u64, request_id: &str, specification: JobSpecification) -> Event {
     let request = Request::Submit {
         specification: Arc::new(specification),
         request_id: request_id.to_owned(),
@@ -147,11 +147,11 @@ fn submit(token: u64, request_id: &str, specification: JobSpecification) -> Even
         priority: 0,
         name: String::new(),
     };
-    Event::Requested { token: Token(token), request }
+    Event::Requested { reply_id: ReplyId(reply_id), request }
 }
 
-fn request(token: u64, request: Request) -> Event {
-    Event::Requested { token: Token(token), request }
+fn request(reply_id: u64, request: Request) -> Event {
+    Event::Requested { reply_id: ReplyId(reply_id), request }
 }
 
 fn stored(job: u64, key: RecordKey) -> Event {
@@ -225,9 +225,11 @@ fn described(effect: &Effect) -> String {
             let reason = end.ending.reason.as_deref().unwrap_or_default();
             format!("store job {} end: {} {reason}", end.job, end.ending.status.name())
         }
-        Effect::Answer { token, answer } => format!("answer {token}: {}", answered(answer)),
+        Effect::Answer { reply_id, answer } => format!("answer {reply_id}: {}", answered(answer)),
         Effect::Publish { job, .. } => format!("publish {job}"),
-        Effect::GiveUp { error, waited } => format!("give_up after {waited:?}: {error}"),
+        Effect::ReportStoreFailure { error, waited } => {
+            format!("give_up after {waited:?}: {error}")
+        }
         Effect::Stop => "stop".to_owned(),
     }
 }

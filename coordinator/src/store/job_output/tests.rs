@@ -173,7 +173,7 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     }
     let other = JobRecord { job: JobId(2), ..record };
     sender.try_send(StoreCommand::Put(Record::Job(other))).unwrap();
-    sender.try_send(StoreCommand::Prune { token: None, jobs: vec![JOB] }).unwrap();
+    sender.try_send(StoreCommand::Prune { reply_id: None, jobs: vec![JOB] }).unwrap();
     drop(sender);
     serve(&mut store, &mut commands, &events);
     assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });

@@ -169,7 +169,7 @@ fn give_back_audit(state: &mut State, batch: &Batch, loss: &LostWorker) {
     }
 }
 
-/// Notes that the worker of a tie-breaker was lost.
+/// Records that the worker of a tie-breaker was lost.
 fn tie_breaker_lost(state: &mut State, assignment: &Assignment, batch: BatchId, loss: &LostWorker) {
     if let Some(evaluation) = state.evaluation_of_mut(assignment)
         && let Some(dispute) =

@@ -62,7 +62,7 @@ fn next(state: &State) -> Option<(JobId, Point)> {
                 Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
                 None => has_room(),
             })?;
-        let certain = place == 0 && matches!(job.stage, Stage::Storing { .. });
+        let certain = place == 0 && matches!(job.stage, Stage::StoringEvaluation { .. });
         let had = state.shares.used(&job.record.client);
         Some((!certain, place, had, Reverse(job.record.priority), *id))
     };
@@ -109,14 +109,14 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
         let specification = &job.record.specification;
         let realizations = specification.monte_carlo.realizations;
         match &job.stage {
-            Stage::Storing { .. } if specification.kind == JobKind::Propagation => None,
+            Stage::StoringEvaluation { .. } if specification.kind == JobKind::Propagation => None,
             Stage::Computing(evaluation) => {
                 let soon = etas.get(id).is_some_and(|eta| *eta < until);
                 soon.then_some(evaluation.filled())
             }
-            Stage::Storing { .. } if has_next(job) => None,
-            Stage::Storing { .. } | Stage::Replaying { .. } => Some(realizations),
-            Stage::Accepting | Stage::Waiting | Stage::Finishing(_) => None,
+            Stage::StoringEvaluation { .. } if has_next(job) => None,
+            Stage::StoringEvaluation { .. } | Stage::Replaying { .. } => Some(realizations),
+            Stage::StoringSubmission | Stage::Waiting | Stage::StoringEnd(_) => None,
         }
     };
     state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()

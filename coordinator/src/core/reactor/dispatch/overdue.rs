@@ -346,7 +346,7 @@ pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Durati
     }
 }
 
-/// Notes that a worker has answered a batch that it holds.
+/// Records that a worker has answered a batch that it holds.
 pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
     let Some(worker) = state.workers.get_mut(&worker) else {
         return;

@@ -69,24 +69,27 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
                 batches::revoke(turn, tie_breaker);
             }
         }
-        Stage::Storing { record, .. } => {
+        Stage::StoringEvaluation { record, .. } => {
             job.restart_pending |= contributed || record.workers.contains(name);
             if job.restart_pending {
                 // The search may continue elsewhere after its restart.
                 speculation::drop_all(turn, id);
             }
         }
-        Stage::Finishing(_) if contributed => {
+        Stage::StoringEnd(_) if contributed => {
             // An end on its way to the store may be durable already; only a refused one can be
             // taken back.
-            let on_its_way =
-                job.store_trouble.as_ref().is_none_or(|store_trouble| store_trouble.on_its_way);
+            let in_flight =
+                job.store_retry.as_ref().is_none_or(|store_retry| store_retry.in_flight);
             job.restart_pending = true;
-            if !on_its_way {
+            if !in_flight {
                 jobs::reopen(turn, id);
             }
         }
-        Stage::Accepting | Stage::Waiting | Stage::Replaying { .. } | Stage::Finishing(_) => {}
+        Stage::StoringSubmission
+        | Stage::Waiting
+        | Stage::Replaying { .. }
+        | Stage::StoringEnd(_) => {}
     }
 }
 
@@ -106,7 +109,7 @@ fn compute_again(turn: &mut Turn, id: JobId) {
     }
 }
 
-/// Notes that the ban with this number is durable.
+/// Handles the report that the ban with this number is durable.
 pub(crate) fn stored(turn: &mut Turn, number: u64) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
@@ -115,13 +118,13 @@ pub(crate) fn stored(turn: &mut Turn, number: u64) {
     }
 }
 
-/// Notes that the ban with this number could not be stored; the write is repeated later.
+/// Handles the report that the ban with this number could not be stored; the write is repeated later.
 pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
         banned.refused = true;
         let since = banned.record.at;
-        records::give_up_if_late(turn, since, error);
+        records::report_store_failure_if_persistent(turn, since, error);
     }
 }
 

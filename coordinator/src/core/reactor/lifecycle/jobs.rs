@@ -36,7 +36,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
     let outcomes = record.outcomes.clone();
-    job.stage = Stage::Storing { record, is_last };
+    job.stage = Stage::StoringEvaluation { record, is_last };
     if is_last {
         speculation::prepare(turn, id, &outcomes);
     }
@@ -66,13 +66,13 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
         }
         Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
         // The store cannot read the evaluations that would still belong to its output.
-        Stage::Replaying { .. } if job.store_trouble.is_some() => {
+        Stage::Replaying { .. } if job.store_retry.is_some() => {
             finish(turn, id, cancelled());
         }
-        Stage::Accepting
+        Stage::StoringSubmission
         | Stage::Replaying { .. }
-        | Stage::Storing { .. }
-        | Stage::Finishing(_) => {}
+        | Stage::StoringEvaluation { .. }
+        | Stage::StoringEnd(_) => {}
     }
 }
 
@@ -162,8 +162,8 @@ pub(crate) fn finish(turn: &mut Turn, id: JobId, ending: Ending) {
     let record = EndRecord::new(id, ending, program, turn.now, search.evaluations(), best);
     let summary = Arc::new(search.summary());
     turn.effects.push(Effect::Store(Record::End { end: record.clone(), summary }));
-    job.stage = Stage::Finishing(record);
-    job.store_trouble = None;
+    job.stage = Stage::StoringEnd(record);
+    job.store_retry = None;
     leave(turn, id);
 }
 
@@ -173,7 +173,7 @@ pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.store_trouble = None;
+    job.store_retry = None;
     job.restart_pending = false;
     job.workers.clear();
     job.search = Search::new(job.record.specification.clone());

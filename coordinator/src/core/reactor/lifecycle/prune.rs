@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::core::effect::{Answer, Effect, Refusal};
 use crate::core::event::Retention;
-use crate::core::ids::{JobId, Token};
+use crate::core::ids::{JobId, ReplyId};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 
@@ -16,12 +16,12 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 const GRACE: Duration = Duration::from_secs(3600);
 
 /// Deletes the jobs that `retention` does not keep; the client is answered when that is durable.
-pub(crate) fn requested(turn: &mut Turn, token: Token, retention: Retention) {
+pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, retention: Retention) {
     let jobs = chosen(turn.state, retention, turn.now);
     if jobs.is_empty() {
-        turn.effects.push(Effect::Answer { token, answer: Answer::Pruned(jobs) });
+        turn.effects.push(Effect::Answer { reply_id, answer: Answer::Pruned(jobs) });
     } else {
-        turn.effects.push(Effect::Prune { token: Some(token), jobs });
+        turn.effects.push(Effect::Prune { reply_id: Some(reply_id), jobs });
     }
 }
 
@@ -51,14 +51,14 @@ pub(crate) fn tick(turn: &mut Turn) {
         return;
     }
     if !jobs.is_empty() {
-        turn.effects.push(Effect::Prune { token: None, jobs });
+        turn.effects.push(Effect::Prune { reply_id: None, jobs });
     }
 }
 
 /// Removes jobs that the store has deleted, or reports that it could not delete them.
 pub(crate) fn pruned(
     turn: &mut Turn,
-    token: Option<Token>,
+    reply_id: Option<ReplyId>,
     jobs: Vec<JobId>,
     outcome: Result<(), String>,
 ) {
@@ -75,8 +75,8 @@ pub(crate) fn pruned(
         }
         Err(error) => Answer::Refused(Refusal::NotPruned { error }),
     };
-    if let Some(token) = token {
-        turn.effects.push(Effect::Answer { token, answer });
+    if let Some(reply_id) = reply_id {
+        turn.effects.push(Effect::Answer { reply_id, answer });
     }
 }
 

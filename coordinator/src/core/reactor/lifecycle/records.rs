@@ -1,4 +1,5 @@
-//! Reports of the store about the records of a job: one is durable, or was refused.
+//! Handles the store's reports on the records of a job: a record has become durable, or could not be
+//! stored.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,31 +13,31 @@ use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
 use crate::store::JobRecord;
 
-/// Notes that a record is durable, and continues the job.
-pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
+/// Handles the report that a record is durable: continues the job.
+pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     match (key, &mut job.stage) {
-        (RecordKey::Job, Stage::Accepting) => {
+        (RecordKey::Job, Stage::StoringSubmission) => {
             job.stage = Stage::Waiting;
-            job.store_trouble = None;
+            job.store_retry = None;
             turn.state.waiting.push_back(id);
-            turn.effects.push(Effect::Note(accepted(&job.record)));
-            for token in std::mem::take(&mut job.tokens) {
-                turn.effects.push(Effect::Answer { token, answer: Answer::Submitted(id) });
+            turn.effects.push(Effect::Note(accepted_notice(&job.record)));
+            for reply_id in std::mem::take(&mut job.pending_replies) {
+                turn.effects.push(Effect::Answer { reply_id, answer: Answer::Submitted(id) });
             }
             if jobs::has_room(turn.state, id) {
                 jobs::begin_waiting(turn);
             }
         }
-        (RecordKey::Evaluation(number), Stage::Storing { record, is_last })
+        (RecordKey::Evaluation(number), Stage::StoringEvaluation { record, is_last })
             if record.number == number =>
         {
             let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
             job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
             job.workers.append(&mut record.workers);
-            job.store_trouble = None;
+            job.store_retry = None;
             job.search.tell(outcomes, estimated_error);
             if job.restart_pending {
                 jobs::restart(turn, id);
@@ -44,28 +45,30 @@ pub(crate) fn stored(turn: &mut Turn, id: JobId, key: RecordKey) {
                 jobs::advance(turn, id);
             }
         }
-        (RecordKey::End, Stage::Finishing(_)) => {
-            ended(turn, id);
+        (RecordKey::End, Stage::StoringEnd(_)) => {
+            on_end_stored(turn, id);
             return;
         }
-        // The report of a write that has been repeated meanwhile.
+        // Ignore the report of a write that has since been repeated.
         _ => {}
     }
     turn.state.changed.insert(id);
 }
 
-/// Handles a record that could not be stored. A submission is refused. Anything else is repeated
-/// for as long as necessary: a change takes effect only when it is durable, and a job ends in no
-/// other way.
+/// Handles the report that a record could not be stored. A submission is refused. Any other record is
+/// written again until it succeeds, because a change takes effect, and a job ends, only once its
+/// record is durable.
 pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
     let retry_at = turn.now + turn.state.config.store_retry;
-    let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| job.awaits() == Some(key)) else {
+    let Some(job) =
+        turn.state.jobs.get_mut(&id).filter(|job| job.record_being_stored() == Some(key))
+    else {
         return;
     };
-    if matches!(job.stage, Stage::Accepting) {
-        for token in std::mem::take(&mut job.tokens) {
+    if matches!(job.stage, Stage::StoringSubmission) {
+        for reply_id in std::mem::take(&mut job.pending_replies) {
             let answer = Answer::Refused(Refusal::Store { error: error.clone() });
-            turn.effects.push(Effect::Answer { token, answer });
+            turn.effects.push(Effect::Answer { reply_id, answer });
         }
         if let Some(request) = RequestName::from_record(&job.record) {
             turn.state.requests.remove(&request);
@@ -73,49 +76,48 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
         turn.state.jobs.remove(&id);
         return;
     }
-    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
-    job.store_trouble =
-        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
+    let since = job.store_retry.as_ref().map_or(turn.now, |retry| retry.since);
+    job.store_retry = Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
     turn.state.changed.insert(id);
-    if job.restart_pending && matches!(job.stage, Stage::Finishing(_)) {
+    if job.restart_pending && matches!(job.stage, Stage::StoringEnd(_)) {
         jobs::reopen(turn, id);
     }
-    give_up_if_late(turn, since, error);
+    report_store_failure_if_persistent(turn, since, error);
 }
 
-/// Reports that the store no longer works, once it has refused for too long.
-pub(crate) fn give_up_if_late(turn: &mut Turn, since: Duration, error: String) {
+/// Reports that the store has failed if it has refused records for longer than configured.
+pub(crate) fn report_store_failure_if_persistent(turn: &mut Turn, since: Duration, error: String) {
     let waited = turn.now.saturating_sub(since);
-    if turn.state.config.store_give_up_after.is_some_and(|patience| waited >= patience) {
-        turn.effects.push(Effect::GiveUp { error, waited });
+    if turn.state.config.store_give_up_after.is_some_and(|limit| waited >= limit) {
+        turn.effects.push(Effect::ReportStoreFailure { error, waited });
     }
 }
 
-/// Sends the current record of a job to the store again, or repeats the request for the one it
-/// reads.
+/// Sends the record that the job is storing to the store again, or repeats the request for the
+/// evaluation that it is reading.
 pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
     effects.push(match &job.stage {
-        Stage::Storing { record, is_last } => {
+        Stage::StoringEvaluation { record, is_last } => {
             let record = record.clone();
             Effect::Store(Record::Evaluation { record, is_last: *is_last })
         }
-        Stage::Finishing(end) => {
+        Stage::StoringEnd(end) => {
             let summary = Arc::new(job.search.summary());
             Effect::Store(Record::End { end: end.clone(), summary })
         }
         Stage::Replaying { asked: true } => {
             Effect::Read { job: job.record.job, number: job.search.evaluations() }
         }
-        Stage::Accepting
+        Stage::StoringSubmission
         | Stage::Waiting
         | Stage::Replaying { asked: false }
         | Stage::Computing(_) => return,
     });
 }
 
-/// Notes that the end of a job is durable.
-fn ended(turn: &mut Turn, id: JobId) {
-    let Some(Job { record, stage: Stage::Finishing(end), tokens, sequence, .. }) =
+/// Handles the report that the end of a job is durable.
+fn on_end_stored(turn: &mut Turn, id: JobId) {
+    let Some(Job { record, stage: Stage::StoringEnd(end), pending_replies, sequence, .. }) =
         turn.state.jobs.remove(&id)
     else {
         return;
@@ -133,15 +135,15 @@ fn ended(turn: &mut Turn, id: JobId) {
     let Some(snapshot) = snapshot::job_snapshot(turn.state, id, turn.now) else {
         return;
     };
-    for token in tokens {
+    for reply_id in pending_replies {
         let answer = Answer::Snapshot(snapshot.clone());
-        turn.effects.push(Effect::Answer { token, answer });
+        turn.effects.push(Effect::Answer { reply_id, answer });
     }
     // Published at once instead of with the other jobs, because clients wait for it.
     turn.effects.push(Effect::Publish { job: id, snapshot });
 }
 
-fn accepted(record: &JobRecord) -> Notice {
+fn accepted_notice(record: &JobRecord) -> Notice {
     Notice::JobAccepted {
         job: record.job,
         client: record.client.clone(),
@@ -152,12 +154,12 @@ fn accepted(record: &JobRecord) -> Notice {
 }
 
 impl Job {
-    /// Returns the key of the record whose report the job waits for.
-    fn awaits(&self) -> Option<RecordKey> {
+    /// Returns the key of the record that is being stored, if any.
+    fn record_being_stored(&self) -> Option<RecordKey> {
         match &self.stage {
-            Stage::Accepting => Some(RecordKey::Job),
-            Stage::Storing { record, .. } => Some(RecordKey::Evaluation(record.number)),
-            Stage::Finishing(_) => Some(RecordKey::End),
+            Stage::StoringSubmission => Some(RecordKey::Job),
+            Stage::StoringEvaluation { record, .. } => Some(RecordKey::Evaluation(record.number)),
+            Stage::StoringEnd(_) => Some(RecordKey::End),
             Stage::Waiting | Stage::Replaying { .. } | Stage::Computing(_) => None,
         }
     }

@@ -44,7 +44,7 @@ pub(crate) fn read(
     }
     match found {
         Ok(Some(record)) => {
-            job.store_trouble = None;
+            job.store_retry = None;
             replay(turn, id, record);
         }
         Ok(None) => jobs::fail(turn, id, &RunFailure::Missing { number }),
@@ -60,7 +60,7 @@ fn recompute(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.store_trouble = None;
+    job.store_retry = None;
     job.progressed = turn.now;
     turn.state.changed.insert(id);
     if job.cancelled {
@@ -92,11 +92,10 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
         jobs::finish(turn, id, jobs::cancelled());
         return;
     }
-    let since = job.store_trouble.as_ref().map_or(turn.now, |store_trouble| store_trouble.since);
-    job.store_trouble =
-        Some(StoreRetry { since, retry_at, error: error.clone(), on_its_way: false });
+    let since = job.store_retry.as_ref().map_or(turn.now, |store_retry| store_retry.since);
+    job.store_retry = Some(StoreRetry { since, retry_at, error: error.clone(), in_flight: false });
     turn.state.changed.insert(id);
-    records::give_up_if_late(turn, since, error);
+    records::report_store_failure_if_persistent(turn, since, error);
 }
 
 /// Passes a stored evaluation to the search, or has it computed again.

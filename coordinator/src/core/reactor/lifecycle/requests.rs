@@ -11,7 +11,7 @@ use osteon_common::version;
 use super::{jobs, prune, workers};
 use crate::core::effect::{Answer, Effect, Record, Refusal};
 use crate::core::event::Request;
-use crate::core::ids::{JobId, Token, WorkerId};
+use crate::core::ids::{JobId, ReplyId, WorkerId};
 use crate::core::job::{Job, RequestName, Stage, identity};
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
@@ -22,29 +22,29 @@ use crate::store::JobRecord;
 /// Maximum number of banned workers that are listed.
 const BANNED_SHOWN_MAX: usize = 1000;
 
-pub(crate) fn requested(turn: &mut Turn, token: Token, request: Request) {
+pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
     let answer = match request {
         Request::Submit { specification, request_id, client, priority, name } => {
             let submission = SubmittedJob { specification, request_id, client, priority, name };
-            match submit(turn, token, submission) {
+            match submit(turn, reply_id, submission) {
                 Ok(answer) => answer,
                 Err(refusal) => Some(Answer::Refused(refusal)),
             }
         }
         Request::Get(job) => Some(get(turn.state, job, turn.now)),
         Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
-        Request::Cancel(job) => cancel(turn, token, job),
+        Request::Cancel(job) => cancel(turn, reply_id, job),
         Request::Fetch(job) => Some(fetch(turn.state, job)),
         Request::Banned => Some(banned(turn.state, turn.now)),
         Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
         Request::DrainWorker(worker) => Some(drain(turn, worker)),
         Request::Prune(retention) => {
-            prune::requested(turn, token, retention);
+            prune::requested(turn, reply_id, retention);
             None
         }
     };
     if let Some(answer) = answer {
-        turn.effects.push(Effect::Answer { token, answer });
+        turn.effects.push(Effect::Answer { reply_id, answer });
     }
 }
 
@@ -60,7 +60,7 @@ struct SubmittedJob {
 /// Accepts a job; the client is answered when it is durable.
 fn submit(
     turn: &mut Turn,
-    token: Token,
+    reply_id: ReplyId,
     submission: SubmittedJob,
 ) -> Result<Option<Answer>, Refusal> {
     let SubmittedJob { specification, request_id, client, priority, name } = submission;
@@ -69,7 +69,7 @@ fn submit(
     }
     let request = RequestName::new(&client, &request_id);
     if let Some(known) = request.as_ref().and_then(|request| turn.state.requests.get(request)) {
-        return resubmit(turn.state, token, *known, &specification, request_id);
+        return resubmit(turn.state, reply_id, *known, &specification, request_id);
     }
     if turn.state.unfinished() >= JOBS_MAX {
         return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
@@ -90,8 +90,8 @@ fn submit(
         name,
     };
     turn.effects.push(Effect::Store(Record::Job(record.clone())));
-    let mut job = Job::new(record, Stage::Accepting, 0, turn.now);
-    job.tokens.push(token);
+    let mut job = Job::new(record, Stage::StoringSubmission, 0, turn.now);
+    job.pending_replies.push(reply_id);
     turn.state.jobs.insert(id, job);
     Ok(None)
 }
@@ -131,7 +131,7 @@ fn bytes(specification: &JobSpecification) -> u64 {
 
 fn resubmit(
     state: &mut State,
-    token: Token,
+    reply_id: ReplyId,
     id: JobId,
     specification: &JobSpecification,
     request_id: String,
@@ -142,8 +142,8 @@ fn resubmit(
         return Err(Refusal::RequestIdTaken { request_id, job: id });
     }
     match state.jobs.get_mut(&id) {
-        Some(job) if matches!(job.stage, Stage::Accepting) => {
-            job.tokens.push(token);
+        Some(job) if matches!(job.stage, Stage::StoringSubmission) => {
+            job.pending_replies.push(reply_id);
             Ok(None)
         }
         _ => Ok(Some(Answer::Submitted(id))),
@@ -169,10 +169,10 @@ fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Ans
 }
 
 /// Cancels a job; the client is answered when its end is durable.
-fn cancel(turn: &mut Turn, token: Token, id: JobId) -> Option<Answer> {
+fn cancel(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
     match turn.state.jobs.get_mut(&id) {
-        Some(job) if !matches!(job.stage, Stage::Accepting) => {
-            job.tokens.push(token);
+        Some(job) if !matches!(job.stage, Stage::StoringSubmission) => {
+            job.pending_replies.push(reply_id);
             jobs::cancel(turn, id);
             None
         }
@@ -185,7 +185,7 @@ fn fetch(state: &State, id: JobId) -> Answer {
         return Answer::Ended(ended.end.clone());
     }
     match state.jobs.get(&id).map(|job| &job.stage) {
-        None | Some(Stage::Accepting) => Answer::Refused(Refusal::NoJob { job: id }),
+        None | Some(Stage::StoringSubmission) => Answer::Refused(Refusal::NoJob { job: id }),
         Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
     }
 }

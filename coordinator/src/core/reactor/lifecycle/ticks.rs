@@ -93,11 +93,11 @@ pub(crate) fn fail_poisoned(turn: &mut Turn) {
 /// Repeats the writes of refused records that are due.
 pub(crate) fn store_again(turn: &mut Turn) {
     for job in turn.state.jobs.values_mut() {
-        let Some(store_trouble) = &mut job.store_trouble else {
+        let Some(store_retry) = &mut job.store_retry else {
             continue;
         };
-        if turn.now >= store_trouble.retry_at && !store_trouble.on_its_way {
-            store_trouble.on_its_way = true;
+        if turn.now >= store_retry.retry_at && !store_retry.in_flight {
+            store_retry.in_flight = true;
             records::store_again(job, &mut turn.effects);
         }
     }

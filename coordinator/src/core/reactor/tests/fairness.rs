@@ -5,7 +5,8 @@ use super::*;
 impl Rig {
     /// Submits and stores a job of a client.
     fn accept_of(&mut self, client: &str, priority: u32, realizations: u64) -> JobId {
-        let Event::Requested { token, request } = submit(0, "", propagation(realizations)) else {
+        let Event::Requested { reply_id, request } = submit(0, "", propagation(realizations))
+        else {
             panic!("no request");
         };
         let Request::Submit { specification, request_id, .. } = request else {
@@ -15,7 +16,7 @@ impl Rig {
         let request =
             Request::Submit { specification, request_id, client, priority, name: String::new() };
         let job = JobId(self.state.next_job);
-        self.event(Event::Requested { token, request });
+        self.event(Event::Requested { reply_id, request });
         self.event(stored(job.0, RecordKey::Job));
         job
     }

@@ -56,8 +56,9 @@ fn a_submission_is_idempotent_by_its_request_id() {
 
 #[test]
 fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
-    let of = |token, client: &str, realizations| {
-        let Event::Requested { token, request } = submit(token, "r", propagation(realizations))
+    let of = |reply_id, client: &str, realizations| {
+        let Event::Requested { reply_id, request } =
+            submit(reply_id, "r", propagation(realizations))
         else {
             unreachable!()
         };
@@ -67,7 +68,7 @@ fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
         let client = client.to_owned();
         let request =
             Request::Submit { specification, request_id, client, priority, name: String::new() };
-        Event::Requested { token, request }
+        Event::Requested { reply_id, request }
     };
     let mut rig = Rig::new();
     rig.check(of(1, "ann", 2), &["store job 1"]);

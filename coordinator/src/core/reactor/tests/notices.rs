@@ -26,7 +26,7 @@ fn detached(notices: &[Notice]) -> (u64, usize, &Departure) {
 #[test]
 fn a_job_is_told_when_it_is_accepted_starts_and_ends() {
     let mut rig = Rig::new();
-    let Event::Requested { token, request } = submit(0, "", propagation(1)) else {
+    let Event::Requested { reply_id, request } = submit(0, "", propagation(1)) else {
         panic!("no request");
     };
     let Request::Submit { specification, request_id, .. } = request else {
@@ -39,7 +39,7 @@ fn a_job_is_told_when_it_is_accepted_starts_and_ends() {
         priority: 3,
         name: "left tibia".to_owned(),
     };
-    assert_eq!(rig.notices(Event::Requested { token, request }), []);
+    assert_eq!(rig.notices(Event::Requested { reply_id, request }), []);
     let job = JobId(1);
     let accepted = Notice::JobAccepted {
         job,

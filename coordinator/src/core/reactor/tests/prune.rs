@@ -26,7 +26,7 @@ fn prune(keep_for: Option<Duration>, keep_last: Option<u64>) -> Event {
 
 fn pruned(jobs: &[u64], outcome: Result<(), String>) -> Event {
     let jobs = jobs.iter().map(|job| JobId(*job)).collect();
-    Event::Pruned { token: Some(Token(7)), jobs, outcome }
+    Event::Pruned { reply_id: Some(ReplyId(7)), jobs, outcome }
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn old_jobs_are_forgotten_unasked() {
     let mut rig = rig();
     rig.state.config.keep_ended = Some(MINUTE * 3);
     rig.check_after(Duration::from_secs(61), &["prune 1"]);
-    rig.check(Event::Pruned { token: None, jobs: vec![JobId(1)], outcome: Ok(()) }, &[]);
+    rig.check(Event::Pruned { reply_id: None, jobs: vec![JobId(1)], outcome: Ok(()) }, &[]);
     // Old jobs are searched for once a minute.
     rig.check_after(Duration::from_secs(59), &[]);
     rig.check_after(Duration::from_secs(1), &["prune 2"]);

@@ -97,7 +97,7 @@ fn a_checked_answer_is_checked_when_its_point_is_asked_for() {
     rig.check(answer(2, 3, 0, 1), &["store job 1 evaluation 0"]);
     rig.check(evaluation(0), &["send 1: batch 4 = 0+1"]);
     rig.event(answer(1, 4, 0, 1));
-    assert!(matches!(rig.state.jobs[&JobId(1)].stage, Stage::Storing { .. }));
+    assert!(matches!(rig.state.jobs[&JobId(1)].stage, Stage::StoringEvaluation { .. }));
 }
 
 #[test]

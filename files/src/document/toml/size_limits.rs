@@ -16,17 +16,17 @@ const OPEN_MAX: usize = 80;
 /// Refuses a text that is nested too deeply or has too much content; returns the byte offset of the
 /// excess.
 pub(super) fn check(text: &str) -> Result<(), (usize, Excess)> {
-    let mut extent = Extent { open: Vec::new(), dots: 0, budget: Budget::new() };
+    let mut counts = ContentCounts { open: Vec::new(), dots: 0, budget: Budget::new() };
     for (count, token) in Source::new(text).lex().enumerate() {
         let within = if count < TOML_TOKENS_MAX { Ok(()) } else { Err(Excess::Tokens) };
-        let within = within.and_then(|()| extent.take(token.kind()));
+        let within = within.and_then(|()| counts.take(token.kind()));
         within.map_err(|excess| (token.span().start(), excess))?;
     }
     Ok(())
 }
 
-/// Counts of the text read so far.
-struct Extent {
+/// ContentCounts of the text read so far.
+struct ContentCounts {
     /// Open brackets. A closing bracket that matches none is ignored, so the count is never below
     /// the parser's nesting depth, however it interprets a malformed text.
     open: Vec<TokenKind>,
@@ -35,7 +35,7 @@ struct Extent {
     budget: Budget,
 }
 
-impl Extent {
+impl ContentCounts {
     fn take(&mut self, kind: TokenKind) -> Result<(), Excess> {
         match kind {
             TokenKind::Dot => self.dots += 1,

@@ -1,8 +1,8 @@
-//! The moments that points within the bounds of a job can reach, in closed form.
+//! Approximate ranges of the moments that the points within a job's bounds can have, in closed form.
 //!
-//! The first arriving signal is a compressional wave along the bone. In a thick plate it runs at
-//! about √(c1111/ρ) of the mean model, in a thin one slower, but no slower than in a bar, √(e_L/ρ);
-//! its coefficient of variation is about δ/√14.
+//! The first arriving signal is a compressional wave along the bone. In a thick plate its velocity is
+//! about √(c1111/ρ) of the mean model. In a thin plate it is lower, but not below the bar velocity
+//! √(e_L/ρ). The coefficient of variation of the velocity is about δ/√14.
 
 use crate::bulk_velocity::bulk_velocity;
 use crate::case::Setup;
@@ -12,95 +12,109 @@ use crate::parameters::{Parameter, Point};
 use crate::plausible::short;
 use crate::sampling;
 
-/// Ratio of mean velocities to √(e_L/ρ) of the slowest and √(c1111/ρ) of the fastest point.
-/// Measured in the paper's geometry all over the usual bounds: 0.98 to 1.055 of √(c1111/ρ).
-const VELOCITY: (f64, f64) = (0.98, 1.055);
-/// Ratio of coefficients of variation to δ/√14, measured in the same way.
-const VARIATION: (f64, f64) = (0.985, 1.145);
-/// Data are out of reach if their mean is beyond everything that can be reached by more than this
-/// factor …
-const MEAN_BEYOND: f64 = 2.0;
-/// … or if their coefficient of variation is above everything that can be reached by more than this
-/// factor. One that is too small does not indicate another unit.
-const VARIATION_BEYOND: f64 = 5.0;
-/// Smaller numbers of velocities may differ this much by chance.
+/// Factors: the smallest mean velocity is the first times √(e_L/ρ), the largest the second times
+/// √(c1111/ρ). In the paper's geometry mean velocities are 0.98 to 1.055 times √(c1111/ρ) throughout
+/// the usual bounds.
+const VELOCITY_FACTORS: (f64, f64) = (0.98, 1.055);
+/// Factors: smallest and largest ratio of the coefficient of variation to δ/√14, measured in the same
+/// way.
+const VARIATION_FACTORS: (f64, f64) = (0.985, 1.145);
+/// Data are refused if their mean lies outside the attainable range by more than this factor.
+const MEAN_EXCESS_MAX: f64 = 2.0;
+/// Data are refused if their coefficient of variation exceeds the attainable maximum by more than this
+/// factor; too small a value is not a sign of a wrong unit.
+const VARIATION_EXCESS_MAX: f64 = 5.0;
+/// With fewer velocities than this the coefficient of variation can be that far off by chance, and is
+/// not checked.
 const VELOCITIES_MIN: usize = 10;
-/// If the receivers are nearer to the source than this many times the sum of the heights,
-/// reflections arrive first, whose apparent velocity is unbounded.
-const NEAR: f64 = 2.0;
+/// If a receiver is nearer to the source than this factor times the sum of both heights above the bone,
+/// a reflection may arrive first, and its apparent velocity has no upper limit.
+const NEAR_FACTOR: f64 = 2.0;
 
 /// Approximate mean velocities (m/s) and coefficients of variation of all points within some
 /// bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
-    /// Slowest and fastest mean, m/s; the fastest is infinite if the bounds include the edge of
+pub struct AttainableMoments {
+    /// Smallest and largest mean, m/s; the largest is infinite if the bounds include the edge of
     /// admissibility.
     pub velocity: (f64, f64),
     /// Smallest and largest coefficient of variation.
     pub variation: (f64, f64),
 }
 
-impl Reach {
-    /// Returns the moments that points within `ranges` reach in `setup`.
+impl AttainableMoments {
+    /// Returns the ranges of the moments that points within `ranges` can have in `setup`.
     pub fn from_ranges(ranges: &[Range; 7], setup: &Setup) -> Self {
         let (density, modulus) =
             (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
-        let slowest = (modulus.0 / density.1).sqrt();
-        let fastest = match fastest(ranges).and_then(|point| bulk_velocity(&point).ok()) {
+        let bar_velocity_min = (modulus.0 / density.1).sqrt();
+        let highest = highest_bulk_velocity_point(ranges);
+        let bulk_velocity_max = match highest.and_then(|point| bulk_velocity(&point).ok()) {
             Some(velocity) if !is_near(setup) => libm::exp(velocity.logarithm),
             _ => f64::INFINITY,
         };
         let dispersion = ends(ranges, Parameter::Dispersion);
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
         Self {
-            velocity: (VELOCITY.0 * slowest, VELOCITY.1 * fastest),
-            variation: (variation(dispersion.0, VARIATION.0), variation(dispersion.1, VARIATION.1)),
+            velocity: (
+                VELOCITY_FACTORS.0 * bar_velocity_min,
+                VELOCITY_FACTORS.1 * bulk_velocity_max,
+            ),
+            variation: (
+                variation(dispersion.0, VARIATION_FACTORS.0),
+                variation(dispersion.1, VARIATION_FACTORS.1),
+            ),
         }
     }
 }
 
 /// Returns the point within `ranges` whose √(c1111/ρ) is smallest. It has the shear modulus and the
 /// dispersion of the start, as √(c1111/ρ) does not depend on them.
-pub fn slowest(ranges: &[Range; 7]) -> Point {
+pub fn lowest_bulk_velocity_point(ranges: &[Range; 7]) -> Point {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
-    let transverse = ends(ranges, Parameter::TransverseYoungModulus).0;
-    let poisson = smallest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
-    let across = ends(ranges, Parameter::TransversePoissonRatio).0;
+    let e_t = ends(ranges, Parameter::TransverseYoungModulus).0;
+    let nu_l = smallest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
+    let nu_t = ends(ranges, Parameter::TransversePoissonRatio).0;
     // c1111 falls with e_L below this value, and grows above it.
-    let least = 4.0 * transverse * poisson * poisson / (1.0 - across);
-    let longitudinal = least.clamp(from, to);
-    corner(ranges, [ends(ranges, Parameter::Density).1, longitudinal, poisson, transverse, across])
+    let e_l_at_minimum = 4.0 * e_t * nu_l * nu_l / (1.0 - nu_t);
+    let e_l = e_l_at_minimum.clamp(from, to);
+    corner(ranges, [ends(ranges, Parameter::Density).1, e_l, nu_l, e_t, nu_t])
 }
 
-/// Returns the point within `ranges` whose √(c1111/ρ) is largest, as [`slowest`]; `None` if it is
-/// unbounded, because the edge of admissibility lies within the ranges.
-pub fn fastest(ranges: &[Range; 7]) -> Option<Point> {
+/// Returns the point within `ranges` whose √(c1111/ρ) is largest, with shear modulus and dispersion as
+/// in [`lowest_bulk_velocity_point`]. Returns `None` if √(c1111/ρ) is unbounded because the ranges
+/// contain the edge of admissibility.
+pub fn highest_bulk_velocity_point(ranges: &[Range; 7]) -> Option<Point> {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
-    let transverse = ends(ranges, Parameter::TransverseYoungModulus).1;
-    let poisson = largest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
-    let across = ends(ranges, Parameter::TransversePoissonRatio).1;
+    let e_t = ends(ranges, Parameter::TransverseYoungModulus).1;
+    let nu_l = largest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
+    let nu_t = ends(ranges, Parameter::TransversePoissonRatio).1;
     let density = ends(ranges, Parameter::Density).0;
-    let [soft, stiff] = [from, to].map(|longitudinal| {
-        let point = corner(ranges, [density, longitudinal, poisson, transverse, across]);
+    let [soft, stiff] = [from, to].map(|e_l| {
+        let point = corner(ranges, [density, e_l, nu_l, e_t, nu_t]);
         Some((bulk_velocity(&point).ok()?.logarithm, point))
     });
     let (soft, stiff) = (soft?, stiff?);
     Some(if soft.0 > stiff.0 { soft.1 } else { stiff.1 })
 }
 
-/// Returns the field at fault and the reason if no set of the data can be approached.
-pub(crate) fn unreachable(specification: &JobSpecification) -> Option<(&'static str, String)> {
+/// If no set of the data can be matched even approximately within the bounds, returns the offending
+/// field and the error message.
+pub(crate) fn unattainable_data(
+    specification: &JobSpecification,
+) -> Option<(&'static str, String)> {
     let data = specification.data.as_ref()?;
     if specification.kind != JobKind::Identification {
         return None;
     }
-    let reach = Reach::from_ranges(&specification.parameters, &specification.setup);
+    let attainable =
+        AttainableMoments::from_ranges(&specification.parameters, &specification.setup);
     let mut first = None;
     for set in 0..data.sets() {
         let count = data.velocities(set).map(<[f64]>::len);
         // If other groups can be matched, one that cannot be is not an error.
-        let missed = reach.missed(data.moments(set), count)?;
-        first.get_or_insert(missed);
+        let found = attainable.unattainable_moment(data.moments(set), count)?;
+        first.get_or_insert(found);
     }
     let (moment, value, reached) = first?;
     Some(match data {
@@ -143,13 +157,17 @@ impl MomentKind {
     }
 }
 
-impl Reach {
-    /// Returns the moment of data with this number of velocities that is far out of reach: its
-    /// kind, its value, and the reachable range.
-    fn missed(&self, data: Moments, count: Option<usize>) -> Option<(MomentKind, f64, String)> {
+impl AttainableMoments {
+    /// Returns the first moment of `data` that is far outside the attainable range: its kind, its
+    /// value, and the message. `count` is the number of velocities, if known.
+    fn unattainable_moment(
+        &self,
+        data: Moments,
+        count: Option<usize>,
+    ) -> Option<(MomentKind, f64, String)> {
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
-        let (slowest, fastest) = self.velocity;
-        if mean < slowest / MEAN_BEYOND || mean > fastest * MEAN_BEYOND {
+        let (lowest, highest) = self.velocity;
+        if mean < lowest / MEAN_EXCESS_MAX || mean > highest * MEAN_EXCESS_MAX {
             let reached = format!(
                 "the bounds of [parameters] allow mean velocities of about {}: check the units of \
                  data and parameters, or widen the bounds",
@@ -158,7 +176,7 @@ impl Reach {
             return Some((MomentKind::Mean, mean, reached));
         }
         let enough = count.is_none_or(|count| count >= VELOCITIES_MIN);
-        if enough && variation > self.variation.1 * VARIATION_BEYOND {
+        if enough && variation > self.variation.1 * VARIATION_EXCESS_MAX {
             let reached = format!(
                 "the bounds of parameters.dispersion allow coefficients of variation of about {}: check \
                  the data, or widen the bounds",
@@ -186,7 +204,7 @@ fn span((from, to): (f64, f64), unit: &str) -> String {
 fn is_near(setup: &Setup) -> bool {
     let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
     let nearest = sampling::distances(setup).fold(f64::INFINITY, f64::min);
-    nearest < NEAR * heights
+    nearest < NEAR_FACTOR * heights
 }
 
 /// Returns the bounds of a parameter, or its fixed value twice.
@@ -228,7 +246,8 @@ mod tests {
         bulk_velocity(point).unwrap().logarithm
     }
 
-    /// In random boxes within the usual one, no random point is slower or faster than the corners.
+    /// In random boxes within the usual one, no random point has a lower or a higher bulk velocity
+    /// than the two corners.
     #[test]
     fn no_point_is_beyond_the_corners() {
         let mut bounded = 0;
@@ -241,7 +260,8 @@ mod tests {
                 (from + (to - from) * a.min(b), from + (to - from) * a.max(b))
             });
             let ranges = free(cut);
-            let (slow, fast) = (slowest(&ranges), fastest(&ranges));
+            let (slow, fast) =
+                (lowest_bulk_velocity_point(&ranges), highest_bulk_velocity_point(&ranges));
             for draw in 0..40 {
                 let germs = Germs::draw(6 + index, draw);
                 let mut germs = germs.values().iter().copied();
@@ -258,26 +278,27 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_box_has_no_fastest_point() {
+    fn the_usual_box_has_no_highest_bulk_velocity() {
         let ranges = free(BOUNDS);
-        assert_eq!(fastest(&ranges), None);
-        let reach = Reach::from_ranges(&ranges, &Setup::default());
-        assert!((2400.0..2401.0).contains(&reach.velocity.0), "{reach:?}");
-        assert_eq!(reach.velocity.1, f64::INFINITY);
+        assert_eq!(highest_bulk_velocity_point(&ranges), None);
+        let attainable = AttainableMoments::from_ranges(&ranges, &Setup::default());
+        assert!((2400.0..2401.0).contains(&attainable.velocity.0), "{attainable:?}");
+        assert_eq!(attainable.velocity.1, f64::INFINITY);
     }
 
     /// e_L and δ are free, as in a search for these two alone.
     #[test]
-    fn what_is_out_of_reach_is_told() {
+    fn data_far_out_of_range_are_reported() {
         let mut ranges = OPTIMUM.0.map(Range::Fixed);
         for axis in [1, 6] {
             let (lower, upper) = BOUNDS[axis];
             ranges[axis] = Range::Free { start: OPTIMUM.0[axis], lower, upper };
         }
-        let reach = Reach::from_ranges(&ranges, &Setup::default());
-        let missed = |mean: f64, coefficient_of_variation: f64, count| {
-            let missed = reach.missed(Moments { mean, coefficient_of_variation }, count);
-            missed.map(|(moment, _, text)| (moment, text.split(':').next().unwrap().to_owned()))
+        let attainable = AttainableMoments::from_ranges(&ranges, &Setup::default());
+        let reported = |mean: f64, coefficient_of_variation: f64, count| {
+            let data = Moments { mean, coefficient_of_variation };
+            let found = attainable.unattainable_moment(data, count);
+            found.map(|(moment, _, text)| (moment, text.split(':').next().unwrap().to_owned()))
         };
         let velocities =
             "the bounds of [parameters] allow mean velocities of about 2700 to 4700 m/s";
@@ -297,17 +318,17 @@ mod tests {
             (3906.0, 0.001, None, None),
         ] {
             let expected = expected.map(|(moment, text)| (moment, text.to_owned()));
-            assert_eq!(missed(mean, variation, count), expected, "{mean} {variation} {count:?}");
+            assert_eq!(reported(mean, variation, count), expected, "{mean} {variation} {count:?}");
         }
     }
 
     /// Reflections that arrive first may have any apparent velocity.
     #[test]
-    fn near_receivers_have_no_fastest_velocity() {
+    fn near_receivers_have_no_largest_velocity() {
         let ranges = OPTIMUM.0.map(Range::Fixed);
         let mut setup = Setup::default();
-        assert!(Reach::from_ranges(&ranges, &setup).velocity.1 < 4200.0);
+        assert!(AttainableMoments::from_ranges(&ranges, &setup).velocity.1 < 4200.0);
         setup.probe.receivers.first_x1 = 7e-3;
-        assert_eq!(Reach::from_ranges(&ranges, &setup).velocity.1, f64::INFINITY);
+        assert_eq!(AttainableMoments::from_ranges(&ranges, &setup).velocity.1, f64::INFINITY);
     }
 }
