@@ -143,7 +143,7 @@ fn a_realization_is_drawn_at_the_best_point_of_its_group() {
         assert_eq!(row["velocity"].parse().ok(), velocity, "{group}");
     }
     for (options, expected) in [
-        (&[][..], "name one of them by --group: \"bone 0\", \"bone 1\""),
+        (&[][..], "choose one with --group: \"bone 0\", \"bone 1\""),
         (
             &["--group", "bone 2"],
             "there is no group \"bone 2\"; the groups are \"bone 0\", \"bone 1\"",

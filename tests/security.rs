@@ -241,7 +241,7 @@ fn a_worker_without_a_workers_certificate_is_told_why_and_ends() {
         (
             Some("foreign-worker"),
             Some("foreign-worker-key"),
-            "authority (its --tls-ca) has not signed",
+            "not signed by the coordinator's certificate authority (its --tls-ca)",
         ),
     ] {
         let mut command = osteon();

@@ -28,7 +28,7 @@ fn results_of_jobs_are_written_as_they_were_read() {
 
 #[test]
 fn results_of_simulations_are_written_as_they_were_read() {
-    let snapshots = files("src/output/snapshots", ".snap");
+    let snapshots = files("src/output/tests/snapshots", ".snap");
     let parts = snapshots.iter().filter_map(|(name, text)| Some((name, text.find("\n{\n")?, text)));
     let texts = parts.filter(|(_, _, text)| text.contains("\"kind\": \"simulation\""));
     let mut count = 0;

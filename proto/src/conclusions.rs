@@ -18,7 +18,7 @@ use crate::v1;
 const ROWS: u32 = 6;
 
 /// The fields of a result that hold its conclusions.
-pub(crate) struct Fields {
+pub(crate) struct ConclusionFields {
     pub(crate) sensitivities: Vec<v1::Sensitivity>,
     pub(crate) identified: Option<v1::Identified>,
     pub(crate) profiles: Vec<v1::Profile>,
@@ -33,10 +33,10 @@ pub(crate) struct FieldsOf<'a> {
     pub(crate) solutions: Option<&'a v1::Solutions>,
 }
 
-pub(crate) fn to_message(conclusions: &Conclusions) -> Fields {
+pub(crate) fn to_message(conclusions: &Conclusions) -> ConclusionFields {
     let Conclusions { inference, profiles, solutions } = conclusions;
     let sensitivities = inference.iter().flat_map(|found| &found.sensitivities);
-    Fields {
+    ConclusionFields {
         sensitivities: sensitivities.map(sensitivity_to_message).collect(),
         identified: inference.as_ref().map(identified_to_message),
         profiles: profiles.iter().map(profile_to_message).collect(),

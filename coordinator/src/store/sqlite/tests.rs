@@ -371,7 +371,7 @@ fn a_second_coordinator_is_refused() {
 
 #[test]
 fn another_format_is_refused() {
-    for version in [1, 5, 7] {
+    for version in [1, 6, 8] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
         store.connection.execute("UPDATE format SET version = ?1", [version]).unwrap();
