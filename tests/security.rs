@@ -268,7 +268,7 @@ fn a_worker_without_a_workers_certificate_is_told_why_and_ends() {
     ));
     let client = run(&[vec!["jobs".to_owned()], options].concat());
     assert_eq!(client.code, Some(1), "{client:?}");
-    assert!(client.stderr.contains("has not signed"), "{client:?}");
+    assert!(client.stderr.contains("is not signed by"), "{client:?}");
 }
 
 /// Returns the messages of a client and a worker that trust the authority `ca` and connect to
