@@ -1,4 +1,4 @@
-//! What distribution costs: jobs of a running coordinator with two workers of one thread each,
+//! Cost of distribution: jobs of a running coordinator with two workers of one thread each,
 //! against the same realizations in a bare loop on two threads of one process.
 //! `cargo bench -p osteon --bench dispatch`
 //!

@@ -16,12 +16,12 @@ pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, W
 #[derive(Debug, Parser)]
 #[command(name = "osteon", version = program::version_line(), max_term_width = 80)]
 pub(crate) struct Arguments {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-/// What to do.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Find the mean elasticity and dispersion that reproduce the measured velocities
@@ -63,7 +63,7 @@ pub(crate) enum Command {
     Schema(SchemaArguments),
 }
 
-/// Of `identify` and `propagate`.
+/// Arguments of `identify` and `propagate`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
     /// Job file (TOML or JSON)
@@ -83,7 +83,7 @@ pub(crate) struct RunArguments {
     /// --threads is given, which run the job on this machine.
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
-    /// What is shown to the coordinator.
+    /// Credentials for the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
     /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
@@ -98,7 +98,7 @@ pub(crate) struct RunArguments {
     pub(crate) json: bool,
 }
 
-/// Of `simulate`.
+/// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
     /// Case file (TOML or JSON)
@@ -122,7 +122,7 @@ pub(crate) struct SimulateArguments {
     pub(crate) time_step: f64,
 }
 
-/// Of `draw`.
+/// Arguments of `draw`.
 #[derive(Debug, Args)]
 pub(crate) struct DrawArguments {
     /// Job file (TOML or JSON)
@@ -138,7 +138,7 @@ pub(crate) struct DrawArguments {
     pub(crate) group: Option<String>,
 }
 
-/// Of `coordinator`.
+/// Arguments of `coordinator`.
 #[derive(Debug, Args)]
 pub(crate) struct CoordinatorArguments {
     /// Address to listen on: HOST:PORT (port 0 selects a free port) or unix:PATH
@@ -191,13 +191,13 @@ pub(crate) struct CoordinatorArguments {
     pub(crate) lease: Duration,
 }
 
-/// Of `worker`.
+/// Arguments of `worker`.
 #[derive(Debug, Args)]
 pub(crate) struct WorkerArguments {
     /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
-    /// What is shown to the coordinator.
+    /// Credentials for the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
     /// Number of threads to compute on [default: all cores]
@@ -229,13 +229,13 @@ pub(crate) struct CredentialArguments {
     pub(crate) token_file: Option<PathBuf>,
 }
 
-/// Of every command that speaks to a coordinator.
+/// Arguments of every command that speaks to a coordinator.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ClientArguments {
     /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
     #[arg(long, value_name = "URL")]
     pub(crate) coordinator: Option<Endpoint>,
-    /// What is shown to the coordinator.
+    /// Credentials for the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
 }
@@ -256,7 +256,7 @@ impl ClientArguments {
     }
 }
 
-/// Of `submit`.
+/// Arguments of `submit`.
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArguments {
     /// Job file (TOML or JSON)
@@ -283,10 +283,10 @@ pub(crate) struct SubmitArguments {
     pub(crate) json: bool,
 }
 
-/// Of `jobs`.
+/// Arguments of `jobs`.
 #[derive(Debug, Args)]
 pub(crate) struct JobsArguments {
-    /// What else than to list them.
+    /// The operation; without one they are listed.
     #[command(subcommand)]
     pub(crate) command: Option<JobsCommand>,
     /// The coordinator.
@@ -297,14 +297,14 @@ pub(crate) struct JobsArguments {
     pub(crate) json: bool,
 }
 
-/// What can be done with jobs.
+/// Operations on jobs.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
     /// Delete ended jobs (without options, all of them) and print their ids
     Prune(PruneArguments),
 }
 
-/// Of `jobs prune`.
+/// Arguments of `jobs prune`.
 #[derive(Debug, Args)]
 pub(crate) struct PruneArguments {
     /// The coordinator.
@@ -321,7 +321,7 @@ pub(crate) struct PruneArguments {
     pub(crate) json: bool,
 }
 
-/// Of commands about one job.
+/// Arguments of commands about one job.
 #[derive(Debug, Args)]
 pub(crate) struct JobArguments {
     /// Id of the job
@@ -332,7 +332,7 @@ pub(crate) struct JobArguments {
     pub(crate) client: ClientArguments,
 }
 
-/// Of `fetch`.
+/// Arguments of `fetch`.
 #[derive(Debug, Args)]
 pub(crate) struct FetchArguments {
     /// Id of the job
@@ -346,7 +346,7 @@ pub(crate) struct FetchArguments {
     pub(crate) out: PathBuf,
 }
 
-/// Of `certs`.
+/// Arguments of `certs`.
 #[derive(Debug, Args)]
 pub(crate) struct CertsArguments {
     /// Directory in which to create the files; if one of them exists already, none is created
@@ -365,7 +365,7 @@ pub(crate) struct CertsArguments {
     pub(crate) ca: Option<PathBuf>,
 }
 
-/// Of `token`.
+/// Arguments of `token`.
 #[derive(Debug, Args)]
 pub(crate) struct TokenArguments {
     /// Name of the token's holder, shown in logs (letters, digits and . _ - @)
@@ -383,7 +383,7 @@ pub(crate) struct TokenArguments {
     pub(crate) tokens: Option<PathBuf>,
 }
 
-/// Of `schema`.
+/// Arguments of `schema`.
 #[derive(Debug, Args)]
 pub(crate) struct SchemaArguments {
     /// `job`: job files; `result`: result.json and the output of a run with --json

@@ -6,10 +6,10 @@ use clap::{Args, Subcommand};
 
 use super::{ClientArguments, probe_seconds};
 
-/// Of `workers`.
+/// Arguments of `workers`.
 #[derive(Debug, Args)]
 pub(crate) struct WorkersArguments {
-    /// What else than to list them.
+    /// The operation; without one they are listed.
     #[command(subcommand)]
     pub(crate) command: Option<WorkersCommand>,
     /// The coordinator.
@@ -20,14 +20,14 @@ pub(crate) struct WorkersArguments {
     pub(crate) json: bool,
 }
 
-/// What can be done with workers.
+/// Operations on workers.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WorkersCommand {
     /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
     Drain(DrainArguments),
 }
 
-/// Of `workers drain`.
+/// Arguments of `workers drain`.
 #[derive(Debug, Args)]
 pub(crate) struct DrainArguments {
     /// Number of the worker, as `osteon workers` lists it
@@ -41,7 +41,7 @@ pub(crate) struct DrainArguments {
     pub(crate) json: bool,
 }
 
-/// Of `health`.
+/// Arguments of `health`.
 #[derive(Debug, Args)]
 pub(crate) struct HealthArguments {
     /// The coordinator.
@@ -55,7 +55,7 @@ pub(crate) struct HealthArguments {
     pub(crate) json: bool,
 }
 
-/// Of `backup`.
+/// Arguments of `backup`.
 #[derive(Debug, Args)]
 pub(crate) struct BackupArguments {
     /// Directory in which the copy is written as osteon.sqlite; that file must not exist

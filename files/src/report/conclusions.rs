@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::schema::keyed_by_parameter;
 use super::{MeanModel, Moments, finite_or_null};
 
-/// What the data determine, to first order around the best point.
+/// The quantities that the data determine, to first order around the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Identified {
     /// Whether the model reproduces each moment of the data to within three standard errors (data and

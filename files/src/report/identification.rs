@@ -30,7 +30,7 @@ pub struct Identification {
     pub reason: Option<String>,
     /// BLAKE3 digest of the evaluations of the search, 64 hexadecimal digits.
     pub digest: String,
-    /// What was minimised.
+    /// The function that was minimised.
     pub objective: Objective,
     /// Cost of the best point.
     pub cost: Option<f64>,
@@ -76,8 +76,8 @@ pub struct Identification {
     )]
     #[schemars(transform = keyed_by_parameter)]
     pub sensitivities: Option<Option<BTreeMap<Parameter, Moments>>>,
-    /// What the data determine; null where the derivatives were not measured, not there where the data
-    /// are groups.
+    /// The quantities that the data determine; null where the derivatives were not measured, absent if
+    /// the data are groups.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
@@ -163,7 +163,7 @@ impl From<&JobResult> for Identification {
     }
 }
 
-/// What was found at the best point, for a job or for a group.
+/// The findings at the best point, for a job or for a group.
 struct BestPointKeys {
     cost: Option<f64>,
     cost_standard_error: Option<Option<f64>>,
@@ -220,7 +220,7 @@ pub struct Group {
     /// were not measured.
     #[schemars(transform = keyed_by_parameter)]
     pub sensitivities: Option<BTreeMap<Parameter, Moments>>,
-    /// What the data determine; null where the derivatives were not measured.
+    /// The quantities that the data determine; null where the derivatives were not measured.
     pub identified: Option<Identified>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
