@@ -179,8 +179,8 @@ mod tests {
         assert_eq!(germs, std::array::from_fn(|germ| germ));
     }
 
-    /// Of 2ᵏ points that begin at a multiple of 2ᵏ, one is in each of 2ᵏ equal intervals, in every
-    /// dimension and every scramble.
+    /// If the index of the first of 2ᵏ points is a multiple of 2ᵏ, each of 2ᵏ equal intervals contains
+    /// exactly one of them, in every dimension and every scramble.
     #[test]
     fn every_coordinate_is_stratified() {
         for (seed, number, block) in [(1, 0, 0), (1, 1, 5), (7, 0, 1023)] {

@@ -23,7 +23,8 @@ fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
     lines.map(row).collect()
 }
 
-/// What a group's data say where e_L and δ are free; without intervals where they are not `known`.
+/// Returns the inference from a group's data if e_L and δ are free; it has intervals if they are
+/// `known`.
 fn found(known: bool) -> Inference {
     let quantity = |value: f64, interval: [f64; 2]| {
         let known = known.then_some(Uncertainty { standard_error: 1.0, interval, free_share: 0.0 });

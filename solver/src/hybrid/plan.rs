@@ -194,9 +194,9 @@ pub(super) fn thinness(setup: &Setup) -> f64 {
 /// Returns the factor by which wavenumbers extend beyond the setup's limit, for elements `finer`
 /// times as fine.
 ///
-/// Of the waves of one frequency the slow ones are cut off first, and the picked ones are fast.
-/// Therefore, beyond the setup's limit, wavenumbers grow only as the root of the fineness, and of
-/// the thinness.
+/// A limit of wavenumbers cuts off the slow waves of each frequency first, but the picked waves are
+/// fast. Therefore, beyond the setup's limit, wavenumbers grow only as the root of the fineness, and
+/// of the thinness.
 fn wavenumber_fineness(setup: &Setup, finer: f64) -> f64 {
     let usual = setup.solver.refinement.sqrt();
     let over = finer / usual;
