@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::moments::Moments;
 use crate::parameters::{Parameter, Point};
+use crate::posterior::Posterior;
 
 /// Conclusions from one set of data: the parameters that it determines, and the points that match
 /// it.
@@ -17,6 +18,8 @@ pub struct Conclusions {
     pub profiles: Vec<Profile>,
     /// The solutions from all starts; `None` for a single start.
     pub solutions: Option<Solutions>,
+    /// The posterior; `None` unless the job asks for it.
+    pub posterior: Option<Posterior>,
 }
 
 /// Conclusions from the data about the parameters.

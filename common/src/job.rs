@@ -7,6 +7,9 @@ use crate::fields::{Key, Section};
 use crate::parameters::{Parameter, Point};
 
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
+pub use crate::posterior_settings::{
+    DRAWS_MAX, POSTERIOR_EVALUATIONS_MAX, PosteriorPrior, PosteriorSettings,
+};
 pub use crate::search_settings::{Objective, Prior, Search, SearchMethod};
 
 /// Kind of a job.
@@ -183,6 +186,8 @@ pub struct JobSpecification {
     pub objective: Objective,
     /// Settings of the search loop.
     pub search: Search,
+    /// Settings of the posterior; `None` if none is asked for.
+    pub posterior: Option<PosteriorSettings>,
 }
 
 /// The settings of a run that are sections of a job file.

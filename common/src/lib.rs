@@ -33,6 +33,8 @@ pub mod origin;
 pub mod outcome;
 pub mod parameters;
 pub mod plausible;
+pub mod posterior;
+mod posterior_settings;
 pub mod probe;
 pub mod quantile;
 pub mod realization;

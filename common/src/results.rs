@@ -94,6 +94,8 @@ pub struct EvaluationRole {
     /// The parameter in which it differs from the best point, to measure a derivative; `None` for
     /// an evaluation of the search itself.
     pub varied: Option<Parameter>,
+    /// Whether it serves the posterior.
+    pub posterior: bool,
 }
 
 /// One evaluation; those of the search are the rows of `history.csv`.

@@ -24,6 +24,7 @@ impl Conclusions {
             inference: best.and_then(|best| inference(specification, set, best, history)),
             profiles: best.map(|best| of_moments(specification, set, best)).unwrap_or_default(),
             solutions: several.then(|| all_starts(specification, set, best, history)),
+            posterior: None,
         }
     }
 }

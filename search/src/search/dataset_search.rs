@@ -125,7 +125,8 @@ impl DatasetSearch {
         statistics: PointStatistics,
         outcomes: Arc<[Outcome]>,
     ) -> Evaluation {
-        row.role = EvaluationRole { group: self.set, start: self.start, varied: None };
+        row.role =
+            EvaluationRole { group: self.set, start: self.start, ..EvaluationRole::default() };
         if let Some((varied, _)) = self.differences.pop() {
             let start = self.best().map_or(0, |best| best.role.start);
             row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
