@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::ensemble::{Germs, uniform};
+use crate::ensemble::{GERMS, Germs, uniform};
 use crate::sobol::Scramble;
 
 /// Everything that determines the germs at every index.
@@ -50,6 +50,13 @@ impl GermSource {
     pub fn streams(seed: u64) -> Self {
         Self { seed, scheme: GermScheme::Streams }
     }
+}
+
+/// Returns the first `count` points of scramble `number` of the Sobol' points of a seed, uniform in
+/// the open unit cube.
+pub fn sobol_points(seed: u64, number: u64, count: u64) -> Vec<[f64; GERMS]> {
+    let scramble = Scramble::new(seed, number);
+    (0..count).map(|index| scramble.point(index).map(uniform)).collect()
 }
 
 impl PartialEq for GermMaker {

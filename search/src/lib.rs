@@ -9,6 +9,7 @@
 
 mod identify;
 pub mod newton;
+mod posterior;
 pub mod proposal;
 mod search;
 pub mod search_box;

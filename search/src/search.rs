@@ -22,6 +22,7 @@ use osteon_common::version::Program;
 use thiserror::Error;
 
 use self::identification::IdentificationSearch;
+use crate::posterior::posterior;
 
 pub use self::candidates::same_point;
 
@@ -379,9 +380,11 @@ impl Summary {
     ) -> JobResult {
         let of_one_set = !matches!(specification.data, Some(Data::Groups(_)));
         let data = specification.data.as_ref().filter(|_| of_one_set);
-        let conclusions =
-            data.map(|_| Conclusions::new(specification, 0, best.as_ref(), &self.history));
-        let searched = self.history.iter().filter(|row| row.role.varied.is_none());
+        let conclusions = data.map(|_| self.conclusions(specification, 0, best.as_ref()));
+        let searched = self
+            .history
+            .iter()
+            .filter(|row| row.is_searched());
         JobResult {
             status: ending.status,
             failure: ending.failure,
@@ -421,8 +424,20 @@ impl Summary {
             status: ending.status,
             reason: ending.reason.clone(),
             data: DataSummary::from_data(data, set),
-            conclusions: Conclusions::new(specification, set, best.as_ref(), &self.history),
+            conclusions: self.conclusions(specification, set, best.as_ref()),
             best,
         })
+    }
+
+    fn conclusions(
+        &self,
+        specification: &JobSpecification,
+        set: usize,
+        best: Option<&BestPoint>,
+    ) -> Conclusions {
+        Conclusions {
+            posterior: posterior(specification, set, best, &self.history),
+            ..Conclusions::new(specification, set, best, &self.history)
+        }
     }
 }

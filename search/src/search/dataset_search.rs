@@ -12,6 +12,7 @@ use osteon_common::statistics::{PointStatistics, likelihood_cost};
 
 use super::method::MethodState;
 use super::reasons;
+use crate::posterior::{PosteriorSearch, feasible_moments, likelihood};
 use crate::proposal::{Proposal, StopReason};
 use crate::search_box::{SearchBox, admissible};
 
@@ -39,6 +40,10 @@ pub(super) struct DatasetSearch {
     stop: Option<StopReason>,
     /// Points that measure derivatives, in reverse order.
     differences: Vec<(Parameter, Point)>,
+    /// Feasible points of the search, kept only for a posterior.
+    known: Vec<(Point, Moments)>,
+    /// Points of the posterior, which come last.
+    posterior: Option<Box<PosteriorSearch>>,
     ending: Option<GroupEnding>,
 }
 
@@ -67,6 +72,8 @@ impl DatasetSearch {
             best: None,
             stop: None,
             differences: Vec::new(),
+            known: Vec::new(),
+            posterior: None,
             ending: None,
         };
         match given.and_then(|given| given.groups().get(set)?.no_variation()) {
@@ -81,6 +88,9 @@ impl DatasetSearch {
         if self.ending.is_some() {
             return None;
         }
+        if let Some(posterior) = &self.posterior {
+            return posterior.point();
+        }
         match (self.differences.last(), self.method.ask()) {
             (Some((_, point)), _) => Some(*point),
             (None, Proposal::Evaluate(at)) => Some(self.space.point(at)),
@@ -91,6 +101,9 @@ impl DatasetSearch {
     /// Returns at most `most` points that the search may ask for after the pending one, the most
     /// probable first.
     pub(super) fn candidates(&self, most: usize) -> Vec<Point> {
+        if let Some(posterior) = &self.posterior {
+            return posterior.candidates(most);
+        }
         if self.differences.is_empty() {
             let candidates = self.method.candidates(most);
             return candidates.iter().map(|at| self.space.point(at)).filter(admissible).collect();
@@ -127,7 +140,9 @@ impl DatasetSearch {
     ) -> Evaluation {
         row.role =
             EvaluationRole { group: self.set, start: self.start, ..EvaluationRole::default() };
-        if let Some((varied, _)) = self.differences.pop() {
+        if self.posterior.is_some() {
+            self.tell_posterior(specification, &mut row, outcomes);
+        } else if let Some((varied, _)) = self.differences.pop() {
             let start = self.best().map_or(0, |best| best.role.start);
             row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
             row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
@@ -135,10 +150,33 @@ impl DatasetSearch {
             self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.moments);
             self.evaluations += 1;
             self.first.get_or_insert(row);
+            self.keep_for_posterior(specification, &row);
             self.keep_if_better(specification, row, outcomes);
         }
         self.settle(specification);
         row
+    }
+
+    fn tell_posterior(
+        &mut self,
+        specification: &JobSpecification,
+        row: &mut Evaluation,
+        outcomes: Arc<[Outcome]>,
+    ) {
+        row.role.posterior = true;
+        if self.best.is_none() {
+            self.first.get_or_insert(*row);
+            self.keep_if_better(specification, *row, outcomes);
+        }
+        if let Some(posterior) = &mut self.posterior {
+            posterior.tell(feasible_moments(row));
+        }
+    }
+
+    fn keep_for_posterior(&mut self, specification: &JobSpecification, row: &Evaluation) {
+        if specification.posterior.is_some() {
+            self.known.extend(feasible_moments(row).map(|moments| (row.point, moments)));
+        }
     }
 
     /// Returns the best evaluation, if a point was feasible. Of equal costs the first is kept, and
@@ -185,6 +223,12 @@ impl DatasetSearch {
     /// Moves on to a point that is to be evaluated, or to the end.
     fn settle(&mut self, specification: &JobSpecification) {
         while self.ending.is_none() && self.differences.is_empty() {
+            if let Some(posterior) = &self.posterior {
+                if posterior.point().is_none() {
+                    self.end(specification);
+                }
+                return;
+            }
             match self.method.ask() {
                 Proposal::Evaluate(at) if admissible(&self.space.point(at)) => return,
                 Proposal::Evaluate(_) => self.method.refuse(),
@@ -196,7 +240,7 @@ impl DatasetSearch {
     /// Starts the search from the next start; after the last start, the derivatives or the end.
     fn stopped(&mut self, specification: &JobSpecification, stop: StopReason) {
         if u64::from(self.start) == specification.search.starts {
-            return self.end(specification);
+            return self.begin_posterior(specification);
         }
         if self.best().is_none_or(|best| best.role.start == self.start) {
             self.stop = Some(stop);
@@ -212,8 +256,19 @@ impl DatasetSearch {
             self.differences = differences(specification, &best.row.point);
         }
         if self.differences.is_empty() {
-            self.end(specification);
+            self.begin_posterior(specification);
         }
+    }
+
+    /// Begins the posterior, if the job asks for one; otherwise ends the search.
+    fn begin_posterior(&mut self, specification: &JobSpecification) {
+        if specification.posterior.is_none() {
+            return self.end(specification);
+        }
+        let likelihood = likelihood(specification, self.set as usize);
+        let known = std::mem::take(&mut self.known);
+        let posterior = PosteriorSearch::new(specification, likelihood, known.into_iter());
+        self.posterior = Some(Box::new(posterior));
     }
 
     fn end(&mut self, specification: &JobSpecification) {

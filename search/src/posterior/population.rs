@@ -1,0 +1,262 @@
+//! Weighted points that stand for the posterior of an interpolated model.
+//!
+//! Independent importance sampling by Sobol' points: the moments are drawn from the likelihood, the
+//! parameters from the prior, but for the pivots, which are solved for (`pivot.rs`). A point's weight
+//! is posterior density over density of its draw; with the pivots z it is π(z) L(y)/(q(y) |∂y/∂z|).
+
+use osteon_common::bulk_velocity::bulk_velocity;
+use osteon_common::data_likelihood::DataLikelihood;
+use osteon_common::ensemble::GERMS;
+use osteon_common::germ_source::sobol_points;
+use osteon_common::job::JobSpecification;
+use osteon_common::parameters::{Parameter, Point};
+
+use super::features::{Features, features};
+use super::moments_grid::MomentsGrid;
+use super::pivot::{Pivots, solve};
+use super::prior::ParameterPrior;
+use super::surrogate::{Deviations, RULE_OF_THUMB, Scale, Surrogate};
+use crate::search_box::admissible;
+
+/// Number of points drawn from the prior for scales and ranges.
+const PRIOR_POINTS: u64 = 1024;
+/// How far ln v may be from ln √(c1111/ρ), and ln Δ from ln δ.
+const REACH: [[f64; 2]; 2] = [[-0.1, 0.1], [-1.6, -1.0]];
+/// Maximum number of corrections of the pivots for one point.
+const CORRECTIONS_MAX: usize = 40;
+/// Corrections end when the deviations change by at most this.
+const CORRECTED: f64 = 1e-12;
+/// Points whose deviations still change by more than this have no solution.
+const UNSOLVED: f64 = 1e-8;
+/// Fraction of the bounds' distance by which a pivot may leave them while it is corrected.
+const OVERSHOOT: f64 = 0.1;
+/// Step of the derivatives by the pivots, relative to the bounds' distance.
+const STEP: f64 = 1e-5;
+
+/// Everything that a posterior depends on except for the model.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Problem {
+    pub(super) likelihood: DataLikelihood,
+    pub(super) priors: Vec<ParameterPrior>,
+    pub(super) scale: Scale,
+    /// Values of the fixed parameters, and medians of the others.
+    base: Point,
+    pivots: Pivots,
+    grid: MomentsGrid,
+    seed: u64,
+}
+
+/// A weighted point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Member {
+    pub(super) point: Point,
+    pub(super) features: Features,
+    /// Logarithms of mean velocity and coefficient of variation by the interpolation.
+    pub(super) moments: [f64; 2],
+    /// Logarithm of the weight, with any common factor.
+    pub(super) log_weight: f64,
+}
+
+/// Weighted points.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Population {
+    pub(super) members: Vec<Member>,
+    /// Their weights, with the sum 1.
+    pub(super) weights: Vec<f64>,
+}
+
+impl Problem {
+    /// Creates the problem of a job with this likelihood of its data; `None` if no point within the
+    /// bounds is admissible, or no parameter is free.
+    pub(super) fn new(specification: &JobSpecification, likelihood: DataLikelihood) -> Option<Self> {
+        let priors = ParameterPrior::of_job(specification);
+        let mut base = specification.start();
+        for prior in &priors {
+            base.0[prior.parameter as usize] = prior.quantile(0.5);
+        }
+        let seed = specification.monte_carlo.seed;
+        let points = prior_points(&priors, &base, seed, PRIOR_POINTS);
+        let sample: Vec<Features> = points.iter().filter_map(features).collect();
+        if priors.is_empty() || sample.is_empty() {
+            return None;
+        }
+        let reach = |k: usize, of: fn(&Features) -> f64| {
+            let low = sample.iter().map(of).fold(f64::INFINITY, f64::min);
+            let high = sample.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            [low + REACH[k][0], high + REACH[k][1]]
+        };
+        let reach = [reach(0, |one| 0.5 * one[5]), reach(1, |one| one[6])];
+        let grid = MomentsGrid::new(&likelihood, reach);
+        let pivots = Pivots::choose(&priors, points.first().unwrap_or(&base));
+        let scale = Scale::of(&sample);
+        Some(Self { likelihood, priors, scale, base, pivots, grid, seed })
+    }
+
+    /// Returns admissible points drawn from the prior; at most `count`.
+    pub(super) fn prior_points(&self, count: u64) -> Vec<Point> {
+        prior_points(&self.priors, &self.base, self.seed, count)
+    }
+
+    /// Draws the population of an interpolated model from `count` Sobol' points; `number` chooses
+    /// among independent ones.
+    pub(super) fn population(&self, model: &Surrogate, count: u64, number: u64) -> Population {
+        let points = sobol_points(self.seed, u64::MAX - 1 - number, count);
+        let branches = self.pivots.branches();
+        let members = points.iter().flat_map(|uniforms| {
+            (0..branches).filter_map(move |branch| self.member(model, uniforms, branch))
+        });
+        Population::new(members.collect())
+    }
+
+    fn member(&self, model: &Surrogate, uniforms: &[f64; GERMS], branch: usize) -> Option<Member> {
+        let wanted = [self.pivots.mean.is_some(), self.pivots.dispersion];
+        let draw = self.grid.draw(wanted, [uniforms[0], uniforms[1]]);
+        let mut point = self.base;
+        let mut uniforms = uniforms[2..].iter();
+        for prior in self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter)) {
+            point.0[prior.parameter as usize] = prior.quantile(*uniforms.next()?);
+        }
+        let (point, at) = self.solved(model, point, draw.at, branch)?;
+        let mut log_prior = 0.0;
+        for prior in self.priors.iter().filter(|prior| self.is_pivot(prior.parameter)) {
+            log_prior += prior.log_density(point.get(prior.parameter))?;
+        }
+        if !admissible(&point) {
+            return None;
+        }
+        let moments = moments(model, &point)?;
+        let jacobian = self.jacobian(model, &point, moments)?;
+        let log_weight =
+            log_prior + self.likelihood.log(moments) - draw.log_density - libm::log(jacobian);
+        log_weight.is_finite().then_some(Member { point, features: at, moments, log_weight })
+    }
+
+    /// Solves for the pivots: returns the point at which the model has the moments `wanted`, as far
+    /// as pivots can be chosen for that.
+    fn solved(
+        &self,
+        model: &Surrogate,
+        mut point: Point,
+        wanted: [f64; 2],
+        branch: usize,
+    ) -> Option<(Point, Features)> {
+        let mut deviations: Deviations = RULE_OF_THUMB;
+        let mut change = f64::INFINITY;
+        for _ in 0..CORRECTIONS_MAX {
+            if self.pivots.dispersion {
+                let dispersion = libm::exp(wanted[1] - deviations[1]);
+                self.set(&mut point, Parameter::Dispersion, dispersion)?;
+            }
+            if let Some(pivot) = self.pivots.mean {
+                let value = solve(&point, pivot, wanted[0] - deviations[0], branch)?;
+                self.set(&mut point, pivot, value)?;
+            }
+            let at = features(&point)?;
+            let found = model.mean(&at);
+            change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
+            deviations = found;
+            if change <= CORRECTED {
+                return Some((point, at));
+            }
+        }
+        (change <= UNSOLVED).then(|| features(&point).map(|at| (point, at))).flatten()
+    }
+
+    /// Sets a pivot, unless it is far outside its bounds.
+    fn set(&self, point: &mut Point, parameter: Parameter, value: f64) -> Option<()> {
+        let prior = self.priors.iter().find(|prior| prior.parameter == parameter)?;
+        let slack = OVERSHOOT * (prior.upper - prior.lower);
+        let near = (prior.lower - slack..=prior.upper + slack).contains(&value) && value > 0.0;
+        near.then(|| point.0[parameter as usize] = value)
+    }
+
+    /// Returns |∂y/∂z| for the pivots z; 1 if there are none.
+    fn jacobian(&self, model: &Surrogate, point: &Point, at: [f64; 2]) -> Option<f64> {
+        let slope = |parameter: Parameter| {
+            let prior = self.priors.iter().find(|prior| prior.parameter == parameter)?;
+            let step = STEP * (prior.upper - prior.lower);
+            let mut beside = *point;
+            beside.0[parameter as usize] -= step;
+            let found = moments(model, &beside)?;
+            Some([0, 1].map(|k| (at[k] - found[k]) / step))
+        };
+        let determinant = match (self.pivots.mean, self.pivots.dispersion) {
+            (Some(pivot), true) => {
+                let (a, b) = (slope(pivot)?, slope(Parameter::Dispersion)?);
+                a[0] * b[1] - a[1] * b[0]
+            }
+            (Some(pivot), false) => slope(pivot)?[0],
+            (None, true) => slope(Parameter::Dispersion)?[1],
+            (None, false) => 1.0,
+        };
+        (determinant != 0.0).then_some(determinant.abs())
+    }
+
+    fn is_pivot(&self, parameter: Parameter) -> bool {
+        self.pivots.mean == Some(parameter)
+            || self.pivots.dispersion && parameter == Parameter::Dispersion
+    }
+}
+
+impl Population {
+    fn new(members: Vec<Member>) -> Self {
+        let logs = members.iter().map(|member| member.log_weight);
+        let weights = normalised(&logs.collect::<Vec<f64>>());
+        Self { members, weights }
+    }
+
+    /// Returns the effective number of independent draws, (Σ w)²/Σ w².
+    pub(super) fn effective(&self) -> f64 {
+        let squares: f64 = self.weights.iter().map(|weight| weight * weight).sum();
+        if squares > 0.0 { 1.0 / squares } else { 0.0 }
+    }
+
+    /// Returns members in proportion to their weights, in systematic steps; `offset` from 0 to 1
+    /// shifts these.
+    pub(super) fn resampled(&self, count: usize, offset: f64) -> Vec<&Member> {
+        let mut chosen = Vec::with_capacity(count);
+        let mut below = 0.0;
+        for (member, weight) in self.members.iter().zip(&self.weights) {
+            below += weight;
+            while chosen.len() < count && (chosen.len() as f64 + offset) < below * count as f64 {
+                chosen.push(member);
+            }
+        }
+        // Rounding may leave the last step just beyond the last member.
+        let last = chosen.last().copied();
+        chosen.extend(last.into_iter().cycle().take(count - chosen.len()));
+        chosen
+    }
+}
+
+/// Returns the weights of these logarithms, with the sum 1.
+pub(super) fn normalised(logs: &[f64]) -> Vec<f64> {
+    let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
+    let mut weights: Vec<f64> = logs.iter().map(|log| libm::exp(log - largest)).collect();
+    let total: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|weight| *weight /= total);
+    weights
+}
+
+/// Returns ln v and ln Δ of an interpolated model at a point.
+pub(super) fn moments(model: &Surrogate, point: &Point) -> Option<[f64; 2]> {
+    let [mean, variation] = model.mean(&features(point)?);
+    Some([closed_form(point)?[0] + mean, closed_form(point)?[1] + variation])
+}
+
+/// Returns ln √(c1111/ρ) and ln δ at a point.
+pub(super) fn closed_form(point: &Point) -> Option<[f64; 2]> {
+    Some([bulk_velocity(point).ok()?.logarithm, libm::log(point.dispersion())])
+}
+
+fn prior_points(priors: &[ParameterPrior], base: &Point, seed: u64, count: u64) -> Vec<Point> {
+    let drawn = sobol_points(seed, u64::MAX, count);
+    let point = |uniforms: &[f64; GERMS]| {
+        let mut point = *base;
+        for (prior, u) in priors.iter().zip(uniforms) {
+            point.0[prior.parameter as usize] = prior.quantile(*u);
+        }
+        point
+    };
+    drawn.iter().map(point).filter(admissible).collect()
+}

@@ -1,0 +1,192 @@
+//! Summaries of a population, and the result that they make up.
+
+use osteon_common::job::JobSpecification;
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
+
+use super::population::{Member, Population, normalised};
+use super::{EFFICIENCY_MIN, PosteriorSearch, Stage, pareto};
+
+/// Sobol' points of the population that the result summarises.
+const POINTS: u64 = 1 << 14;
+/// Points drawn from the prior for its standard deviations.
+const PRIOR_POINTS: u64 = 4096;
+/// Smallest number of effective draws of a result that counts as converged.
+const EFFECTIVE_MIN: f64 = 400.0;
+
+impl PosteriorSearch {
+    /// Returns the posterior, once all evaluations are made. `errors` are the relative standard
+    /// errors of the model's moments due to sampling.
+    pub(crate) fn result(
+        &self,
+        specification: &JobSpecification,
+        errors: [f64; 2],
+    ) -> Option<Posterior> {
+        let problem = self.problem.as_ref().filter(|_| self.stage == Stage::Done)?;
+        let population = problem.population(&self.surrogate, POINTS, self.populations);
+        if population.members.is_empty() {
+            return None;
+        }
+        let prior = problem.prior_points(PRIOR_POINTS);
+        let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
+        let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
+        let efficiency = self.check.efficiency();
+        let effective = population.effective() * efficiency;
+        let reason = self.reason(efficiency, effective);
+        let noise = problem.likelihood.errors();
+        let share = |k: usize| errors[k] / noise[k] * (errors[k] / noise[k]);
+        let settings = specification.posterior.unwrap_or_default();
+        let count = usize::try_from(settings.draws).unwrap_or(usize::MAX);
+        Some(Posterior {
+            converged: reason.is_none(),
+            reason,
+            evaluations: self.evaluations,
+            effective_draws: effective,
+            checked_draws: self.check.log_ratios.len() as u64,
+            model_error: self.check.error(),
+            check_efficiency: efficiency,
+            pareto_k: pareto::shape(&normalised(&self.check.log_ratios)),
+            sampling_error: (share(0) + share(1)).sqrt(),
+            parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
+            correlation: correlation(&population, &free),
+            free,
+            mean: of_member(&population, |member| libm::exp(member.moments[0])),
+            coefficient_of_variation: of_member(&population, |member| libm::exp(member.moments[1])),
+            bulk_velocity: of(&|point| {
+                super::closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
+            }),
+            entries: entries(&population, &prior),
+            predictive_p_value: None,
+            draws: draws(&population, problem, count),
+        })
+    }
+
+    /// Returns why the result is not accurate; `None` if it is.
+    fn reason(&self, efficiency: f64, effective: f64) -> Option<String> {
+        if efficiency < EFFICIENCY_MIN {
+            return Some(format!(
+                "after {} evaluations the interpolated model still differs from the model: \
+                 {:.0} % of the checked draws count, {:.0} % are needed; raise [posterior] \
+                 max_evaluations",
+                self.evaluations,
+                100.0 * efficiency,
+                100.0 * EFFICIENCY_MIN
+            ));
+        }
+        (effective < EFFECTIVE_MIN).then(|| {
+            format!(
+                "the draws count as {effective:.0} independent ones only, {EFFECTIVE_MIN} are \
+                 needed: few points within the bounds match the data; widen the bounds or the priors"
+            )
+        })
+    }
+}
+
+/// Summarises a quantity of the population's points and of the prior's.
+fn summary(
+    population: &Population,
+    prior: &[Point],
+    quantity: &dyn Fn(&Point) -> f64,
+) -> PosteriorSummary {
+    let values = population.members.iter().map(|member| quantity(&member.point)).collect();
+    let prior: Vec<f64> = prior.iter().map(quantity).collect();
+    let equal = vec![1.0 / prior.len() as f64; prior.len()];
+    let (_, prior_standard_deviation) = moments(&prior, &equal);
+    PosteriorSummary { prior_standard_deviation, ..weighted(values, &population.weights) }
+}
+
+/// Summarises a quantity of the population's members; that of the prior is unknown.
+fn of_member(population: &Population, quantity: impl Fn(&Member) -> f64) -> PosteriorSummary {
+    weighted(population.members.iter().map(quantity).collect(), &population.weights)
+}
+
+fn weighted(values: Vec<f64>, weights: &[f64]) -> PosteriorSummary {
+    let (mean, standard_deviation) = moments(&values, weights);
+    let mut sorted: Vec<(f64, f64)> = values.into_iter().zip(weights.iter().copied()).collect();
+    sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let quantiles = QUANTILE_LEVELS.map(|level| quantile(&sorted, level));
+    PosteriorSummary {
+        mean,
+        standard_deviation,
+        quantiles,
+        prior_standard_deviation: f64::NAN,
+    }
+}
+
+fn moments(values: &[f64], weights: &[f64]) -> (f64, f64) {
+    let mean: f64 = values.iter().zip(weights).map(|(value, weight)| weight * value).sum();
+    let squares = values.iter().zip(weights).map(|(v, w)| w * ((v - mean) * (v - mean)));
+    (mean, squares.sum::<f64>().sqrt())
+}
+
+/// Returns the quantile of values in ascending order with their weights, interpolated between the
+/// middles of the weights.
+fn quantile(sorted: &[(f64, f64)], level: f64) -> f64 {
+    let mut below = 0.0;
+    let mut before: Option<(f64, f64)> = None;
+    for &(value, weight) in sorted {
+        let middle = below + 0.5 * weight;
+        if middle >= level {
+            return match before {
+                Some((last, at)) if middle > at => {
+                    last + (value - last) * ((level - at) / (middle - at))
+                }
+                _ => value,
+            };
+        }
+        before = Some((value, middle));
+        below += weight;
+    }
+    sorted.last().map_or(f64::NAN, |last| last.0)
+}
+
+fn correlation(population: &Population, free: &[Parameter]) -> Vec<Vec<f64>> {
+    let columns: Vec<Vec<f64>> = free
+        .iter()
+        .map(|&one| {
+            let values: Vec<f64> =
+                population.members.iter().map(|member| member.point.get(one)).collect();
+            let (mean, deviation) = moments(&values, &population.weights);
+            values.iter().map(|value| (value - mean) / deviation).collect()
+        })
+        .collect();
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        let products = a.iter().zip(b).zip(&population.weights);
+        products.map(|((a, b), weight)| weight * (a * b)).sum()
+    };
+    let row = |a: &Vec<f64>| columns.iter().map(|b| product(a, b)).collect();
+    columns.iter().map(row).collect()
+}
+
+fn entries(population: &Population, prior: &[Point]) -> Vec<(usize, usize, PosteriorSummary)> {
+    let entry = |point: &Point, row: usize, column: usize| {
+        let elasticity = point.constants().elasticity();
+        elasticity.map_or(f64::NAN, |elasticity| elasticity.rows()[row][column])
+    };
+    let places = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
+    places
+        .map(|(row, column)| {
+            let of = |point: &Point| entry(point, row, column);
+            (row, column, summary(population, prior, &of))
+        })
+        .collect()
+}
+
+fn draws(
+    population: &Population,
+    problem: &super::Problem,
+    count: usize,
+) -> Vec<PosteriorDraw> {
+    let draw = |member: &Member| {
+        let log_prior = problem.priors.iter().map(|prior| {
+            prior.log_density(member.point.get(prior.parameter)).unwrap_or(f64::NEG_INFINITY)
+        });
+        PosteriorDraw {
+            point: member.point,
+            log_density: problem.likelihood.log(member.moments) + log_prior.sum::<f64>(),
+            mean: libm::exp(member.moments[0]),
+            coefficient_of_variation: libm::exp(member.moments[1]),
+        }
+    };
+    population.resampled(count, 0.5).into_iter().map(draw).collect()
+}

@@ -1,0 +1,305 @@
+//! Interpolation of the model's moments: Gaussian processes for their deviation from the closed
+//! form.
+//!
+//! Each of ln v - ln √(c1111/ρ) and ln Δ - ln δ is interpolated by a Gaussian process in the features
+//! of the point (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning
+//! (2006), Sec. 2.2 and 5.4), with a Matérn kernel of order 5/2, a broad linear trend and a length
+//! for each feature, chosen by maximum marginal likelihood.
+
+use super::cholesky::{Cholesky, dot};
+use super::features::{FEATURES, Features};
+
+/// The two deviations at a point: of ln v and of ln Δ.
+pub(super) type Deviations = [f64; 2];
+
+/// Deviations by the rule of thumb, for use before any evaluation: v = 0.99 √(c1111/ρ),
+/// Δ = 0.99 δ/√14.
+pub(super) const RULE_OF_THUMB: Deviations = [-0.010_05, -1.329_58];
+
+/// Variance of constant and trend in units of the process's own: practically unknown beforehand.
+const TREND_VARIANCE: f64 = 100.0;
+/// Shortest and longest length, in standard deviations of a feature.
+const LENGTHS: [f64; 2] = [0.3, 30.0];
+/// First length of every feature.
+const FIRST_LENGTH: f64 = 3.0;
+/// Factors by which lengths are changed, one sweep over the features after another.
+const SWEEPS: [f64; 6] = [2.0, 1.6, 1.4, 1.25, 1.15, 1.1];
+/// Maximum number of points from which lengths are chosen: the last ones.
+const POINTS_FOR_LENGTHS_MAX: usize = 160;
+/// Variance of the noise in units of the process's variance: the velocities jump by some 1e-9
+/// where the solver's sampling changes, and more where a realization begins to fail.
+const NOISE: f64 = 1e-8;
+/// Larger noise, used if two points contradict each other.
+const NOISE_MAX: f64 = 1e-2;
+
+/// The interpolation of both deviations.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Surrogate {
+    scale: Scale,
+    inputs: Vec<Features>,
+    outputs: Vec<Deviations>,
+    processes: [Process; 2],
+}
+
+/// Centre and spread of each feature; the spread is infinite where a feature does not vary.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale {
+    centre: Features,
+    spread: Features,
+}
+
+/// A prediction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Prediction {
+    pub(super) mean: Deviations,
+    pub(super) variance: Deviations,
+}
+
+/// The Gaussian process of one deviation.
+#[derive(Debug, Clone, PartialEq)]
+struct Process {
+    lengths: Features,
+    noise: f64,
+    /// Value about which the trend is taken.
+    level: f64,
+    /// Variance of the process.
+    variance: f64,
+    factor: Cholesky,
+    weights: Vec<f64>,
+}
+
+impl Scale {
+    /// Returns the scale of a sample of features.
+    pub(super) fn of(sample: &[Features]) -> Self {
+        let count = sample.len().max(1) as f64;
+        let mut scale = Self { centre: [0.0; FEATURES], spread: [f64::INFINITY; FEATURES] };
+        for k in 0..FEATURES {
+            let mean = sample.iter().map(|one| one[k]).sum::<f64>() / count;
+            let square: f64 = sample.iter().map(|one| (one[k] - mean) * (one[k] - mean)).sum();
+            let spread = (square / count).sqrt();
+            scale.centre[k] = mean;
+            if spread > 1e-9 * (1.0 + mean.abs()) {
+                scale.spread[k] = spread;
+            }
+        }
+        scale
+    }
+
+    fn apply(&self, features: &Features) -> Features {
+        std::array::from_fn(|k| (features[k] - self.centre[k]) / self.spread[k])
+    }
+}
+
+impl Surrogate {
+    /// Creates an interpolation without points, which predicts the rule of thumb.
+    pub(super) fn new(scale: Scale) -> Self {
+        let processes = RULE_OF_THUMB.map(Process::new);
+        Self { scale, inputs: Vec::new(), outputs: Vec::new(), processes }
+    }
+
+    /// Returns the number of points.
+    pub(super) fn len(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// Adds a point with the deviations found there.
+    pub(super) fn add(&mut self, features: &Features, found: Deviations) {
+        self.inputs.push(self.scale.apply(features));
+        self.outputs.push(found);
+    }
+
+    /// Uses all points added; chooses the lengths anew if asked to.
+    pub(super) fn fit(&mut self, choose_lengths: bool) {
+        for (k, process) in self.processes.iter_mut().enumerate() {
+            let values: Vec<f64> = self.outputs.iter().map(|output| output[k]).collect();
+            if choose_lengths {
+                let from = values.len().saturating_sub(POINTS_FOR_LENGTHS_MAX);
+                process.choose_lengths(&self.inputs[from..], &values[from..], &self.scale);
+            }
+            process.fit(&self.inputs, &values);
+        }
+    }
+
+    /// Predicts the deviations at a point.
+    pub(super) fn mean(&self, features: &Features) -> Deviations {
+        let at = self.scale.apply(features);
+        [0, 1].map(|k| self.processes[k].mean(&self.inputs, &at))
+    }
+
+    /// Predicts the deviations at a point with the variances of their errors.
+    pub(super) fn predict(&self, features: &Features) -> Prediction {
+        let at = self.scale.apply(features);
+        let both = [0, 1].map(|k| self.processes[k].predict(&self.inputs, &at));
+        Prediction { mean: both.map(|one| one.0), variance: both.map(|one| one.1) }
+    }
+
+    /// Returns for each of several points the part of its covariances with the others that the
+    /// points added so far do not explain: a vector for each process, whose scalar products are
+    /// the covariances they explain.
+    pub(super) fn explained(&self, features: &Features) -> [Vec<f64>; 2] {
+        let at = self.scale.apply(features);
+        [0, 1].map(|k| self.processes[k].explained(&self.inputs, &at))
+    }
+
+    /// Returns the prior covariances of the deviations at two points.
+    pub(super) fn covariance(&self, a: &Features, b: &Features) -> Deviations {
+        let (a, b) = (self.scale.apply(a), self.scale.apply(b));
+        [0, 1].map(|k| self.processes[k].variance * self.processes[k].kernel(&a, &b))
+    }
+}
+
+impl Process {
+    fn new(level: f64) -> Self {
+        Self {
+            lengths: [FIRST_LENGTH; FEATURES],
+            noise: NOISE,
+            level,
+            variance: 1e-4,
+            factor: Cholesky::default(),
+            weights: Vec::new(),
+        }
+    }
+
+    /// Covariance of two points in units of the variance.
+    fn kernel(&self, a: &Features, b: &Features) -> f64 {
+        let (mut square, mut trend) = (0.0, 1.0);
+        for k in 0..FEATURES {
+            let step = (a[k] - b[k]) / self.lengths[k];
+            square += step * step;
+            trend += a[k] * b[k];
+        }
+        let distance = (5.0 * square).sqrt();
+        (1.0 + distance + distance * distance / 3.0) * libm::exp(-distance) + TREND_VARIANCE * trend
+    }
+
+    /// Conditions the process on all points, with as little noise as they allow.
+    fn fit(&mut self, inputs: &[Features], values: &[f64]) {
+        if values.is_empty() {
+            return;
+        }
+        self.level = values.iter().sum::<f64>() / values.len() as f64;
+        self.noise = NOISE;
+        while !self.factorise(inputs) && self.noise < NOISE_MAX {
+            self.noise *= 10.0;
+        }
+        let rests: Vec<f64> = values.iter().map(|value| value - self.level).collect();
+        let white = self.factor.solve_lower(&rests);
+        self.variance = (dot(&white, &white) / values.len() as f64).max(1e-24);
+        self.weights = self.factor.solve(&rests);
+    }
+
+    fn factorise(&mut self, inputs: &[Features]) -> bool {
+        self.factor = Cholesky::default();
+        for (k, a) in inputs.iter().enumerate() {
+            let mut row: Vec<f64> = inputs[..k].iter().map(|b| self.kernel(a, b)).collect();
+            row.push(self.kernel(a, a) + self.noise);
+            if !self.factor.push(&row) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Chooses the lengths by coordinate search for the largest marginal likelihood.
+    fn choose_lengths(&mut self, inputs: &[Features], values: &[f64], scale: &Scale) {
+        let mut best = self.misfit(inputs, values);
+        for factor in SWEEPS {
+            for k in (0..FEATURES).filter(|&k| scale.spread[k].is_finite()) {
+                let before = self.lengths[k];
+                for length in [before * factor, before / factor] {
+                    self.lengths[k] = length.clamp(LENGTHS[0], LENGTHS[1]);
+                    let found = self.misfit(inputs, values);
+                    if found < best {
+                        best = found;
+                        break;
+                    }
+                    self.lengths[k] = before;
+                }
+            }
+        }
+    }
+
+    /// Returns minus the logarithm of the marginal likelihood, with the variance chosen best.
+    fn misfit(&mut self, inputs: &[Features], values: &[f64]) -> f64 {
+        self.fit(inputs, values);
+        if self.weights.len() != values.len() {
+            return f64::INFINITY;
+        }
+        0.5 * values.len() as f64 * libm::log(self.variance) + self.factor.half_log_determinant()
+    }
+
+    fn covariances(&self, inputs: &[Features], at: &Features) -> Vec<f64> {
+        inputs.iter().map(|input| self.kernel(input, at)).collect()
+    }
+
+    fn mean(&self, inputs: &[Features], at: &Features) -> f64 {
+        let products = inputs.iter().zip(&self.weights).map(|(x, w)| w * self.kernel(x, at));
+        self.level + products.sum::<f64>()
+    }
+
+    fn predict(&self, inputs: &[Features], at: &Features) -> (f64, f64) {
+        let covariances = self.covariances(inputs, at);
+        let white = self.factor.solve_lower(&covariances);
+        let rest = self.kernel(at, at) - dot(&white, &white);
+        (self.level + dot(&covariances, &self.weights), self.variance * rest.max(0.0))
+    }
+
+    fn explained(&self, inputs: &[Features], at: &Features) -> Vec<f64> {
+        let mut white = self.factor.solve_lower(&self.covariances(inputs, at));
+        let root = self.variance.sqrt();
+        white.iter_mut().for_each(|value| *value *= root);
+        white
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::ensemble::Germs;
+
+    use super::*;
+
+    fn sample(count: u64, seed: u64) -> Vec<Features> {
+        (0..count).map(|i| std::array::from_fn(|k| Germs::draw(seed, i).values()[k])).collect()
+    }
+
+    /// A smooth function of two features.
+    fn deviations(x: &Features) -> Deviations {
+        [0.01 * (2.0 * x[0]).sin() * (1.0 + x[1]), -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0]]
+    }
+
+    #[test]
+    fn predictions_are_as_wrong_as_they_say() {
+        let inputs = sample(80, 3);
+        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
+        surrogate.fit(true);
+        let mut ratios = Vec::new();
+        for x in sample(50, 4) {
+            let Prediction { mean, variance } = surrogate.predict(&x);
+            let expected = deviations(&x);
+            for k in 0..2 {
+                assert!((mean[k] - surrogate.mean(&x)[k]).abs() < 1e-10);
+                assert!((mean[k] - expected[k]).abs() < 2e-3, "{k}: {} {}", mean[k], expected[k]);
+                ratios.push((mean[k] - expected[k]).powi(2) / variance[k]);
+            }
+        }
+        let mean_ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        assert!((0.01..4.0).contains(&mean_ratio), "{mean_ratio}");
+    }
+
+    #[test]
+    fn points_are_interpolated() {
+        let inputs = sample(30, 5);
+        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        assert_eq!(surrogate.mean(&inputs[0]), RULE_OF_THUMB);
+        inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
+        surrogate.fit(true);
+        for x in &inputs {
+            let found = surrogate.predict(x);
+            for k in 0..2 {
+                assert!((found.mean[k] - deviations(x)[k]).abs() < 1e-6);
+                assert!(found.variance[k] < 1e-9);
+            }
+        }
+    }
+}

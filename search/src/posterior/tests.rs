@@ -1,0 +1,1 @@
+//! Posteriors of models that are known in closed form.
