@@ -121,6 +121,7 @@ fn parse_with_warnings(
         monte_carlo: monte_carlo(&mut reader, &table),
         objective: objective(&mut reader, &table),
         search: search(&mut reader, &table),
+        posterior: None,
     };
     check::job_from(&specification, origin.as_ref(), &mut reader.violations);
     if !reader.violations.is_empty() {

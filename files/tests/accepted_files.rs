@@ -101,6 +101,7 @@ fn a_minimal_job_has_the_documented_defaults() {
             sensitivities: true,
             priors: [None; 7],
         },
+        posterior: None,
     };
     assert_eq!(given, expected);
     assert!(given.check().is_empty());

@@ -200,6 +200,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 monte_carlo,
                 objective,
                 search,
+                posterior: None,
             }
         },
     )

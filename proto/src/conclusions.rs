@@ -34,7 +34,7 @@ pub(crate) struct FieldsOf<'a> {
 }
 
 pub(crate) fn to_message(conclusions: &Conclusions) -> ConclusionFields {
-    let Conclusions { inference, profiles, solutions } = conclusions;
+    let Conclusions { inference, profiles, solutions, posterior: _ } = conclusions;
     let sensitivities = inference.iter().flat_map(|found| &found.sensitivities);
     ConclusionFields {
         sensitivities: sensitivities.map(sensitivity_to_message).collect(),
@@ -55,6 +55,7 @@ pub(crate) fn from_message(fields: &FieldsOf<'_>) -> Result<Conclusions, Malform
         inference: inference.transpose()?,
         profiles: fields.profiles.iter().map(profile_from_message).collect::<Result<_, _>>()?,
         solutions: fields.solutions.map(solutions_from_message).transpose()?,
+        posterior: None,
     })
 }
 

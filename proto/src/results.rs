@@ -178,7 +178,12 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     Ok(Evaluation {
         number: message.number,
-        role: EvaluationRole { group: message.group, start: message.start, varied },
+        role: EvaluationRole {
+            group: message.group,
+            start: message.start,
+            varied,
+            posterior: false,
+        },
         point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,

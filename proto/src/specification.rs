@@ -82,6 +82,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
             .search
             .as_ref()
             .map_or_else(Search::default, |message| search_from_message(message, violations)),
+        posterior: None,
     }
 }
 

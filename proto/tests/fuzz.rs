@@ -194,7 +194,7 @@ fn history_of_two_starts() -> Vec<Evaluation> {
         }
         Evaluation {
             number,
-            role: EvaluationRole { group: 0, start, varied },
+            role: EvaluationRole { start, varied, ..EvaluationRole::default() },
             point,
             moments: Some(moments(3950.0 - number as f64, 0.0103 + 1e-6 * number as f64)),
             cost: Some(1e-11),
@@ -253,7 +253,7 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         picking: job.setup.picking,
         program: Program::current(Some("c0ffee")),
     };
-    let Conclusions { inference, profiles, solutions } = &result.conclusions;
+    let Conclusions { inference, profiles, solutions, posterior: _ } = &result.conclusions;
     assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));
     assert_eq!(profiles.len(), 2);
     assert!(solutions.as_ref().is_some_and(|found| found.spread.is_some()));

@@ -109,6 +109,7 @@ pub enum IdentifyError<E> {
 ///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
 ///     objective: Objective::Moments,
 ///     search: Search::default(),
+///     posterior: None,
 /// };
 /// // In place of a solver: the speed of the bulk wave along the bone.
 /// let found = osteon_search::identify(&specification, |realizations| {

@@ -19,6 +19,7 @@ fn job(data: Data, density: Range) -> JobSpecification {
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
+        posterior: None,
     }
 }
 

@@ -129,6 +129,7 @@ fn found(
         monte_carlo: monte_carlo(draws),
         objective: Objective::default(),
         search,
+        posterior: None,
     };
     let CompletedJob { result, history } =
         identify(&specification, &mut RealizationCache::new(), draws.isa)?;

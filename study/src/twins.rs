@@ -199,6 +199,7 @@ fn specification(
         },
         objective: Objective::default(),
         search: Search::by(SearchMethod::Newton),
+        posterior: None,
     }
 }
 

@@ -36,6 +36,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
+        posterior: None,
     }
 }
 

@@ -50,6 +50,7 @@ pub(crate) fn identification(
         },
         objective: Objective::default(),
         search: Search { max_evaluations, sensitivities: false, ..Search::default() },
+        posterior: None,
     }
 }
 

@@ -59,7 +59,7 @@ fn grouped() -> (JobSpecification, JobResult, Vec<Evaluation>) {
     c.reason = Some("only one velocity, and no more".to_owned());
     let row = |group, varied| Evaluation {
         number: 0,
-        role: EvaluationRole { group, start: 0, varied },
+        role: EvaluationRole { group, varied, ..EvaluationRole::default() },
         point: POINT,
         moments: None,
         cost: None,

@@ -385,7 +385,7 @@ fn the_history_names_start_and_group() {
     specification.search.starts = 2;
     let row = Evaluation {
         number: 7,
-        role: EvaluationRole { group: 1, start: 1, varied: None },
+        role: EvaluationRole { group: 1, start: 1, ..EvaluationRole::default() },
         point: POINT,
         moments: None,
         cost: Some(0.5),

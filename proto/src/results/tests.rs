@@ -192,7 +192,7 @@ prop_compose! {
             let (values, costs) = pairs.into_iter().unzip();
             Profile { parameter: Parameter::ALL[parameter], values, costs }
         });
-        Conclusions { inference, profiles: profiles.collect(), solutions }
+        Conclusions { inference, profiles: profiles.collect(), solutions, posterior: None }
     }
 }
 
@@ -291,7 +291,8 @@ properties! {
         failures in failures(),
         estimated_error in estimated_error(),
     ) {
-        let role = EvaluationRole { group, start, varied: varied.map(|k| Parameter::ALL[k]) };
+        let varied = varied.map(|k| Parameter::ALL[k]);
+        let role = EvaluationRole { group, start, varied, ..EvaluationRole::default() };
         let evaluation =
             Evaluation { number, role, point, moments, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);
@@ -356,6 +357,7 @@ fn complete() -> v1::JobResult {
             matching: 1,
             spread: Some(Spreads { parameters: [spread; 7], entries: vec![(0, 5, spread)] }),
         }),
+        posterior: None,
     };
     to_message(&JobResult {
         status: Status::Converged,

@@ -118,6 +118,7 @@ prop_compose! {
                 priors,
                 ..Search::by(method)
             },
+            posterior: None,
         }
     }
 }
@@ -142,6 +143,7 @@ fn message() -> v1::JobSpecification {
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
+        posterior: None,
     })
 }
 

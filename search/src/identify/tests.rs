@@ -23,6 +23,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
         monte_carlo: MonteCarlo { realizations: 50, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 60, ..SearchSettings::by(method) },
+        posterior: None,
     }
 }
 

@@ -28,6 +28,7 @@ fn specification(max_evaluations: u64) -> JobSpecification {
         monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations, ..SearchSettings::default() },
+        posterior: None,
     }
 }
 

@@ -128,6 +128,7 @@ fn propagation(realizations: u64) -> JobSpecification {
         monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: Search::default(),
+        posterior: None,
     }
 }
 

@@ -34,6 +34,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         monte_carlo: MonteCarlo { realizations: 2, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 8, ..SearchSettings::default() },
+        posterior: None,
     });
     let mut search = Search::new(specification.clone());
     let mut records = Vec::new();

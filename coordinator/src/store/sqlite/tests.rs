@@ -28,6 +28,7 @@ pub(super) fn job(id: u64) -> JobRecord {
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
+        posterior: None,
     };
     JobRecord {
         job: JobId(id),
@@ -90,7 +91,7 @@ fn evaluations(store: &mut SqliteStore, job: u64) -> Result<Vec<EvaluationRecord
 pub(super) fn summary(job: u64) -> Summary {
     let row = |number| osteon_common::results::Evaluation {
         number,
-        role: EvaluationRole { group: 1, start: 2, varied: None },
+        role: EvaluationRole { group: 1, start: 2, ..EvaluationRole::default() },
         point: evaluation(job, number).point,
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
