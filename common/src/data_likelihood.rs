@@ -14,6 +14,17 @@ use crate::moments::Moments;
 /// Number of values of ρ, the midpoints of equal intervals from 0 to 1, over which the likelihood
 /// is averaged.
 const SHARES: usize = 48;
+/// Nodes and weights of Gauss-Hermite quadrature for the standard normal law (M. Abramowitz and
+/// I. A. Stegun, Handbook of Mathematical Functions (1964), Table 25.10, n = 5).
+const NORMAL_NODES: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_7),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_7),
+];
+/// Errors of the model's moments below this fraction of the data's are negligible.
+const NEGLIGIBLE: f64 = 0.02;
 
 /// The likelihood of one set of data.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +39,9 @@ pub struct DataLikelihood {
     classes: Vec<SubjectClass>,
     /// Values of ρ.
     shares: Vec<f64>,
+    /// Errors of the model's moments, over which the likelihood is averaged: differences of both
+    /// logarithms, and logarithms of their weights. A single zero if the model is exact.
+    model_errors: Vec<([f64; 2], f64)>,
 }
 
 /// Subjects that have the same number of velocities each, and the sums over them that are
@@ -91,23 +105,44 @@ impl DataLikelihood {
         let middle = |k: usize| (k as f64 + 0.5) / SHARES as f64;
         let shares = if several { (0..SHARES).map(middle).collect() } else { vec![0.0] };
         let known = variance > 0.0 && centre > 0.0 && variance.is_finite();
-        known.then(|| Self { centre, deviation: variance.sqrt(), instrument, classes, shares })
+        known.then(|| Self {
+            centre,
+            deviation: variance.sqrt(),
+            instrument,
+            classes,
+            shares,
+            model_errors: vec![([0.0; 2], 0.0)],
+        })
+    }
+
+    /// Returns the likelihood of a model whose moments have these relative standard errors, which
+    /// are the same at every point, as common germs make them: its average over normal errors.
+    pub fn with_model_errors(self, errors: [f64; 2]) -> Self {
+        let noise = self.errors();
+        let nodes = |axis: usize| {
+            let matters = errors[axis] > NEGLIGIBLE * noise[axis];
+            if matters { NORMAL_NODES.to_vec() } else { vec![(0.0, 1.0)] }
+        };
+        let pairs = nodes(0).into_iter().flat_map(|mean| {
+            nodes(1).into_iter().map(move |variation| {
+                let steps = [mean.0 * errors[0], variation.0 * errors[1]];
+                (steps, libm::log(mean.1 * variation.1))
+            })
+        });
+        Self { model_errors: pairs.collect(), ..self }
     }
 
     /// Returns the logarithm of the likelihood of a model with this logarithm of the mean (m/s) and
     /// of the coefficient of variation, up to a constant, nats.
     pub fn log(&self, [mean, variation]: [f64; 2]) -> f64 {
-        let mean = libm::exp(mean);
-        let deviation = mean * libm::exp(variation);
-        let variance = deviation * deviation;
-        let of = |share: &f64| self.log_with(mean - self.centre, variance, *share);
-        let logs: Vec<f64> = self.shares.iter().map(of).collect();
-        let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
-        if !largest.is_finite() {
-            return f64::NEG_INFINITY;
-        }
-        let sum: f64 = logs.iter().map(|log| libm::exp(log - largest)).sum();
-        largest + libm::log(sum / logs.len() as f64)
+        let of = |(step, weight): &([f64; 2], f64)| {
+            let mean = libm::exp(mean + step[0]);
+            let deviation = mean * libm::exp(variation + step[1]);
+            let variance = deviation * deviation;
+            let of_share = |share: &f64| self.log_with(mean - self.centre, variance, *share);
+            weight + log_of_sum(self.shares.iter().map(of_share))
+        };
+        log_of_sum(self.model_errors.iter().map(of))
     }
 
     /// Returns the logarithms of the data's mean and coefficient of variation.
@@ -136,6 +171,19 @@ impl DataLikelihood {
         };
         -0.5 * self.classes.iter().map(of).sum::<f64>()
     }
+}
+
+/// Returns the logarithm of the sum of the exponentials.
+fn log_of_sum(logs: impl ExactSizeIterator<Item = f64>) -> f64 {
+    if logs.len() == 1 {
+        return logs.sum();
+    }
+    let logs: Vec<f64> = logs.collect();
+    let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
+    if !largest.is_finite() {
+        return f64::NEG_INFINITY;
+    }
+    largest + libm::log(logs.iter().map(|log| libm::exp(log - largest)).sum())
 }
 
 /// Sums the velocities by subject, and the subjects by the number of their velocities.
@@ -229,6 +277,27 @@ mod tests {
         let difference = log(&found, 3980.0, 0.02) - log(&found, 3900.0, 0.03);
         let expected = direct(3980.0, 0.02) - direct(3900.0, 0.03);
         assert!((difference - expected).abs() < 1e-9, "{difference} {expected}");
+    }
+
+    /// Compares with the average over many errors of the model's mean, of the size of the data's.
+    #[test]
+    fn errors_of_the_model_are_averaged_over() {
+        let exact = DataLikelihood::independent(&VELOCITIES, 0.0).unwrap();
+        let error = exact.errors()[0];
+        let blurred = exact.clone().with_model_errors([error, 0.0]);
+        let average = |mean: f64| {
+            let of = |k: i32| {
+                let z = f64::from(k) / 20.0;
+                let log = exact.log([libm::log(mean) + z * error, libm::log(0.025)]);
+                (log - 0.5 * z * z).exp()
+            };
+            (-120..=120).map(of).sum::<f64>().ln()
+        };
+        let found = log(&blurred, 3900.0, 0.025) - log(&blurred, 4000.0, 0.025);
+        let expected = average(3900.0) - average(4000.0);
+        assert!((found - expected).abs() < 0.01, "{found} {expected}");
+        let same = exact.clone().with_model_errors([0.01 * error, 0.0]);
+        assert_eq!(log(&same, 3900.0, 0.02), log(&exact, 3900.0, 0.02));
     }
 
     #[test]

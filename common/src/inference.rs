@@ -137,8 +137,7 @@ impl Context<'_> {
             let value = self.best.point.get(parameter);
             let axis = (0..free.len()).map(|other| if other == place { 1.0 } else { 0.0 });
             let gradient: Vec<f64> = axis.collect();
-            let response = self.response(&gradient).filter(|_| self.linear.undetermined.is_empty());
-            let known = response.map(|response| {
+            let known = self.response(&gradient).map(|response| {
                 let NoiseResponse { deviation, free_share, .. } = response;
                 let edge = self.specification.range(parameter).edge();
                 let standard_error = deviation * edge;
@@ -170,9 +169,12 @@ impl Context<'_> {
     }
 
     /// Returns the effect of noise on a quantity with this gradient; `None` if the model does not
-    /// match, or if the quantity does not depend on any free parameter.
+    /// match, if the quantity does not depend on any free parameter, or if the data leave a
+    /// direction free: even a quantity whose gradient is nearly orthogonal to it then depends on how
+    /// far the parameters may move along it, which the posterior says.
     fn response(&self, gradient: &[f64]) -> Option<NoiseResponse> {
-        if !self.matched || gradient.iter().all(|slope| *slope == 0.0) {
+        let known = self.matched && self.linear.undetermined.is_empty();
+        if !known || gradient.iter().all(|slope| *slope == 0.0) {
             return None;
         }
         self.linear.response(gradient, &self.noise.covariance())
@@ -185,7 +187,7 @@ impl Context<'_> {
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
-    let searched = history.iter().filter(|row| row.belongs_to(set) && row.is_searched());
+    let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)
 }

@@ -123,11 +123,6 @@ impl Evaluation {
     pub fn belongs_to(&self, set: usize) -> bool {
         self.role.group as usize == set
     }
-
-    /// Whether it belongs to the search itself and serves neither a derivative nor the posterior.
-    pub fn is_searched(&self) -> bool {
-        self.role.varied.is_none() && !self.role.posterior
-    }
 }
 
 /// Meaning of the best point of a search.

@@ -161,7 +161,8 @@ impl PosteriorSearch {
         let (Some(member), Some(problem)) = (self.pending.pop(), &self.problem) else { return };
         self.evaluations += 1;
         if self.stage == Stage::Checking {
-            let exact = moments.map_or(f64::NEG_INFINITY, |found| problem.likelihood.log(logs(found)));
+            let exact =
+                moments.map_or(f64::NEG_INFINITY, |found| problem.likelihood.log(logs(found)));
             self.check.log_ratios.push(exact - problem.likelihood.log(member.moments));
         }
         match moments {
@@ -175,7 +176,8 @@ impl PosteriorSearch {
 
     fn learn(&mut self, point: &Point, moments: Moments) {
         let logs = logs(moments);
-        let deviations = closed_form(point).map(|closed| [logs[0] - closed[0], logs[1] - closed[1]]);
+        let deviations =
+            closed_form(point).map(|closed| [logs[0] - closed[0], logs[1] - closed[1]]);
         if let (Some(at), Some(deviations)) = (features(point), deviations)
             && deviations.iter().all(|deviation| deviation.is_finite())
         {
@@ -207,7 +209,8 @@ impl PosteriorSearch {
         let few = problem.priors.len() <= 2;
         let wanted = PREDICTED_ERRORS[usize::from(!few)];
         let enough = self.surrogate.len() >= BATCHES[0];
-        if enough && predicted_error(problem, &self.surrogate, &draws) <= wanted || left <= CHECKED {
+        if enough && predicted_error(problem, &self.surrogate, &draws) <= wanted || left <= CHECKED
+        {
             self.stage = Stage::Checking;
             self.check = Check::default();
             let fresh = population.resampled(CHECKED.min(left), 0.25);
@@ -280,9 +283,8 @@ fn least_certain(
         .collect();
     let mut chosen = Vec::new();
     for _ in 0..count {
-        let loss = |rest: &[f64; 2]| {
-            rest[0] / (errors[0] * errors[0]) + rest[1] / (errors[1] * errors[1])
-        };
+        let loss =
+            |rest: &[f64; 2]| rest[0] / (errors[0] * errors[0]) + rest[1] / (errors[1] * errors[1]);
         let most = (0..draws.len()).max_by(|a, b| loss(&rests[*a]).total_cmp(&loss(&rests[*b])));
         let Some(most) = most.filter(|most| rests[*most].iter().all(|rest| *rest > 0.0)) else {
             break;

@@ -381,10 +381,7 @@ impl Summary {
         let of_one_set = !matches!(specification.data, Some(Data::Groups(_)));
         let data = specification.data.as_ref().filter(|_| of_one_set);
         let conclusions = data.map(|_| self.conclusions(specification, 0, best.as_ref()));
-        let searched = self
-            .history
-            .iter()
-            .filter(|row| row.is_searched());
+        let searched = self.history.iter().filter(|row| row.role.is_of_search());
         JobResult {
             status: ending.status,
             failure: ending.failure,

@@ -43,9 +43,9 @@ impl MomentsGrid {
         for _ in 0..NARROWED {
             logs = tabulated(likelihood, spans);
             let narrower = narrowed(&logs, spans);
-            let done = [0, 1].iter().all(|&k| {
-                narrower[k][1] - narrower[k][0] > 0.7 * (spans[k][1] - spans[k][0])
-            });
+            let done = [0, 1]
+                .iter()
+                .all(|&k| narrower[k][1] - narrower[k][0] > 0.7 * (spans[k][1] - spans[k][0]));
             if done {
                 break;
             }

@@ -36,9 +36,8 @@ fn zhang_stephens(excesses: &[f64]) -> Option<f64> {
         let root = (nodes as f64 / (j as f64 + 0.5)).sqrt();
         1.0 / largest + (1.0 - root) / (3.0 * quartile)
     };
-    let shape = |theta: f64| {
-        excesses.iter().map(|x| libm::log1p(-theta * x)).sum::<f64>() / count as f64
-    };
+    let shape =
+        |theta: f64| excesses.iter().map(|x| libm::log1p(-theta * x)).sum::<f64>() / count as f64;
     let likelihood = |theta: f64| {
         let k = shape(theta);
         count as f64 * (libm::log(-theta / k) - k - 1.0)

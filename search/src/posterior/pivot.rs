@@ -28,10 +28,7 @@ impl Pivots {
     pub(super) fn choose(priors: &[ParameterPrior], at: &Point) -> Self {
         let gradient = bulk_velocity(at).map_or([1.0; 7], |velocity| velocity.gradient);
         let free = priors.iter().filter(|prior| {
-            !matches!(
-                prior.parameter,
-                Parameter::Dispersion | Parameter::LongitudinalShearModulus
-            )
+            !matches!(prior.parameter, Parameter::Dispersion | Parameter::LongitudinalShearModulus)
         });
         let influence = |prior: &&ParameterPrior| {
             let whole = (gradient[prior.parameter as usize] * prior.middle_half()).abs();

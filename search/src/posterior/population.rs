@@ -12,7 +12,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 
 use super::features::{Features, features};
-use super::moments_grid::MomentsGrid;
+use super::moments_grid::{MomentsGrid, Span};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
 use super::surrogate::{Deviations, RULE_OF_THUMB, Scale, Surrogate};
@@ -42,6 +42,8 @@ pub(super) struct Problem {
     /// Values of the fixed parameters, and medians of the others.
     base: Point,
     pivots: Pivots,
+    /// Moments that models within the bounds can have.
+    reach: [Span; 2],
     grid: MomentsGrid,
     seed: u64,
 }
@@ -68,7 +70,10 @@ pub(super) struct Population {
 impl Problem {
     /// Creates the problem of a job with this likelihood of its data; `None` if no point within the
     /// bounds is admissible, or no parameter is free.
-    pub(super) fn new(specification: &JobSpecification, likelihood: DataLikelihood) -> Option<Self> {
+    pub(super) fn new(
+        specification: &JobSpecification,
+        likelihood: DataLikelihood,
+    ) -> Option<Self> {
         let priors = ParameterPrior::of_job(specification);
         let mut base = specification.start();
         for prior in &priors {
@@ -89,7 +94,14 @@ impl Problem {
         let grid = MomentsGrid::new(&likelihood, reach);
         let pivots = Pivots::choose(&priors, points.first().unwrap_or(&base));
         let scale = Scale::of(&sample);
-        Some(Self { likelihood, priors, scale, base, pivots, grid, seed })
+        Some(Self { likelihood, priors, scale, base, pivots, reach, grid, seed })
+    }
+
+    /// Returns the problem with a model whose moments have these relative standard errors.
+    pub(super) fn with_model_errors(&self, errors: [f64; 2]) -> Self {
+        let likelihood = self.likelihood.clone().with_model_errors(errors);
+        let grid = MomentsGrid::new(&likelihood, self.reach);
+        Self { likelihood, grid, ..self.clone() }
     }
 
     /// Returns admissible points drawn from the prior; at most `count`.

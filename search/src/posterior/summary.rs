@@ -23,6 +23,7 @@ impl PosteriorSearch {
         errors: [f64; 2],
     ) -> Option<Posterior> {
         let problem = self.problem.as_ref().filter(|_| self.stage == Stage::Done)?;
+        let problem = &problem.with_model_errors(errors);
         let population = problem.population(&self.surrogate, POINTS, self.populations);
         if population.members.is_empty() {
             return None;
@@ -105,12 +106,7 @@ fn weighted(values: Vec<f64>, weights: &[f64]) -> PosteriorSummary {
     let mut sorted: Vec<(f64, f64)> = values.into_iter().zip(weights.iter().copied()).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let quantiles = QUANTILE_LEVELS.map(|level| quantile(&sorted, level));
-    PosteriorSummary {
-        mean,
-        standard_deviation,
-        quantiles,
-        prior_standard_deviation: f64::NAN,
-    }
+    PosteriorSummary { mean, standard_deviation, quantiles, prior_standard_deviation: f64::NAN }
 }
 
 fn moments(values: &[f64], weights: &[f64]) -> (f64, f64) {
@@ -172,11 +168,7 @@ fn entries(population: &Population, prior: &[Point]) -> Vec<(usize, usize, Poste
         .collect()
 }
 
-fn draws(
-    population: &Population,
-    problem: &super::Problem,
-    count: usize,
-) -> Vec<PosteriorDraw> {
+fn draws(population: &Population, problem: &super::Problem, count: usize) -> Vec<PosteriorDraw> {
     let draw = |member: &Member| {
         let log_prior = problem.priors.iter().map(|prior| {
             prior.log_density(member.point.get(prior.parameter)).unwrap_or(f64::NEG_INFINITY)

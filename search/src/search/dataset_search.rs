@@ -164,7 +164,7 @@ impl DatasetSearch {
         outcomes: Arc<[Outcome]>,
     ) {
         row.role.posterior = true;
-        if self.best.is_none() {
+        if self.evaluations == 0 {
             self.first.get_or_insert(*row);
             self.keep_if_better(specification, *row, outcomes);
         }
