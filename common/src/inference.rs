@@ -185,7 +185,7 @@ impl Context<'_> {
 pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
     let cost = relative[0] * relative[0] + relative[1] * relative[1];
-    let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.varied.is_none());
+    let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)
 }

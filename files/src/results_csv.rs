@@ -22,7 +22,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
     out.push_str(if several { ",start" } else { "" });
     out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
-    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.varied.is_none()) {
+    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.is_of_search()) {
         // Writing to a string does not fail.
         let _infallible = history_row(&mut out, evaluation);
         if several {
@@ -115,7 +115,7 @@ pub fn groups(
         fields.extend(measured(group));
         fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
         let of_group = |row: &&Evaluation| row.role.group as usize == set;
-        let searched = history.iter().filter(|row| row.role.varied.is_none());
+        let searched = history.iter().filter(|row| row.role.is_of_search());
         fields.push(searched.filter(of_group).count().to_string());
         fields.push(field(reason(group)));
         out.push_str(&fields.join(","));

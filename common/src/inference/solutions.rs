@@ -9,7 +9,7 @@ use crate::results::Evaluation;
 /// Returns the best point of each start of set number `set` that found a feasible one.
 pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     let mut solutions: Vec<Solution> = Vec::new();
-    for row in history.iter().filter(|row| row.belongs_to(set) && row.role.varied.is_none()) {
+    for row in history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search()) {
         let cost = row.cost.unwrap_or(f64::INFINITY);
         let here = Solution { start: row.role.start, point: row.point, cost, evaluations: 1 };
         match solutions.last_mut().filter(|last| last.start == row.role.start) {
