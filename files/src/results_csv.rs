@@ -40,7 +40,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
 /// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
 /// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
 /// removing one `'` there. The field is quoted if necessary.
-fn field(text: &str) -> String {
+pub(crate) fn field(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
     let mut begins = true;
     for c in text.chars() {
@@ -244,7 +244,7 @@ fn quantities_of(group: &GroupResult) -> [Option<DerivedQuantity>; 2] {
 }
 
 /// Formats a number; empty if it is absent or not finite.
-fn number(value: Option<f64>) -> String {
+pub(crate) fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 
