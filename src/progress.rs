@@ -87,14 +87,14 @@ impl Drop for Progress {
     }
 }
 
-/// Returns how many evaluations of a job measure derivatives, in addition to those of its searches.
+/// Returns how many evaluations of a job measure derivatives or serve the posterior, in addition to
+/// those of its searches.
 fn derivatives(specification: &JobSpecification) -> u64 {
     if specification.kind == JobKind::Propagation {
         return 0;
     }
     let sets = specification.data.as_ref().map_or(1, Data::sets) as u64;
-    let search = &specification.search;
-    let searches = search.max_evaluations.saturating_mul(search.starts).saturating_mul(sets);
+    let searches = specification.searched_max().saturating_mul(sets);
     specification.evaluations_max().saturating_sub(searches)
 }
 

@@ -16,7 +16,7 @@ use osteon_common::results::{GroupResult, JobResult, Status};
 use osteon_common::visible;
 use osteon_files::document::Format;
 use osteon_files::report::ResultFile;
-use osteon_files::{job_file, results_csv, user_file};
+use osteon_files::{job_file, posterior_csv, results_csv, user_file};
 
 use crate::client::Fetched;
 use crate::exit_status::CommandFailure;
@@ -31,6 +31,7 @@ pub(crate) const JOB: &str = "job.toml";
 pub(crate) const CASE: &str = "case.toml";
 const HISTORY: &str = "history.csv";
 const REALIZATIONS: &str = "realizations.csv";
+const POSTERIOR: &str = "posterior.csv";
 const GROUPS: &str = "groups.csv";
 const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
@@ -196,6 +197,10 @@ impl ResultsDirectory {
                 files.write(COMPARISON, &results_csv::comparison(result))?;
             }
             files.write(REALIZATIONS, &realizations(fetched))?;
+            if fetched.specification.posterior.is_some() {
+                let Fetched { specification, result, .. } = fetched;
+                files.write(POSTERIOR, &posterior_csv::posterior(specification, result))?;
+            }
             let JobResult { program, digest, seed, .. } = &fetched.result;
             let (digest, seed) = (Some(digest.as_str()), Some(*seed));
             files.finish(

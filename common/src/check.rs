@@ -4,6 +4,8 @@
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
 mod job;
+mod posterior;
+mod priors;
 mod section;
 mod setup;
 mod value;
@@ -12,6 +14,7 @@ use crate::job::JobSpecification;
 use crate::violations::Violations;
 
 pub use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, data, job, job_from, no_data};
+pub use self::posterior::posterior;
 pub use self::setup::setup;
 pub use self::value::{number, quantity};
 

@@ -8,7 +8,7 @@ use crate::parameters::{Parameter, Point};
 
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
 pub use crate::posterior_settings::{
-    DRAWS_MAX, POSTERIOR_EVALUATIONS_MAX, PosteriorPrior, PosteriorSettings,
+    DRAWS_MAX, POSTERIOR_EVALUATIONS_MAX, PosteriorPrior, PosteriorSettings, PriorDistribution,
 };
 pub use crate::search_settings::{Objective, Prior, Search, SearchMethod};
 
@@ -247,16 +247,40 @@ impl JobSpecification {
         self.search.priors.iter().any(Option::is_some)
     }
 
-    /// Returns the maximum number of evaluations of the whole job.
+    /// Returns the maximum number of evaluations of the whole job, including those that measure
+    /// derivatives and those of the posterior.
     pub fn evaluations_max(&self) -> u64 {
         if self.kind == JobKind::Propagation {
             return 1;
         }
-        let Search { max_evaluations, starts, sensitivities, .. } = self.search;
         let free = self.parameters.iter().filter(|range| matches!(range, Range::Free { .. }));
-        let measured = if sensitivities { free.count() as u64 } else { 0 };
+        let free = free.count() as u64;
+        let measured = if self.search.sensitivities && self.is_searched() { free } else { 0 };
+        let sampled = self.posterior.map_or(0, |posterior| posterior.max_evaluations);
         let sets = self.data.as_ref().map_or(1, Data::searched) as u64;
-        starts.saturating_mul(max_evaluations).saturating_add(measured).saturating_mul(sets)
+        let each = self.searched_max().saturating_add(measured).saturating_add(sampled);
+        each.saturating_mul(sets)
+    }
+
+    /// Returns the maximum number of evaluations of the searches of one set of data, from all
+    /// starts; 0 if only the posterior is computed.
+    pub fn searched_max(&self) -> u64 {
+        let Search { max_evaluations, starts, .. } = self.search;
+        if self.is_searched() { starts.saturating_mul(max_evaluations) } else { 0 }
+    }
+
+    /// Returns whether a search is made, and not the posterior alone computed.
+    pub fn is_searched(&self) -> bool {
+        self.search.method != SearchMethod::Posterior
+    }
+
+    /// Returns the specification with the default posterior if its method needs one and none is
+    /// given, as files and messages are read.
+    #[must_use]
+    pub fn with_implied_posterior(self) -> Self {
+        let implied = self.kind == JobKind::Identification && !self.is_searched();
+        let implied = implied.then(PosteriorSettings::default);
+        Self { posterior: self.posterior.or(implied), ..self }
     }
 
     /// Returns the point of fixed values and starts.

@@ -20,6 +20,9 @@ pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
 pub const GROUPS_MAX: usize = 1000;
 /// Maximum number of searches of one set of data, each from a different start.
 pub const STARTS_MAX: u64 = 1000;
+/// Maximum number of draws from the posteriors of all groups of one job together; each takes 80
+/// bytes of memory, and 200 in a table.
+pub const DRAWS_ALL_MAX: u64 = 2_000_000;
 /// Smallest refinement of the solver's sampling.
 pub const REFINEMENT_MIN: f64 = 0.5;
 /// Largest refinement of the solver's sampling.

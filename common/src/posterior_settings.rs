@@ -1,7 +1,9 @@
 //! Settings of the posterior.
 
 use crate::accepted::WholeRange;
-use crate::fields::{Fields, Key, Section};
+use crate::fields::{self, Fields, Key, Section};
+
+fields::choices!(PriorDistribution);
 
 /// Maximum number of draws of a posterior.
 pub const DRAWS_MAX: u64 = 20_000;
@@ -40,6 +42,72 @@ pub enum PosteriorPrior {
         /// The standard deviation of the natural logarithm, above 0.
         spread: f64,
     },
+}
+
+/// The law of a [`PosteriorPrior`], without its numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PriorDistribution {
+    /// Uniform between the bounds.
+    #[default]
+    Uniform,
+    /// Normal, truncated to the bounds.
+    Normal,
+    /// Log-normal, truncated to the bounds.
+    LogNormal,
+}
+
+impl PriorDistribution {
+    /// All laws, in the order of a user's file.
+    pub const ALL: [Self; 3] = [Self::Uniform, Self::Normal, Self::LogNormal];
+
+    /// Returns the name used in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Normal => "normal",
+            Self::LogNormal => "log_normal",
+        }
+    }
+}
+
+impl PosteriorPrior {
+    /// Returns the prior with this law; a uniform one has no use for the numbers.
+    pub fn new(distribution: PriorDistribution, center: f64, spread: f64) -> Self {
+        match distribution {
+            PriorDistribution::Uniform => Self::Uniform,
+            PriorDistribution::Normal => Self::Normal { center, spread },
+            PriorDistribution::LogNormal => Self::LogNormal { center, spread },
+        }
+    }
+
+    /// Returns its law.
+    pub fn distribution(self) -> PriorDistribution {
+        match self {
+            Self::Uniform => PriorDistribution::Uniform,
+            Self::Normal { .. } => PriorDistribution::Normal,
+            Self::LogNormal { .. } => PriorDistribution::LogNormal,
+        }
+    }
+
+    /// Returns center and spread; `None` of a uniform prior.
+    pub fn numbers(self) -> Option<[f64; 2]> {
+        match self {
+            Self::Uniform => None,
+            Self::Normal { center, spread } | Self::LogNormal { center, spread } => {
+                Some([center, spread])
+            }
+        }
+    }
+}
+
+impl PosteriorSettings {
+    /// Its section of a job file.
+    pub const KEY: Key = Key {
+        name: "posterior",
+        meaning: "if this section is there, even without keys, the posterior of the free parameters \
+                  is computed after the search ([searches.md](searches.md)); it requires at least \
+                  two realizations, and `identify`",
+    };
 }
 
 impl Default for PosteriorSettings {

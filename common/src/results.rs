@@ -92,10 +92,17 @@ pub struct EvaluationRole {
     /// Number of the start of its search, from 0; 0 is the job's own start.
     pub start: u32,
     /// The parameter in which it differs from the best point, to measure a derivative; `None` for
-    /// an evaluation of the search itself.
+    /// other evaluations.
     pub varied: Option<Parameter>,
     /// Whether it serves the posterior.
     pub posterior: bool,
+}
+
+impl EvaluationRole {
+    /// Returns whether it is an evaluation of the search itself.
+    pub fn is_of_search(&self) -> bool {
+        self.varied.is_none() && !self.posterior
+    }
 }
 
 /// One evaluation; those of the search are the rows of `history.csv`.

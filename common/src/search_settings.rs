@@ -43,17 +43,20 @@ pub enum SearchMethod {
     Simplex,
     /// Minimum-norm Gauss-Newton steps with Broyden's updates.
     Newton,
+    /// No search: the posterior alone.
+    Posterior,
 }
 
 impl SearchMethod {
     /// All methods, in the order of a user's file.
-    pub const ALL: [Self; 2] = [Self::Simplex, Self::Newton];
+    pub const ALL: [Self; 3] = [Self::Simplex, Self::Newton, Self::Posterior];
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simplex => "simplex",
             Self::Newton => "newton",
+            Self::Posterior => "posterior",
         }
     }
 }
@@ -104,7 +107,7 @@ impl Search {
             method,
             max_evaluations: 400,
             cost_tolerance: match method {
-                SearchMethod::Simplex => 1e-10,
+                SearchMethod::Simplex | SearchMethod::Posterior => 1e-10,
                 SearchMethod::Newton => 1e-12,
             },
             size_tolerance: 1e-5,
@@ -171,7 +174,7 @@ impl Section for Search {
         let priors = "for each free parameter that has one: `{ value = …, weight = … }`; the cost \
                       grows by weight × ((p - value)/(upper - lower))² \
                       ([searches.md](searches.md#priors)). The value must be within the bounds, the \
-                      weight above 0; not available with `\"newton\"`";
+                      weight above 0; only with `\"simplex\"`";
         fields.custom_table(Key { name: "priors", meaning: priors });
     }
 }
@@ -181,7 +184,9 @@ impl Search {
         let before = self.method;
         let method = "`\"simplex\"`: Nelder-Mead with the standard coefficients; `\"newton\"`: \
                       Gauss-Newton steps to the matching point nearest to the start \
-                      ([searches.md](searches.md)), which requires at least two realizations";
+                      ([searches.md](searches.md)), which requires at least two realizations; \
+                      `\"posterior\"`: no search, the posterior alone, with the defaults of \
+                      `[posterior]` if that is left out";
         fields.choice(Key { name: "method", meaning: method }, &mut self.method);
         if self.method != before {
             *self = Self::by(self.method);
@@ -209,7 +214,7 @@ impl Search {
         fields.number(
             Key {
                 name: "initial_step",
-                meaning: "edge of the first simplex; it has no effect with `\"newton\"`",
+                meaning: "edge of the first simplex; other methods have no use for it",
             },
             &mut self.initial_step,
             Number::within(Interval::above_to(0.0, 0.5, "of the box")),

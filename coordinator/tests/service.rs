@@ -19,6 +19,7 @@ use osteon_coordinator::store::{
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
 use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
+use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::fetch_response::Part;
@@ -149,6 +150,7 @@ async fn check_leftover(
             Part::Result(message) => result = Some(message),
             Part::History(block) => rows += block.rows.len() as u64,
             Part::Group(_) => panic!("the result of a group"),
+            Part::Draws(_) => panic!("draws from a posterior that nobody asked for"),
             Part::Realizations(block) => {
                 let (first, block) = realizations::from_message(block).unwrap();
                 assert_eq!(first, outcomes.len() as u64);
@@ -156,7 +158,8 @@ async fn check_leftover(
             }
         }
     }
-    let result = results::from_message(result.unwrap(), outcomes, Vec::new()).unwrap();
+    let blocks = ResultBlocks { outcomes, ..ResultBlocks::default() };
+    let result = results::from_message(result.unwrap(), blocks, Vec::new()).unwrap();
     assert_eq!(result, fake::plain_run(expected));
     assert_eq!(rows, result.evaluations);
 }

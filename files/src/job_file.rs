@@ -3,6 +3,7 @@
 mod data_section;
 mod key_tables;
 mod parameters;
+mod posterior;
 mod priors;
 mod schema;
 
@@ -10,7 +11,9 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::case::Setup;
 use osteon_common::check;
-use osteon_common::job::{JobKind, JobSpecification, MonteCarlo, Objective, Search};
+use osteon_common::job::{
+    JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Search,
+};
 use osteon_common::limits;
 use osteon_common::warnings::{self, Warning};
 
@@ -31,7 +34,8 @@ const BOUND: Bound = Bound {
 /// Reads and validates the job file at `path`; its extension determines the format. If it names a
 /// file of measured velocities, that is read too, relative to the job file, and inlined.
 ///
-/// For a propagation, `[data]` may be left out and is not kept; no file of velocities is read.
+/// For a propagation, `[data]` may be left out and is not kept, nor is `[posterior]`; no file of
+/// velocities is read.
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
@@ -106,6 +110,7 @@ fn parse_with_warnings(
         "monte_carlo",
         "objective",
         "search",
+        PosteriorSettings::KEY.name,
     ];
     let table = reader.root(&root, &keys);
     if !table.is_table() {
@@ -113,6 +118,7 @@ fn parse_with_warnings(
     }
     let setup = setup(&mut reader, &table);
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
+    let posterior = posterior::read(&mut reader, &table);
     let specification = JobSpecification {
         kind,
         setup,
@@ -121,9 +127,13 @@ fn parse_with_warnings(
         monte_carlo: monte_carlo(&mut reader, &table),
         objective: objective(&mut reader, &table),
         search: search(&mut reader, &table),
-        posterior: None,
+        posterior: posterior.filter(|_| kind == JobKind::Identification),
     };
+    let specification = specification.with_implied_posterior();
     check::job_from(&specification, origin.as_ref(), &mut reader.violations);
+    if let Some(unused) = posterior.filter(|_| kind == JobKind::Propagation) {
+        check::posterior(&specification, &unused, &mut reader.violations);
+    }
     if !reader.violations.is_empty() {
         return Err(reader.refuse(&root).into());
     }

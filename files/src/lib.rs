@@ -10,6 +10,7 @@ pub mod case_file;
 pub mod document;
 pub mod file_error;
 pub mod job_file;
+pub mod posterior_csv;
 mod reader;
 pub mod report;
 pub mod results_csv;

@@ -22,7 +22,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
     out.push_str(if several { ",start" } else { "" });
     out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
-    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.varied.is_none()) {
+    for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.is_of_search()) {
         // Writing to a string does not fail.
         let _infallible = history_row(&mut out, evaluation);
         if several {
@@ -40,7 +40,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
 /// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
 /// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
 /// removing one `'` there. The field is quoted if necessary.
-fn field(text: &str) -> String {
+pub(crate) fn field(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
     let mut begins = true;
     for c in text.chars() {
@@ -115,7 +115,7 @@ pub fn groups(
         fields.extend(measured(group));
         fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
         let of_group = |row: &&Evaluation| row.role.group as usize == set;
-        let searched = history.iter().filter(|row| row.role.varied.is_none());
+        let searched = history.iter().filter(|row| row.role.is_of_search());
         fields.push(searched.filter(of_group).count().to_string());
         fields.push(field(reason(group)));
         out.push_str(&fields.join(","));
@@ -244,7 +244,7 @@ fn quantities_of(group: &GroupResult) -> [Option<DerivedQuantity>; 2] {
 }
 
 /// Formats a number; empty if it is absent or not finite.
-fn number(value: Option<f64>) -> String {
+pub(crate) fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 

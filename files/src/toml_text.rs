@@ -6,7 +6,7 @@ use std::fmt::{self, Write as _};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
-use osteon_common::job::{Data, JobSpecification, Prior, Range, Search};
+use osteon_common::job::{Data, JobSpecification, PosteriorSettings, Prior, Range, Search};
 use osteon_common::parameters::Parameter;
 
 /// Number of velocities per line of an inlined data set.
@@ -166,7 +166,8 @@ fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
         writeln!(out)?;
         section(out, key, declared)?;
     }
-    priors(out, &specification.search)
+    priors(out, &specification.search)?;
+    specification.posterior.map_or(Ok(()), |settings| posterior(out, settings))
 }
 
 fn priors(out: &mut String, search: &Search) -> fmt::Result {
@@ -174,6 +175,19 @@ fn priors(out: &mut String, search: &Search) -> fmt::Result {
         if let Some(Prior { value, weight }) = prior {
             writeln!(out, "\n[search.priors.{}]", parameter.name())?;
             writeln!(out, "value = {value:?}\nweight = {weight:?}")?;
+        }
+    }
+    Ok(())
+}
+
+fn posterior(out: &mut String, mut settings: PosteriorSettings) -> fmt::Result {
+    writeln!(out)?;
+    section(out, PosteriorSettings::KEY, &mut settings)?;
+    for (parameter, prior) in Parameter::ALL.iter().zip(settings.priors) {
+        if let Some([center, spread]) = prior.numbers() {
+            writeln!(out, "\n[posterior.priors.{}]", parameter.name())?;
+            writeln!(out, "distribution = \"{}\"", prior.distribution().name())?;
+            writeln!(out, "center = {center:?}\nspread = {spread:?}")?;
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Mapping between enumerations of messages and types of `osteon-common`.
 
-use osteon_common::job::{JobKind, Objective, Sampling};
+use osteon_common::job::{JobKind, Objective, PriorDistribution, Sampling};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::{JobFailure, PointMeaning, Status};
@@ -84,6 +84,18 @@ pub static OBJECTIVE: EnumMapping<Objective, v1::ObjectiveKind> = EnumMapping {
     },
     name: v1::ObjectiveKind::as_str_name,
 };
+
+/// Law of a prior.
+pub static PRIOR_DISTRIBUTION: EnumMapping<PriorDistribution, v1::PriorDistribution> =
+    EnumMapping {
+        all: &PriorDistribution::ALL,
+        message: |distribution| match distribution {
+            PriorDistribution::Uniform => v1::PriorDistribution::Uniform,
+            PriorDistribution::Normal => v1::PriorDistribution::Normal,
+            PriorDistribution::LogNormal => v1::PriorDistribution::LogNormal,
+        },
+        name: v1::PriorDistribution::as_str_name,
+    };
 
 /// One of the seven parameters.
 pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {

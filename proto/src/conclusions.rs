@@ -5,12 +5,14 @@ use osteon_common::inference::{
     Solution, Solutions, Spread, Spreads, Uncertainty,
 };
 use osteon_common::parameters::Parameter;
+use osteon_common::posterior::PosteriorDraw;
 
 use crate::choice::PARAMETER;
 use crate::malformed::Malformed;
 use crate::parameter_values::{
     point_from_message, point_to_message, some_from_message, some_to_message,
 };
+use crate::posterior;
 use crate::results::{moments_from_message, moments_to_message};
 use crate::v1;
 
@@ -23,6 +25,7 @@ pub(crate) struct ConclusionFields {
     pub(crate) identified: Option<v1::Identified>,
     pub(crate) profiles: Vec<v1::Profile>,
     pub(crate) solutions: Option<v1::Solutions>,
+    pub(crate) posterior: Option<v1::Posterior>,
 }
 
 /// The same fields, borrowed from a message.
@@ -31,22 +34,33 @@ pub(crate) struct FieldsOf<'a> {
     pub(crate) identified: Option<&'a v1::Identified>,
     pub(crate) profiles: &'a [v1::Profile],
     pub(crate) solutions: Option<&'a v1::Solutions>,
+    pub(crate) posterior: Option<&'a v1::Posterior>,
 }
 
 pub(crate) fn to_message(conclusions: &Conclusions) -> ConclusionFields {
-    let Conclusions { inference, profiles, solutions, posterior: _ } = conclusions;
+    let Conclusions { inference, profiles, solutions, posterior } = conclusions;
     let sensitivities = inference.iter().flat_map(|found| &found.sensitivities);
     ConclusionFields {
         sensitivities: sensitivities.map(sensitivity_to_message).collect(),
         identified: inference.as_ref().map(identified_to_message),
         profiles: profiles.iter().map(profile_to_message).collect(),
         solutions: solutions.as_ref().map(solutions_to_message),
+        posterior: posterior.as_ref().map(posterior::to_message),
     }
 }
 
+/// Returns the conclusions of a result, with the `draws` from its posterior.
+///
 /// # Errors
-/// If a required field is absent, or if fields contradict each other.
-pub(crate) fn from_message(fields: &FieldsOf<'_>) -> Result<Conclusions, Malformed> {
+/// If a required field is absent, if fields contradict each other, or if there are draws and no
+/// posterior.
+pub(crate) fn from_message(
+    fields: &FieldsOf<'_>,
+    draws: Vec<PosteriorDraw>,
+) -> Result<Conclusions, Malformed> {
+    if fields.posterior.is_none() && !draws.is_empty() {
+        return Err(Malformed::Missing { field: "posterior" });
+    }
     let sensitivities =
         fields.sensitivities.iter().map(sensitivity_from_message).collect::<Result<Vec<_>, _>>()?;
     let inference =
@@ -55,15 +69,18 @@ pub(crate) fn from_message(fields: &FieldsOf<'_>) -> Result<Conclusions, Malform
         inference: inference.transpose()?,
         profiles: fields.profiles.iter().map(profile_from_message).collect::<Result<_, _>>()?,
         solutions: fields.solutions.map(solutions_from_message).transpose()?,
-        posterior: None,
+        posterior: fields
+            .posterior
+            .map(|message| posterior::from_message(message, draws))
+            .transpose()?,
     })
 }
 
-fn present<T>(value: Option<T>, field: &'static str) -> Result<T, Malformed> {
+pub(crate) fn present<T>(value: Option<T>, field: &'static str) -> Result<T, Malformed> {
     value.ok_or(Malformed::Missing { field })
 }
 
-fn parameter(number: i32) -> Result<Parameter, Malformed> {
+pub(crate) fn parameter(number: i32) -> Result<Parameter, Malformed> {
     PARAMETER.required(number, "parameter")
 }
 
@@ -208,10 +225,9 @@ fn solutions_to_message(solutions: &Solutions) -> v1::Solutions {
         spread: Some(spread_to_message(spread)),
     });
     let entries = spread.iter().flat_map(|spread| &spread.entries);
-    let number = |place: usize| u32::try_from(place + 1).unwrap_or(u32::MAX);
     let entries = entries.map(|(row, column, spread)| v1::EntrySpread {
-        row: number(*row),
-        column: number(*column),
+        row: entry_number(*row),
+        column: entry_number(*column),
         spread: Some(spread_to_message(spread)),
     });
     v1::Solutions {
@@ -262,8 +278,13 @@ fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
     Ok(Spreads { parameters, entries })
 }
 
+/// Converts an index that starts at 0 into a row or column number from 1.
+pub(crate) fn entry_number(place: usize) -> u32 {
+    u32::try_from(place + 1).unwrap_or(u32::MAX)
+}
+
 /// Converts a row or column number from `least` to 6 into an index that starts at 0.
-fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
+pub(crate) fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
     let place = (least..=ROWS).contains(&number).then(|| number as usize - 1);
     let allowed = "it must be 1 to 6, and a column at least its row";
     let refused = Malformed::OutOfRange { field, value: number.into(), allowed };

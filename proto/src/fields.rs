@@ -184,7 +184,7 @@ impl Fields for MessageReader<'_> {
 #[cfg(test)]
 mod tests {
     use osteon_common::case::Setup;
-    use osteon_common::job::{MonteCarlo, Objective, Search};
+    use osteon_common::job::{MonteCarlo, Objective, PosteriorSettings, Search};
 
     use super::*;
 
@@ -234,5 +234,9 @@ mod tests {
         check(&fields::entries(&mut MonteCarlo::default()), &descriptor::<v1::MonteCarlo>());
         check(&fields::entries(&mut Objective::default()), &descriptor::<v1::Objective>());
         check(&fields::entries(&mut Search::default()), &descriptor::<v1::Search>());
+        check(
+            &fields::entries(&mut PosteriorSettings::default()),
+            &descriptor::<v1::PosteriorSettings>(),
+        );
     }
 }

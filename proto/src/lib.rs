@@ -18,6 +18,8 @@ pub mod identity;
 pub mod malformed;
 pub mod parameter_values;
 mod pipe;
+pub mod posterior;
+mod posterior_settings;
 pub mod realizations;
 pub mod results;
 pub mod setup;

@@ -5,6 +5,7 @@ use osteon_common::job::{Objective, Search};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
 use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, MomentIntervals};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
+use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::{
     BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
     GroupResult, JobResult, Moments,
@@ -24,8 +25,27 @@ use crate::setup;
 use crate::specification::{search_from_message, search_to_message};
 use crate::v1;
 
-/// Returns the message of a result. Its groups have messages of their own, and the outcomes of best
-/// points are sent in realization blocks.
+/// The parts of the result for one set of data that are sent in blocks of their own.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ResultBlocks {
+    /// Outcomes of the best point.
+    pub outcomes: Vec<Outcome>,
+    /// Draws from the posterior.
+    pub draws: Vec<PosteriorDraw>,
+}
+
+impl ResultBlocks {
+    /// Takes them from the result for a set of data.
+    pub fn new(best: Option<BestPoint>, conclusions: Conclusions) -> Self {
+        Self {
+            outcomes: best.map(|best| best.outcomes).unwrap_or_default(),
+            draws: conclusions.posterior.map(|posterior| posterior.draws).unwrap_or_default(),
+        }
+    }
+}
+
+/// Returns the message of a result. Its groups have messages of their own, the outcomes of best
+/// points are sent in realization blocks, and the draws from posteriors in draw blocks.
 pub fn to_message(result: &JobResult) -> v1::JobResult {
     let conclusions = conclusions::to_message(&result.conclusions);
     v1::JobResult {
@@ -39,6 +59,7 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         identified: conclusions.identified,
         profiles: conclusions.profiles,
         solutions: conclusions.solutions,
+        posterior: conclusions.posterior,
         objective: Some(v1::Objective { kind: OBJECTIVE.number(result.objective) }),
         search: Some(search_to_message(&result.search)),
         evaluations: result.evaluations,
@@ -56,15 +77,16 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
     }
 }
 
-/// Returns the result of a message, with the `outcomes` of its best point, and its `groups`.
+/// Returns the result of a message, with the `blocks` and the `groups` that followed it.
 ///
 /// # Errors
 /// If a required field is absent, or a value is not one that a coordinator writes.
 pub fn from_message(
     message: &v1::JobResult,
-    outcomes: Vec<Outcome>,
+    blocks: ResultBlocks,
     groups: Vec<GroupResult>,
 ) -> Result<JobResult, Malformed> {
+    let ResultBlocks { outcomes, draws } = blocks;
     let best = message.best.as_ref().map(|best| best_from_message(best, outcomes));
     let SpecificationParts { objective, search, solver, picking } = settings_from_message(message)?;
     Ok(JobResult {
@@ -74,7 +96,7 @@ pub fn from_message(
         digest: message.digest.clone(),
         best: best.transpose()?,
         data: message.data.as_ref().map(data_from_message).transpose()?,
-        conclusions: conclusions_from_message(message)?,
+        conclusions: conclusions_from_message(message, draws)?,
         groups,
         objective,
         search,
@@ -105,17 +127,19 @@ pub fn group_to_message(group: u32, found: &GroupResult) -> v1::GroupResult {
         identified: conclusions.identified,
         profiles: conclusions.profiles,
         solutions: conclusions.solutions,
+        posterior: conclusions.posterior,
     }
 }
 
-/// Returns the result of a group, with the `outcomes` of its best point.
+/// Returns the result of a group, with the `blocks` that followed it.
 ///
 /// # Errors
 /// Same as [`from_message`].
 pub fn group_from_message(
     message: &v1::GroupResult,
-    outcomes: Vec<Outcome>,
+    blocks: ResultBlocks,
 ) -> Result<GroupResult, Malformed> {
+    let ResultBlocks { outcomes, draws } = blocks;
     let data = message.data.as_ref().ok_or(Malformed::Missing { field: "data" })?;
     let best = message.best.as_ref().map(|best| best_from_message(best, outcomes));
     Ok(GroupResult {
@@ -124,12 +148,7 @@ pub fn group_from_message(
         reason: message.reason.clone(),
         best: best.transpose()?,
         data: data_from_message(data)?,
-        conclusions: conclusions::from_message(&FieldsOf {
-            sensitivities: &message.sensitivities,
-            identified: message.identified.as_ref(),
-            profiles: &message.profiles,
-            solutions: message.solutions.as_ref(),
-        })?,
+        conclusions: conclusions_of_group(message, draws)?,
     })
 }
 
@@ -166,6 +185,7 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
         group: evaluation.role.group,
         start: evaluation.role.start,
         varied: evaluation.role.varied.map(|parameter| PARAMETER.number(parameter)),
+        posterior: evaluation.role.posterior,
     }
 }
 
@@ -176,14 +196,11 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
 /// unknown.
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
+    let &v1::EvaluationRow { group, start, posterior, .. } = message;
+    let role = EvaluationRole { group, start, varied, posterior };
     Ok(Evaluation {
         number: message.number,
-        role: EvaluationRole {
-            group: message.group,
-            start: message.start,
-            varied,
-            posterior: false,
-        },
+        role,
         point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
         cost: message.cost,
@@ -240,13 +257,32 @@ fn program_from_message(message: &v1::JobResult) -> Program {
     }
 }
 
-fn conclusions_from_message(message: &v1::JobResult) -> Result<Conclusions, Malformed> {
-    conclusions::from_message(&FieldsOf {
+fn conclusions_from_message(
+    message: &v1::JobResult,
+    draws: Vec<PosteriorDraw>,
+) -> Result<Conclusions, Malformed> {
+    let fields = FieldsOf {
         sensitivities: &message.sensitivities,
         identified: message.identified.as_ref(),
         profiles: &message.profiles,
         solutions: message.solutions.as_ref(),
-    })
+        posterior: message.posterior.as_ref(),
+    };
+    conclusions::from_message(&fields, draws)
+}
+
+fn conclusions_of_group(
+    message: &v1::GroupResult,
+    draws: Vec<PosteriorDraw>,
+) -> Result<Conclusions, Malformed> {
+    let fields = FieldsOf {
+        sensitivities: &message.sensitivities,
+        identified: message.identified.as_ref(),
+        profiles: &message.profiles,
+        solutions: message.solutions.as_ref(),
+        posterior: message.posterior.as_ref(),
+    };
+    conclusions::from_message(&fields, draws)
 }
 
 /// The parts of a specification that a result repeats, as messages.
@@ -398,4 +434,4 @@ fn failures_from_message(messages: &[v1::FailureCount]) -> Result<FailureCounts,
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -9,6 +9,7 @@ use osteon_common::violations::Violations;
 
 use crate::choice::{JOB_KIND, PARAMETER};
 use crate::fields;
+use crate::posterior_settings;
 use crate::setup;
 use crate::v1;
 
@@ -26,6 +27,7 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         monte_carlo: Some(fields::to_message(&mut specification.monte_carlo.clone())),
         objective: Some(fields::to_message(&mut specification.objective.clone())),
         search: Some(search_to_message(&specification.search)),
+        posterior: specification.posterior.as_ref().map(posterior_settings::to_message),
     }
 }
 
@@ -65,7 +67,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
     if let Some(message) = &message.objective {
         fields::from_message("objective", message, &mut objective, violations);
     }
-    JobSpecification {
+    let specification = JobSpecification {
         kind,
         setup: setup::from_messages(
             message.layers.as_ref(),
@@ -82,8 +84,12 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
             .search
             .as_ref()
             .map_or_else(Search::default, |message| search_from_message(message, violations)),
-        posterior: None,
-    }
+        posterior: message
+            .posterior
+            .as_ref()
+            .map(|message| posterior_settings::from_message(message, violations)),
+    };
+    specification.with_implied_posterior()
 }
 
 fn data_to_message(data: &Data) -> v1::Data {

@@ -23,13 +23,16 @@ use osteon_files::{job_file, results_csv};
 use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
+use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::{
-    evaluation, parameter_values, realizations, results, specification, status, v1,
+    evaluation, parameter_values, posterior, realizations, results, specification, status, v1,
 };
 use proptest::prelude::*;
 use prost::Message as _;
 use tonic::{Code, Status};
+
+mod sample_posterior;
 
 /// Longest details of a status, bytes: HTTP/2 peers refuse trailers above 16 KiB, in base64.
 const DETAILS_BYTES_MAX: usize = 12 << 10;
@@ -231,13 +234,15 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
         outcomes: outcomes(),
     };
+    let posterior = Some(sample_posterior::posterior(POINT));
+    let conclusions = Conclusions::new(&job, 0, Some(&best), &history);
     let result = JobResult {
         status: JobEnd::Failed,
         failure: Some(JobFailure::Store),
         reason: Some("why".to_owned()),
         digest: "00".repeat(32),
         data: job.data.as_ref().map(|data| DataSummary::from_data(data, 0)),
-        conclusions: Conclusions::new(&job, 0, Some(&best), &history),
+        conclusions: Conclusions { posterior, ..conclusions },
         best: Some(best),
         groups: Vec::new(),
         objective: job.objective,
@@ -253,11 +258,18 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         picking: job.setup.picking,
         program: Program::current(Some("c0ffee")),
     };
-    let Conclusions { inference, profiles, solutions, posterior: _ } = &result.conclusions;
+    let Conclusions { inference, profiles, solutions, posterior } = &result.conclusions;
     assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));
     assert_eq!(profiles.len(), 2);
     assert!(solutions.as_ref().is_some_and(|found| found.spread.is_some()));
+    assert!(posterior.is_some());
     (job, history, result)
+}
+
+/// The blocks that belong to [`result`] and [`group`].
+fn blocks() -> ResultBlocks {
+    let JobResult { best, conclusions, .. } = identification().2;
+    ResultBlocks::new(best, conclusions)
 }
 
 fn result() -> v1::JobResult {
@@ -281,6 +293,7 @@ fn fetches() -> Vec<Vec<u8>> {
         Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect(), groups: Vec::new() }),
         Part::Group(group()),
         Part::Realizations(realizations::to_message(Some(7), 0, &outcomes())),
+        Part::Draws(posterior::draws_to_message(Some(7), 0, &blocks().draws)),
     ];
     parts.map(|part| v1::FetchResponse { part: Some(part) }.encode_to_vec()).to_vec()
 }
@@ -298,13 +311,18 @@ fn check_fetch(bytes: &[u8]) {
             let Ok((first, outcomes)) = realizations::from_message(&block) else { return };
             assert_eq!(realizations::to_message(block.group, first, &outcomes), block);
         }
+        Part::Draws(block) => {
+            let Ok((first, draws)) = posterior::draws_from_message(&block) else { return };
+            let written = posterior::draws_to_message(block.group, first, &draws);
+            assert_eq!(written.encode_to_vec(), block.encode_to_vec());
+        }
     });
 }
 
 fn check_result(message: &v1::JobResult) {
-    let Ok(result) = results::from_message(message, outcomes(), Vec::new()) else { return };
+    let Ok(result) = results::from_message(message, blocks(), Vec::new()) else { return };
     let written = results::to_message(&result);
-    let again = results::from_message(&written, outcomes(), Vec::new()).unwrap();
+    let again = results::from_message(&written, blocks(), Vec::new()).unwrap();
     // In bytes, for numbers that are none.
     assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
     for kind in [JobKind::Identification, JobKind::Propagation] {
@@ -314,9 +332,9 @@ fn check_result(message: &v1::JobResult) {
 }
 
 fn check_group(message: &v1::GroupResult) {
-    let Ok(found) = results::group_from_message(message, outcomes()) else { return };
+    let Ok(found) = results::group_from_message(message, blocks()) else { return };
     let written = results::group_to_message(message.group, &found);
-    let again = results::group_from_message(&written, outcomes()).unwrap();
+    let again = results::group_from_message(&written, blocks()).unwrap();
     let again = results::group_to_message(message.group, &again);
     assert_eq!(again.encode_to_vec(), written.encode_to_vec());
     let result = JobResult { groups: vec![found], data: None, ..identification().2 };
@@ -364,8 +382,8 @@ fn every_seed_is_taken() {
         batch::answer_from_message(&message).unwrap();
         check_answer(&bytes);
     }
-    results::from_message(&result(), outcomes(), Vec::new()).unwrap();
-    results::group_from_message(&group(), outcomes()).unwrap();
+    results::from_message(&result(), blocks(), Vec::new()).unwrap();
+    results::group_from_message(&group(), blocks()).unwrap();
     results::evaluation_from_message(&row(0)).unwrap();
     fetches().iter().for_each(|bytes| check_fetch(bytes));
 }

@@ -1,12 +1,15 @@
 //! Assembles the parts of a fetch into the specification, result and history of a job.
 
-use osteon_common::limits::{GROUPS_MAX, REALIZATIONS_MAX};
+use osteon_common::job::DRAWS_MAX;
+use osteon_common::limits::{DRAWS_ALL_MAX, GROUPS_MAX, REALIZATIONS_MAX};
 use osteon_common::outcome::Outcome;
+use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::Evaluation;
 use osteon_proto::malformed::Malformed;
+use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
-use osteon_proto::v1::{self, RealizationBlock};
-use osteon_proto::{realizations, results, specification};
+use osteon_proto::v1::{self, DrawBlock, RealizationBlock};
+use osteon_proto::{posterior, realizations, results, specification};
 
 use super::Fetched;
 
@@ -18,9 +21,21 @@ pub(super) struct FetchedParts {
     history: Vec<Evaluation>,
     /// The outcomes at the best point of the job.
     realizations: PointOutcomes,
-    groups: Vec<(v1::GroupResult, PointOutcomes)>,
+    /// The draws from the posterior of the job.
+    draws: Vec<PosteriorDraw>,
+    groups: Vec<FetchedGroup>,
     /// Number of outcomes of groups that were kept.
     kept: u64,
+    /// Number of draws received.
+    drawn: u64,
+}
+
+/// A group with the blocks that followed it.
+#[derive(Debug)]
+struct FetchedGroup {
+    message: v1::GroupResult,
+    realizations: PointOutcomes,
+    draws: Vec<PosteriorDraw>,
 }
 
 /// The outcomes of one point.
@@ -49,9 +64,11 @@ impl FetchedParts {
                     let allowed = "groups must follow each other, at most 1000";
                     return Err(out_of_range("group", group.group.into(), allowed));
                 }
-                self.groups.push((group, PointOutcomes::default()));
+                let (realizations, draws) = (PointOutcomes::default(), Vec::new());
+                self.groups.push(FetchedGroup { message: group, realizations, draws });
             }
             Part::Realizations(block) => self.add_realizations(&block)?,
+            Part::Draws(block) => self.add_draws(&block)?,
         }
         Ok(())
     }
@@ -60,9 +77,9 @@ impl FetchedParts {
         let (first, outcomes) = realizations::from_message(block)?;
         let (of_point, keeps) = match (block.group, self.groups.last_mut()) {
             (None, _) => (&mut self.realizations, true),
-            (Some(group), Some((found, of_group))) if found.group == group => {
+            (Some(group), Some(found)) if found.message.group == group => {
                 self.kept += outcomes.len() as u64;
-                (of_group, self.kept <= REALIZATIONS_MAX)
+                (&mut found.realizations, self.kept <= REALIZATIONS_MAX)
             }
             (Some(group), _) => {
                 let allowed = "realizations must follow the result of their group";
@@ -83,21 +100,45 @@ impl FetchedParts {
         Ok(())
     }
 
+    fn add_draws(&mut self, block: &DrawBlock) -> Result<(), Malformed> {
+        let (first, draws) = posterior::draws_from_message(block)?;
+        let of_set = match (block.group, self.groups.last_mut()) {
+            (None, _) => &mut self.draws,
+            (Some(group), Some(found)) if found.message.group == group => &mut found.draws,
+            (Some(group), _) => {
+                let allowed = "draws must follow the result of their group";
+                return Err(out_of_range("group", group.into(), allowed));
+            }
+        };
+        let count = of_set.len() as u64 + draws.len() as u64;
+        self.drawn += draws.len() as u64;
+        if first != of_set.len() as u64 || count > DRAWS_MAX || self.drawn > DRAWS_ALL_MAX {
+            let allowed =
+                "blocks of draws must follow each other, up to 20 000 draws of a posterior";
+            return Err(out_of_range("first", first as f64, allowed));
+        }
+        of_set.extend(draws);
+        Ok(())
+    }
+
     /// Assembles the parts once all have arrived.
     pub(super) fn assemble(self) -> Result<Fetched, Malformed> {
         let specification =
             self.specification.ok_or(Malformed::Missing { field: "specification" })?;
         let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
         let all = result.realizations;
-        let groups = self.groups.into_iter().map(|(group, of_group)| {
-            results::group_from_message(&group, of_group.assemble(group.best.is_some(), all)?)
-        });
+        let groups =
+            self.groups.into_iter().map(|FetchedGroup { message, realizations, draws }| {
+                let outcomes = realizations.assemble(message.best.is_some(), all)?;
+                results::group_from_message(&message, ResultBlocks { outcomes, draws })
+            });
         let groups = groups.collect::<Result<_, _>>()?;
         let outcomes = self.realizations.assemble(result.best.is_some(), all)?;
+        let blocks = ResultBlocks { outcomes, draws: self.draws };
         Ok(Fetched {
             specification: specification::from_message(&specification)
                 .map_err(Malformed::InvalidSpecification)?,
-            result: results::from_message(&result, outcomes, groups)?,
+            result: results::from_message(&result, blocks, groups)?,
             history: self.history,
         })
     }

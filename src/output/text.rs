@@ -7,6 +7,7 @@ mod identified;
 mod layout;
 mod number;
 pub(super) mod operators;
+mod posterior;
 mod result;
 mod solver;
 

@@ -6,7 +6,7 @@ use crate::accepted::{Interval, written};
 use crate::attainable_moments;
 use crate::field_path::{element_path, entry_path};
 use crate::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
     SearchMethod,
 };
 use crate::limits;
@@ -18,6 +18,8 @@ use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
 
+use super::posterior::posterior_of_job;
+use super::priors::priors;
 use super::section::section;
 use super::setup::setup;
 use super::value::{known_wrong, number, quantity};
@@ -75,6 +77,7 @@ pub fn job_from(
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
     likelihood(specification, violations);
+    posterior_of_job(specification, violations);
     within_reach(specification, violations);
 }
 
@@ -385,23 +388,37 @@ fn scrambles(monte_carlo: &MonteCarlo, violations: &mut Violations) {
     }
 }
 
-/// Checks the number of evaluations of all searches of a job together.
+/// Checks the number of evaluations of all searches of a job together, and of its posteriors.
 fn evaluations(specification: &JobSpecification, violations: &mut Violations) {
-    let fields = ["search.max_evaluations", "search.starts", "data"];
+    let fields = ["search.max_evaluations", "search.starts", "posterior", "data"];
     if fields.iter().any(|field| known_wrong(field, violations)) {
         return;
     }
     let (all, most) = (specification.evaluations_max(), limits::EVALUATIONS_MAX);
     let sets = specification.data.as_ref().map_or(1, Data::sets) as u64;
     let searches = specification.search.starts * sets;
-    if searches > 1 && all > most {
-        let each = specification.search.max_evaluations;
-        violations.add(
+    if searches <= 1 || all <= most {
+        return;
+    }
+    let each = specification.search.max_evaluations;
+    let together = format!("all together may have at most {most}");
+    match specification.posterior {
+        Some(posterior) if !specification.is_searched() => violations.add(
+            "posterior.max_evaluations",
+            format!("is {}, for each of {sets} sets of data; {together}", posterior.max_evaluations),
+        ),
+        Some(posterior) => violations.add(
             "search.max_evaluations",
             format!(
-                "is {each}, of each of {searches} searches; all together may have at most {most}"
+                "is {each}, of each of {searches} searches, and each of {sets} posteriors has up to \
+                 {}; {together}",
+                posterior.max_evaluations
             ),
-        );
+        ),
+        None => violations.add(
+            "search.max_evaluations",
+            format!("is {each}, of each of {searches} searches; {together}"),
+        ),
     }
 }
 
@@ -454,39 +471,6 @@ fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
         violations.add(
             "monte_carlo.realizations",
             "is 1; the objective \"likelihood\" needs the law of velocities that differ, so at least 2",
-        );
-    }
-}
-
-fn priors(specification: &JobSpecification, violations: &mut Violations) {
-    for parameter in Parameter::ALL {
-        let Some(Prior { value, weight }) = specification.search.priors[parameter as usize] else {
-            continue;
-        };
-        let path = format!("search.priors.{}", parameter.name());
-        number(&format!("{path}.weight"), weight, Interval::above(0.0, ""), violations);
-        match specification.range(parameter) {
-            Range::Free { lower, upper, .. } => {
-                let within = Interval::from_to(lower, upper, "the bounds");
-                if !known_wrong(&format!("parameters.{}", parameter.name()), violations) {
-                    number(&format!("{path}.value"), value, within, violations);
-                }
-            }
-            Range::Fixed(_) if !violations.has_at_or_below(&path) => {
-                violations
-                    .add(path, "is for a parameter that is fixed; only free ones have priors");
-            }
-            Range::Fixed(_) => {}
-        }
-    }
-    if specification.search.method == SearchMethod::Newton
-        && specification.has_priors()
-        && !known_wrong("search.priors", violations)
-    {
-        violations.add(
-            "search.priors",
-            "cannot be had with the method \"newton\", whose answer is nearest to the starts of \
-             the parameters: make the prior values the starts, or use \"simplex\"",
         );
     }
 }

@@ -57,6 +57,7 @@ fn all_starts(
 /// Returns the meaning of the best point of a search with this cost.
 pub fn meaning(specification: &JobSpecification, cost: f64) -> PointMeaning {
     match specification.search.method {
+        SearchMethod::Posterior => PointMeaning::LeastCost,
         _ if tolerance(specification).is_none_or(|tolerance| cost > tolerance) => {
             PointMeaning::LeastCost
         }

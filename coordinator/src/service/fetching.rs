@@ -8,10 +8,10 @@ use std::time::Duration;
 use futures::{Stream, StreamExt as _, stream};
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
 use osteon_common::outcome::Outcome;
-use osteon_common::results::BestPoint;
+use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{FetchResponse, HistoryBlock};
-use osteon_proto::{realizations, results, specification};
+use osteon_proto::{posterior, realizations, results, specification};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::spawn_blocking;
 use tokio::time::{Instant, sleep, timeout};
@@ -27,6 +27,8 @@ use crate::store::thread::StoreCommand;
 const AHEAD: usize = 2;
 /// Maximum number of history rows in one message.
 const HISTORY_BLOCK_ROWS: usize = 4096;
+/// Maximum number of draws from a posterior in one message.
+const DRAW_BLOCK: usize = 4096;
 /// Interval of empty history blocks, sent as heartbeats while a part is read or computed.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
 /// Maximum number of realizations in one message.
@@ -72,8 +74,8 @@ async fn left(
     Ok(StoredOutput { end, specification: record.specification, summary })
 }
 
-/// Sends one specification, one result, history blocks and realization blocks; where the data are
-/// groups, also the result and the realization blocks of each. The parts are read and made while
+/// Sends one specification, one result, history blocks, realization blocks and draw blocks; where
+/// the data are groups, also the result with realization and draw blocks of each. The parts are read and made while
 /// they are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
     store: mpsc::WeakSender<StoreCommand>,
@@ -84,9 +86,9 @@ pub(crate) async fn send_all(
     let left = Arc::new(reader.kept_waiting(left(&store, end)).await?);
     reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
     let of_best = reader.kept_waiting(outcomes(&store, job, left.best())).await?;
-    let (message, of_best) = computed(&left, &reader, move |left| {
+    let (message, blocks) = computed(&left, &reader, move |left| {
         let result = left.result(of_best);
-        (results::to_message(&result), outcomes_of(result.best))
+        (results::to_message(&result), ResultBlocks::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
@@ -94,24 +96,20 @@ pub(crate) async fn send_all(
         let rows = rows.iter().map(results::evaluation_to_message).collect();
         reader.send(Part::History(HistoryBlock { rows, groups: Vec::new() })).await?;
     }
-    send_realizations(None, &of_best, &reader).await?;
+    send_blocks(None, &blocks, &reader).await?;
     for set in 0..left.groups() {
         let read = reader.kept_waiting(outcomes(&store, job, left.best_of(set))).await?;
         let number = u32::try_from(set).unwrap_or(u32::MAX);
         let found = computed(&left, &reader, move |left| {
             let found = left.group(set, read)?;
             let message = results::group_to_message(number, &found);
-            Some((message, outcomes_of(found.best)))
+            Some((message, ResultBlocks::new(found.best, found.conclusions)))
         });
-        let Some((message, of_group)) = found.await? else { continue };
+        let Some((message, blocks)) = found.await? else { continue };
         reader.send(Part::Group(message)).await?;
-        send_realizations(Some(number), &of_group, &reader).await?;
+        send_blocks(Some(number), &blocks, &reader).await?;
     }
     Ok(())
-}
-
-fn outcomes_of(best: Option<BestPoint>) -> Vec<Outcome> {
-    best.map(|best| best.outcomes).unwrap_or_default()
 }
 
 /// Runs `compute` on the output of a job, on a thread that may block. The thread cannot be stopped,
@@ -131,15 +129,20 @@ async fn computed<T: Send + 'static>(
     reader.kept_waiting(async { computing.await.map_err(failed) }).await
 }
 
-async fn send_realizations(
+/// Sends the realizations at the best point of a set of data, then the draws from its posterior.
+async fn send_blocks(
     group: Option<u32>,
-    outcomes: &[Outcome],
+    blocks: &ResultBlocks,
     reader: &FetchStream,
 ) -> Result<(), StreamEnd> {
-    for (block, outcomes) in outcomes.chunks(REALIZATION_BLOCK).enumerate() {
+    for (block, outcomes) in blocks.outcomes.chunks(REALIZATION_BLOCK).enumerate() {
         let first = (block * REALIZATION_BLOCK) as u64;
         let block = realizations::to_message(group, first, outcomes);
         reader.send(Part::Realizations(block)).await?;
+    }
+    for (block, draws) in blocks.draws.chunks(DRAW_BLOCK).enumerate() {
+        let first = (block * DRAW_BLOCK) as u64;
+        reader.send(Part::Draws(posterior::draws_to_message(group, first, draws))).await?;
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use osteon_common::results::JobResult;
 use osteon_files::report::ResultFile;
 use osteon_files::results_csv;
 
+use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::{GroupResult, HistoryBlock, JobResult as ResultMessage};
 
 use super::*;
@@ -43,6 +44,7 @@ async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
                 let (_, outcomes) = realizations::from_message(&block).unwrap();
                 left.realizations.push((block.group, outcomes));
             }
+            Part::Draws(_) => panic!("draws from a posterior that nobody asked for"),
             Part::Specification(_) | Part::Result(_) => panic!("two of one kind"),
         }
     }
@@ -53,7 +55,8 @@ async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
 fn result(parts: &Parts) -> JobResult {
     let of = |group: Option<u32>| {
         let found = parts.realizations.iter().find(|(of, _)| *of == group);
-        found.map(|(_, outcomes)| outcomes.clone()).unwrap_or_default()
+        let outcomes = found.map(|(_, outcomes)| outcomes.clone()).unwrap_or_default();
+        ResultBlocks { outcomes, ..ResultBlocks::default() }
     };
     let groups = parts
         .groups

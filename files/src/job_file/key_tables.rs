@@ -2,12 +2,12 @@
 
 use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
-use osteon_common::job::RunSettings;
+use osteon_common::job::{PosteriorSettings, RunSettings};
 use osteon_common::parameters::Parameter;
 
 use crate::toml_text;
 
-use super::{data_section, parameters, priors};
+use super::{data_section, parameters, posterior, priors};
 
 /// Returns the table of the keys that case and job files share.
 pub fn setup_table() -> String {
@@ -23,15 +23,19 @@ pub fn job_table() -> String {
     };
     let names = Parameter::ALL.map(|parameter| format!("`{}`", parameter.name())).join(", ");
     let each = format!("either `start` and `bounds`, or `fixed`, for each of {names}");
+    let section = PosteriorSettings::KEY;
     let mut settings = RunSettings::default();
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&format!(
-        "{}{}{}{}{}",
+        "{}{}{}{}{}{}{}{}",
         special("data", &data_section::KEYS),
         row("parameters.NAME", "", "", &each),
         special("parameters.NAME", &parameters::KEYS),
         declared.concat(),
         special("search.priors.NAME", &priors::KEYS),
+        row(section.name, "", "", section.meaning),
+        rows(section.name, &entries(&mut PosteriorSettings::default())),
+        special("posterior.priors.NAME", &posterior::KEYS),
     ))
 }
 

@@ -2,11 +2,11 @@
 
 use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
-use osteon_common::job::RunSettings;
+use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};
 
-use super::{data_section, parameters, priors};
+use super::{data_section, parameters, posterior, priors};
 
 /// Returns the JSON Schema (draft 2020-12) of a job file in TOML or JSON, with a final newline. It
 /// states names, types and ranges; relations between keys are checked when a file is read.
@@ -25,6 +25,10 @@ pub fn schema() -> String {
         properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
     }
     properties["search"]["properties"]["priors"]["properties"] = each_parameter(prior);
+    let key = PosteriorSettings::KEY;
+    let settings = table(&entries(&mut PosteriorSettings::default()));
+    properties.insert(key.name.to_owned(), described(settings, key));
+    properties[key.name]["properties"]["priors"]["properties"] = each_parameter(posterior_prior);
     let schema = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Job file of osteon",
@@ -140,6 +144,19 @@ fn prior(parameter: Parameter) -> Json {
     });
     let mut prior = object(properties);
     prior["required"] = json!([value.name, weight.name]);
+    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+}
+
+fn posterior_prior(parameter: Parameter) -> Json {
+    let [distribution, center, spread] = posterior::KEYS;
+    let names = PriorDistribution::ALL.map(PriorDistribution::name);
+    let properties = json!({
+        distribution.name: described(json!({ "enum": names }), distribution),
+        center.name: described(json!({ "type": "number" }), center),
+        spread.name: described(number(None, Interval::above(0.0, "")), spread),
+    });
+    let mut prior = object(properties);
+    prior["required"] = json!([distribution.name]);
     described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
 }
 

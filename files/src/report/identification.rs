@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
 use super::{
-    Data, EstimatedErrors, MeanModel, Moments, Solver, Velocity, absent_or_nullable, finite_or_null,
+    Data, EstimatedErrors, MeanModel, Moments, PosteriorReport, Solver, Velocity,
+    absent_or_nullable, finite_or_null,
 };
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
@@ -91,6 +92,14 @@ pub struct Identification {
     /// The answers from all starts; only with several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solutions: Option<Solutions>,
+    /// The posterior of the free parameters; null where the job did not ask for it, absent if the data
+    /// are groups.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "absent_or_nullable"
+    )]
+    pub posterior: Option<Option<PosteriorReport>>,
     /// The result of each group; only where the data are groups.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub groups: Option<Vec<Group>>,
@@ -111,6 +120,11 @@ impl Identification {
     /// Returns the quantities that the data determine, where the derivatives were measured.
     pub fn identified(&self) -> Option<&Identified> {
         self.identified.as_ref()?.as_ref()
+    }
+
+    /// Returns the posterior, if the job asked for it.
+    pub fn posterior(&self) -> Option<&PosteriorReport> {
+        self.posterior.as_ref()?.as_ref()
     }
 
     /// The derivatives, where they were measured.
@@ -153,6 +167,7 @@ impl From<&JobResult> for Identification {
             identified: single.map(|_| inference.map(Identified::from)),
             profiles: single.map(|_| profiles(conclusions)).unwrap_or_default(),
             solutions: single.and(conclusions.solutions.as_ref()).map(Solutions::from),
+            posterior: single.map(|_| conclusions.posterior.as_ref().map(PosteriorReport::from)),
             groups: single.is_none().then(|| result.groups.iter().map(group).collect()),
             solver: Solver::new(&result.solver, result.nominal, estimated_error.into()),
             picking: result.picking,
@@ -229,6 +244,9 @@ pub struct Group {
     /// The answers from all starts; only with several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solutions: Option<Solutions>,
+    /// The posterior of the free parameters; null where the job did not ask for it.
+    #[serde(default)]
+    pub posterior: Option<PosteriorReport>,
 }
 
 impl Group {
@@ -251,6 +269,7 @@ impl Group {
             identified: inference.map(Identified::from),
             profiles: profiles(&group.conclusions),
             solutions: group.conclusions.solutions.as_ref().map(Solutions::from),
+            posterior: group.conclusions.posterior.as_ref().map(PosteriorReport::from),
         }
     }
 }

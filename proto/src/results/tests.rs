@@ -4,6 +4,7 @@ use osteon_fuzz::properties;
 use proptest::prelude::*;
 
 use super::*;
+use crate::posterior::tests::posterior;
 use osteon_common::inference::{
     DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity, Solution, Solutions,
     Spread, Spreads, Uncertainty,
@@ -13,7 +14,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{JobFailure, PointMeaning, Status};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
-fn number() -> impl Strategy<Value = f64> {
+pub(crate) fn number() -> impl Strategy<Value = f64> {
     use proptest::num::f64::{INFINITE, NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO | INFINITE
 }
@@ -42,7 +43,7 @@ fn cost() -> impl Strategy<Value = Option<f64>> {
     proptest::option::of(prop_oneof![0.0..10.0, Just(f64::INFINITY)])
 }
 
-fn point() -> impl Strategy<Value = Point> {
+pub(crate) fn point() -> impl Strategy<Value = Point> {
     proptest::array::uniform7(-1e12..1e12).prop_map(Point)
 }
 
@@ -115,7 +116,7 @@ prop_compose! {
 }
 
 /// A subset of the seven parameters in their order, each with probability ½, but at least one.
-fn free() -> impl Strategy<Value = Vec<Parameter>> {
+pub(crate) fn free() -> impl Strategy<Value = Vec<Parameter>> {
     proptest::sample::subsequence(Parameter::ALL.to_vec(), 1..=7)
 }
 
@@ -187,12 +188,13 @@ prop_compose! {
         profiles in proptest::collection::vec(
             (0_usize..7, proptest::collection::vec((number(), number()), 0..12)), 0..7),
         solutions in proptest::option::of(solutions().boxed()),
+        posterior in proptest::option::of(posterior().boxed()),
     ) -> Conclusions {
         let profiles = profiles.into_iter().map(|(parameter, pairs)| {
             let (values, costs) = pairs.into_iter().unzip();
             Profile { parameter: Parameter::ALL[parameter], values, costs }
         });
-        Conclusions { inference, profiles: profiles.collect(), solutions, posterior: None }
+        Conclusions { inference, profiles: profiles.collect(), solutions, posterior }
     }
 }
 
@@ -265,19 +267,19 @@ prop_compose! {
 
 properties! {
     fn results_survive_the_wire(result in result().boxed()) {
-        let outcomes = result.best.as_ref().map(|best| best.outcomes.clone());
+        let blocks = ResultBlocks::new(result.best.clone(), result.conclusions.clone());
         let message = to_message(&result);
-        let read = from_message(&message, outcomes.unwrap_or_default(), result.groups.clone());
+        let read = from_message(&message, blocks, result.groups.clone());
         // The debug format also compares the signs of zeros.
         prop_assert_eq!(format!("{:?}", read.as_ref().ok()), format!("{:?}", Some(&result)));
         prop_assert_eq!(read, Ok(result));
     }
 
     fn groups_survive_the_wire(number in any::<u32>(), group in group().boxed()) {
-        let outcomes = group.best.as_ref().map(|best| best.outcomes.clone());
+        let blocks = ResultBlocks::new(group.best.clone(), group.conclusions.clone());
         let message = group_to_message(number, &group);
         prop_assert_eq!(message.group, number);
-        prop_assert_eq!(group_from_message(&message, outcomes.unwrap_or_default()), Ok(group));
+        prop_assert_eq!(group_from_message(&message, blocks), Ok(group));
     }
 
     fn evaluations_survive_the_wire(
@@ -285,6 +287,7 @@ properties! {
         group in any::<u32>(),
         start in any::<u32>(),
         varied in proptest::option::of(0_usize..7),
+        posterior in any::<bool>(),
         point in point(),
         moments in proptest::option::of(moments()),
         cost in cost(),
@@ -292,7 +295,7 @@ properties! {
         estimated_error in estimated_error(),
     ) {
         let varied = varied.map(|k| Parameter::ALL[k]);
-        let role = EvaluationRole { group, start, varied, ..EvaluationRole::default() };
+        let role = EvaluationRole { group, start, varied, posterior };
         let evaluation =
             Evaluation { number, role, point, moments, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);
@@ -316,7 +319,7 @@ fn what_no_coordinator_writes_is_refused() {
     assert_eq!(many(REALIZATIONS_MAX).unwrap().total(), REALIZATIONS_MAX);
     assert!(many(REALIZATIONS_MAX + 1).is_err());
     assert_eq!(
-        from_message(&v1::JobResult::default(), vec![], vec![]),
+        from_message(&v1::JobResult::default(), ResultBlocks::default(), vec![]),
         Err(Malformed::Missing { field: "objective" })
     );
 }
@@ -387,9 +390,9 @@ fn complete() -> v1::JobResult {
 fn conclusions_with_a_part_missing_are_refused() {
     let refused = |change: fn(&mut v1::JobResult)| {
         let mut message = complete();
-        from_message(&message, vec![], vec![]).unwrap();
+        from_message(&message, ResultBlocks::default(), vec![]).unwrap();
         change(&mut message);
-        match from_message(&message, vec![], vec![]).unwrap_err() {
+        match from_message(&message, ResultBlocks::default(), vec![]).unwrap_err() {
             Malformed::Missing { field }
             | Malformed::WrongLength { field, .. }
             | Malformed::UnknownValue { field, .. }

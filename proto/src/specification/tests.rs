@@ -1,7 +1,9 @@
 use std::path::Path;
 
 use osteon_common::case::Setup;
-use osteon_common::job::{Sampling, SearchMethod};
+use osteon_common::job::{
+    PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
+};
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_files::document::Format;
 use osteon_files::job_file;
@@ -73,6 +75,19 @@ fn solver() -> impl Strategy<Value = SolverSettings> {
 }
 
 prop_compose! {
+    /// With the centers of priors at the starts of the paper's search box.
+    fn posterior()(
+        draws in 100_u64..=20_000,
+        max_evaluations in 20_u64..=2_000,
+        laws in proptest::array::uniform7(
+            (proptest::sample::select(PriorDistribution::ALL.to_vec()), 0.01..1.0)),
+    ) -> PosteriorSettings {
+        let prior = |i: usize| PosteriorPrior::new(laws[i].0, RANGES[i].0, laws[i].1 * RANGES[i].0);
+        PosteriorSettings { draws, max_evaluations, priors: std::array::from_fn(prior) }
+    }
+}
+
+prop_compose! {
     fn specification()(
         data in proptest::option::of(data()),
         parameters in parameters(),
@@ -89,13 +104,22 @@ prop_compose! {
         sensitivities: bool,
         weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
         solver in solver(),
+        posterior in proptest::option::of(posterior()),
     ) -> JobSpecification {
+        let posterior = posterior.filter(|_| data.is_some()).map(|mut posterior| {
+            for (prior, range) in posterior.priors.iter_mut().zip(&parameters) {
+                if matches!(range, Range::Fixed(_)) {
+                    *prior = PosteriorPrior::Uniform;
+                }
+            }
+            posterior
+        });
         let mut priors = [None; 7];
         for ((prior, weight), range) in priors.iter_mut().zip(weights).zip(&parameters) {
             let drawn = matches!(range, Range::Free { .. }) && method == SearchMethod::Simplex;
             *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
         }
-        JobSpecification {
+        let specification = JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
             setup: Setup { solver, ..Setup::default() },
             data,
@@ -118,8 +142,9 @@ prop_compose! {
                 priors,
                 ..Search::by(method)
             },
-            posterior: None,
-        }
+            posterior,
+        };
+        specification.with_implied_posterior()
     }
 }
 
@@ -239,6 +264,36 @@ fn each_fault_is_named_by_its_path() {
         });
         assert_eq!(fields, ["monte_carlo.scrambles"], "{sampling:?} {scrambles} of 2747");
     }
+}
+
+#[test]
+fn each_fault_of_a_posterior_is_named_by_its_path() {
+    fn of(change: impl FnOnce(&mut v1::PosteriorSettings)) -> Vec<String> {
+        let mut settings = v1::PosteriorSettings::default();
+        change(&mut settings);
+        faults(|m| m.posterior = Some(settings))
+    }
+    let prior = |parameter: i32, distribution: i32, center: Option<f64>, spread: Option<f64>| {
+        of(|m| m.priors.push(v1::PosteriorPrior { parameter, distribution, center, spread }))
+    };
+    assert_eq!(of(|m| m.draws = Some(99)), ["posterior.draws"]);
+    assert_eq!(of(|m| m.max_evaluations = Some(2001)), ["posterior.max_evaluations"]);
+    let density = "posterior.priors.density";
+    let numbers = [format!("{density}.center"), format!("{density}.spread")];
+    assert_eq!(prior(1, 2, None, None), numbers);
+    assert_eq!(prior(1, 1, Some(1700.0), Some(100.0)), numbers);
+    assert_eq!(prior(1, 2, Some(f64::NAN), Some(0.0)), numbers);
+    assert_eq!(prior(1, 3, Some(-1.0), Some(1.0)), numbers[..1]);
+    assert_eq!(prior(1, 2, Some(3000.1), Some(100.0)), numbers[..1]);
+    assert_eq!(prior(1, 0, Some(1700.0), Some(100.0)), [format!("{density}.distribution")]);
+    assert_eq!(prior(0, 2, Some(1700.0), Some(100.0)), ["posterior.priors"]);
+    let twice = v1::PosteriorPrior { parameter: 1, distribution: 1, ..Default::default() };
+    assert_eq!(of(|m| m.priors = vec![twice; 2]), [density]);
+    let propagated = faults(|m| {
+        (m.kind, m.data) = (v1::JobKind::Propagation.into(), None);
+        m.posterior = Some(v1::PosteriorSettings::default());
+    });
+    assert_eq!(propagated, ["posterior"]);
 }
 
 /// Returns all messages about a specification after `change`.
@@ -376,6 +431,7 @@ fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecifica
         search_message.set_method(match search {
             SearchMethod::Simplex => v1::SearchMethod::Simplex,
             SearchMethod::Newton => v1::SearchMethod::Newton,
+            SearchMethod::Posterior => v1::SearchMethod::Posterior,
         });
         message.search = Some(search_message);
     }

@@ -4,7 +4,7 @@ use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
 
 use crate::newton::{self, Newton};
-use crate::proposal::Proposal;
+use crate::proposal::{Proposal, StopReason};
 use crate::search_box::SearchBox;
 use crate::simplex::{self, Costs, Simplex};
 
@@ -17,6 +17,8 @@ const EQUAL_LIKELIHOODS: f64 = 5e-4;
 pub(super) enum MethodState {
     Simplex(Simplex),
     Newton(Box<Newton>),
+    /// No search is made.
+    Posterior,
 }
 
 impl MethodState {
@@ -44,6 +46,7 @@ impl MethodState {
                 let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
                 Self::Newton(Box::new(Newton::new(space, data, settings)))
             }
+            SearchMethod::Posterior => Self::Posterior,
         }
     }
 
@@ -52,6 +55,7 @@ impl MethodState {
         match self {
             Self::Simplex(simplex) => simplex.ask(),
             Self::Newton(newton) => newton.ask(),
+            Self::Posterior => Proposal::Stopped(StopReason::Converged),
         }
     }
 
@@ -60,6 +64,7 @@ impl MethodState {
         match self {
             Self::Simplex(simplex) => simplex.tell(cost),
             Self::Newton(newton) => newton.tell(cost, moments),
+            Self::Posterior => {}
         }
     }
 
@@ -69,6 +74,7 @@ impl MethodState {
         match self {
             Self::Simplex(simplex) => simplex.candidates(most),
             Self::Newton(newton) => newton.candidates(most),
+            Self::Posterior => Vec::new(),
         }
     }
 
@@ -77,6 +83,7 @@ impl MethodState {
         match self {
             Self::Simplex(simplex) => simplex.refuse(),
             Self::Newton(newton) => newton.refuse(),
+            Self::Posterior => {}
         }
     }
 }

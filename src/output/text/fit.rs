@@ -72,7 +72,11 @@ pub(super) fn misfit(
         let percent = glued(&format!("{} %", digits(100.0 * difference.abs(), 2)));
         Some(format!("{percent} {side} the data's"))
     };
-    let mut text = "The model does not fit the data, so no intervals can be given.".to_owned();
+    let intervals = match found.posterior() {
+        Some(_) => "so the posterior below says little",
+        None => "so no intervals can be given",
+    };
+    let mut text = format!("The model does not fit the data, {intervals}.");
     if let [Some(mean), Some(variation)] = Moment::ALL.map(off) {
         text.push_str(&format!(
             " Its mean velocity is {mean}, its coefficient of variation {variation}."

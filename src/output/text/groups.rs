@@ -3,7 +3,7 @@
 
 use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
-use osteon_files::report::{Data, Group, Moment, QuantityEstimate};
+use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
 
 use super::result::scale;
 use super::{aligned, significant};
@@ -20,6 +20,19 @@ struct GroupCell {
     ends: Option<[f64; 2]>,
 }
 
+impl From<Option<QuantityEstimate>> for GroupCell {
+    fn from(found: Option<QuantityEstimate>) -> Self {
+        let ends = found.and_then(|found| found.ends());
+        Self { value: found.and_then(|found| found.value), ends }
+    }
+}
+
+impl From<&QuantityPosterior> for GroupCell {
+    fn from(found: &QuantityPosterior) -> Self {
+        Self { value: found.mean, ends: found.ends() }
+    }
+}
+
 /// Returns the tables, each line preceded by the given beginning.
 pub(super) fn table(groups: &[Group]) -> String {
     let mut text = "\n".to_owned();
@@ -28,11 +41,13 @@ pub(super) fn table(groups: &[Group]) -> String {
         data(groups, Moment::CoefficientOfVariation, "COEFFICIENT OF VARIATION"),
     ];
     let identified = [
-        quantities(groups, "√(c1111/ρ) (m/s)", 1.0, |group| {
-            group.identified.as_ref().map(|known| known.bulk_velocity)
+        quantities(groups, "√(c1111/ρ) (m/s)", 1.0, |group| match &group.posterior {
+            Some(known) => (&known.bulk_velocity).into(),
+            None => group.identified.as_ref().map(|known| known.bulk_velocity).into(),
         }),
         quantities(groups, "DISPERSION", 1.0, |group| {
-            group.identified.as_ref().map(|known| known.dispersion)
+            let dispersion = group.identified.as_ref().map(|known| known.dispersion);
+            known_after(group, Parameter::Dispersion).unwrap_or(dispersion.into())
         }),
     ];
     text.push_str(&overview(groups));
@@ -46,7 +61,10 @@ pub(super) fn table(groups: &[Group]) -> String {
         };
         text.push_str(&side_by_side(groups, [column(pair.first()), column(pair.get(1))]));
     }
-    text.push_str("\nIn brackets: 95 % confidence intervals, each group by itself.\n");
+    let of_posterior = groups.iter().any(|group| group.posterior.is_some());
+    let intervals =
+        if of_posterior { "intervals of the posterior" } else { "confidence intervals" };
+    text.push_str(&format!("\nIn brackets: 95 % {intervals}, each group by itself.\n"));
     text.push_str(&notes(groups));
     text.push_str(&caveat(groups));
     text
@@ -93,13 +111,12 @@ fn quantities(
     groups: &[Group],
     heading: &str,
     scale: f64,
-    of: impl Fn(&Group) -> Option<QuantityEstimate>,
+    of: impl Fn(&Group) -> GroupCell,
 ) -> Column {
     let cell = |group| {
-        let quantity = of(group);
-        let ends = quantity.and_then(|quantity| quantity.ends());
+        let GroupCell { value, ends } = of(group);
         GroupCell {
-            value: quantity.and_then(|quantity| quantity.value).map(|value| value * scale),
+            value: value.map(|value| value * scale),
             ends: ends.map(|ends| ends.map(|end| end * scale)),
         }
     };
@@ -114,17 +131,24 @@ fn of_parameter(groups: &[Group], parameter: Parameter) -> Column {
     quantities(groups, &heading, scale, |group| known(group, parameter))
 }
 
-/// Returns the estimate of a parameter from the data of a group.
-fn known(group: &Group, parameter: Parameter) -> Option<QuantityEstimate> {
-    *group.identified.as_ref()?.parameters.get(&parameter)?
+/// Returns what the data of a group say of a parameter.
+fn known(group: &Group, parameter: Parameter) -> GroupCell {
+    known_after(group, parameter).unwrap_or_else(|| {
+        let estimate = || *group.identified.as_ref()?.parameters.get(&parameter)?;
+        estimate().into()
+    })
 }
 
-/// Returns the free parameters of the mean model that the data of at least one group determine.
+/// Returns the posterior of a parameter, if there is one.
+fn known_after(group: &Group, parameter: Parameter) -> Option<GroupCell> {
+    Some(group.posterior.as_ref()?.parameters.get(&parameter)?.into())
+}
+
+/// Returns the free parameters of the mean model that the data of at least one group determine, or
+/// that have a posterior.
 fn known_parameters(groups: &[Group]) -> Vec<Parameter> {
-    let is_known = |parameter: &Parameter| {
-        let of = |group| known(group, *parameter).is_some_and(|found| found.interval.is_some());
-        groups.iter().any(of)
-    };
+    let is_known =
+        |parameter: &Parameter| groups.iter().any(|group| known(group, *parameter).ends.is_some());
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     elastic.filter(is_known).collect()
 }
@@ -156,10 +180,16 @@ fn shown(cells: &[GroupCell]) -> Vec<String> {
 fn note(group: &Group) -> Option<String> {
     let reason = group.reason.as_deref().and_then(|reason| reason.lines().next());
     let unmatched = group.identified.as_ref().is_some_and(|known| !known.matched);
+    let vague = group.posterior.as_ref().filter(|known| !known.converged);
     match (reason, group.status) {
         (Some(reason), _) => Some(reason.to_owned()),
         (None, Status::MaxEvaluations) => Some("the evaluations are used up".to_owned()),
-        (None, _) if unmatched => {
+        (None, _) if vague.is_some() => {
+            let reason = vague.and_then(|known| known.reason.as_deref()?.lines().next());
+            let reason = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+            Some(format!("the posterior did not converge{reason}"))
+        }
+        (None, _) if unmatched && group.posterior.is_none() => {
             Some("the model does not match the data within their noise: no intervals".to_owned())
         }
         _ => None,

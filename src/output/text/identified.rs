@@ -7,6 +7,7 @@ use osteon_files::report::{Identification, Identified, Moments, QuantityEstimate
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, digits, measured, significant};
+use super::posterior;
 use super::result::{readable, scale};
 
 /// Name of √(c1111/ρ), which the data always determine where they determine anything.
@@ -14,14 +15,21 @@ const SPEED: &str = "√(c1111/ρ)";
 
 /// Returns whether the uncertainty of any quantity is known.
 pub(super) fn has_intervals(found: &Identification) -> bool {
+    found.posterior().is_some() || has_confidence_intervals(found)
+}
+
+/// Returns whether there is a confidence interval of any quantity.
+fn has_confidence_intervals(found: &Identification) -> bool {
     found.identified().is_some_and(|known| known.matched && !rows(known).is_empty())
 }
 
-/// Returns the intervals of the identified quantities, and what remains undetermined; empty if
-/// nothing is known.
+/// Returns the posterior or, without one, the intervals of the identified quantities, and what
+/// remains undetermined; empty if nothing is known.
 pub(super) fn text(found: &Identification) -> String {
     let mut text = String::new();
-    if let Some(known) = found.identified().filter(|_| has_intervals(found)) {
+    if let Some(known) = found.posterior() {
+        text.push_str(&posterior::text(known));
+    } else if let Some(known) = found.identified().filter(|_| has_confidence_intervals(found)) {
         text.push_str(&format!("\n{}{}", wrapped(&heading(known)), aligned(&rows(known))));
         text.push_str(&condition(found, known));
     }

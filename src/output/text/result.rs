@@ -11,7 +11,7 @@ use osteon_files::report::{Data, Identification, Moment, Propagation, ResultFile
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
-use super::{fit, groups, identified, solver};
+use super::{fit, groups, identified, posterior, solver};
 use crate::output::ShownResult;
 use crate::result_status;
 
@@ -43,6 +43,9 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     if let Some(measured) = found.sensitivities() {
         count.push_str(&format!(" and {} for derivatives", measured.len()));
     }
+    if let Some(posterior) = found.posterior() {
+        count.push_str(&format!(" and {} for the posterior", posterior.evaluations));
+    }
     if let Some(groups) = &found.groups {
         text.push_str(&count);
         text.push_str(&groups::table(groups));
@@ -51,7 +54,10 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     // A point without a finite cost allows no statement about the data.
     let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
     let Some(point) = point else {
-        text.push_str(&wrapped(&format!("{count}; no point was feasible")));
+        match found.posterior() {
+            Some(known) => text.push_str(&format!("{}{}", wrapped(&count), posterior::text(known))),
+            None => text.push_str(&wrapped(&format!("{count}; no point was feasible"))),
+        }
         return;
     };
     let failed = failures(&found.failures);
@@ -71,6 +77,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
         text.push_str(&identified::text(found));
     } else {
         text.push_str(&fit::misfit(found, &point, specification));
+        text.push_str(&found.posterior().map(posterior::text).unwrap_or_default());
     }
 }
 

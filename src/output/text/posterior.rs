@@ -1,0 +1,103 @@
+//! The posterior as text.
+
+use osteon_common::parameters::Parameter;
+use osteon_files::report::{PosteriorReport, QuantityPosterior};
+
+use super::layout::{aligned, glued, wrapped};
+use super::number::{DIGITS, Decimals, digits, measured};
+use super::result::{readable, scale};
+
+/// Posterior probability below which the data would be surprising under the model.
+const SURPRISING: f64 = 0.01;
+
+/// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
+pub(super) fn text(found: &PosteriorReport) -> String {
+    let mut text = format!("\n{}{}", wrapped(&fixed(found)), aligned(&rows(found)));
+    text.push_str(&wrapped(
+        "`from data`: share of the prior variance that the data removed; near 0 %, the prior alone \
+         makes the interval.",
+    ));
+    text.push_str(&wrapped(&effort(found)));
+    text.push_str(&doubts(found));
+    text
+}
+
+/// Says between which limits the data fix the moments of the velocities.
+fn fixed(found: &PosteriorReport) -> String {
+    let mean = limits(&found.mean, 1.0, " m/s");
+    let variation = limits(&found.coefficient_of_variation, 1.0, "");
+    let (mean, variation) = (glued(&mean), glued(&variation));
+    let level = glued("95 %");
+    format!(
+        "The data fix the mean velocity ({mean}) and the coefficient of variation ({variation}); \
+         {level}. Posterior of what follows from them:"
+    )
+}
+
+/// Returns a heading, and a row for each quantity: those that the data know best first.
+fn rows(found: &PosteriorReport) -> Vec<[String; 4]> {
+    let mut rows = vec![["", "mean ± sd", "95 % interval", "from data"].map(str::to_owned)];
+    rows.push(row("√(c1111/ρ)", &found.bulk_velocity, 1.0, " m/s"));
+    let of = |parameter: Parameter, quantity: &QuantityPosterior| {
+        let (scale, unit) = scale(parameter);
+        row(&readable(parameter), quantity, scale, unit)
+    };
+    let dispersion = found.parameters.get_key_value(&Parameter::Dispersion);
+    let others = found.parameters.iter().filter(|(name, _)| **name != Parameter::Dispersion);
+    rows.extend(dispersion.into_iter().chain(others).map(|(name, found)| of(*name, found)));
+    rows
+}
+
+/// Returns name, mean with standard deviation, interval and explained share of a quantity.
+fn row(name: &str, quantity: &QuantityPosterior, scale: f64, unit: &str) -> [String; 4] {
+    let [mean, deviation] = [quantity.mean, quantity.standard_deviation]
+        .map(|number| number.unwrap_or(f64::NAN) * scale);
+    [
+        name.to_owned(),
+        format!("{}{unit}", measured(mean, deviation)),
+        limits(quantity, scale, unit),
+        format!("{:.0} %", 100.0 * quantity.explained),
+    ]
+}
+
+/// Returns the ends of the 95 % interval, with two digits of the standard deviation.
+fn limits(quantity: &QuantityPosterior, scale: f64, unit: &str) -> String {
+    let Some(ends) = quantity.ends() else { return "unknown".to_owned() };
+    let deviation = quantity.standard_deviation.unwrap_or(f64::NAN) * scale;
+    let decimals = Decimals::for_standard_error(deviation);
+    let [lower, upper] = ends.map(|end| match decimals {
+        Some(decimals) => decimals.show(end * scale),
+        None => digits(end * scale, DIGITS),
+    });
+    format!("{lower} to {upper}{unit}")
+}
+
+fn effort(found: &PosteriorReport) -> String {
+    let PosteriorReport { evaluations, draws, .. } = found;
+    let effective = found.effective_draws.map_or("?".to_owned(), |count| format!("{count:.0}"));
+    format!("{draws} draws, {effective} of them effective, from {evaluations} evaluations.")
+}
+
+/// Returns the warnings: an accuracy that was not reached, and data that the model hardly explains.
+fn doubts(found: &PosteriorReport) -> String {
+    let mut text = String::new();
+    if !found.converged {
+        let reason = found.reason.as_deref().and_then(|reason| reason.lines().next());
+        let reason = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+        let reason = reason.trim_end_matches('.');
+        text.push_str(&wrapped(&format!(
+            "Warning: the posterior did not converge{reason}. Its intervals may be off."
+        )));
+    }
+    if let Some(p) = found.predictive_p_value.filter(|p| *p < SURPRISING) {
+        let p = glued(&format!("p = {}", digits(p, 2)));
+        text.push_str(&wrapped(&format!(
+            "Warning: no point of the posterior explains the distribution of the data \
+             (Kolmogorov–Smirnov test of the posterior-predictive law: {p})."
+        )));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests;

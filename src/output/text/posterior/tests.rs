@@ -1,0 +1,40 @@
+use unicode_width::UnicodeWidthStr as _;
+
+use super::*;
+use crate::sample_result::posterior;
+
+#[test]
+fn what_the_data_fix_comes_first() {
+    insta::assert_snapshot!(text(&posterior()));
+}
+
+#[test]
+fn doubts_are_told() {
+    let said = |change: fn(&mut PosteriorReport)| {
+        let mut found = posterior();
+        change(&mut found);
+        let text = text(&found);
+        assert!(text.lines().all(|line| line.width() <= 80), "{text}");
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    assert!(!said(|_| {}).contains("Warning"));
+    let vague = said(|found| {
+        (found.converged, found.reason) = (false, Some("the evaluations are used up.".to_owned()));
+    });
+    let warning = "Warning: the posterior did not converge: the evaluations are used up. Its";
+    assert!(vague.contains(warning), "{vague}");
+    let unexplained = said(|found| found.converged = false);
+    assert!(unexplained.contains("did not converge. Its intervals may be off."), "{unexplained}");
+    let surprising = said(|found| found.predictive_p_value = Some(0.0042));
+    assert!(surprising.contains("posterior-predictive law: p = 0.0042)."), "{surprising}");
+}
+
+#[test]
+fn numbers_that_are_none_are_unknown() {
+    let mut found = posterior();
+    found.effective_draws = None;
+    found.mean.interval_95 = [None, None];
+    found.bulk_velocity.standard_deviation = None;
+    let text = text(&found);
+    assert!(text.contains("the mean velocity (unknown)") && text.contains("? of them"), "{text}");
+}
