@@ -43,6 +43,9 @@ pub(crate) enum Study {
     Twins(TwinsArguments),
     /// Count how many confidence intervals contain the true value, over data sets of 100 velocities
     Coverage(TwinsArguments),
+    /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from
+    /// the prior with all seven parameters free
+    Posteriors(TwinsArguments),
     /// Measure how the error of the hybrid method falls with element size, order and time step
     Convergence,
 }

@@ -16,6 +16,7 @@ mod generator;
 mod identify;
 pub mod methods;
 pub mod models;
+pub mod posteriors;
 pub mod refinement;
 pub mod searches;
 pub mod setups;

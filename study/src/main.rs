@@ -15,7 +15,7 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, refinement, searches, setups, variance,
+    failures, methods, models, posteriors, refinement, searches, setups, variance,
 };
 
 use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
@@ -96,6 +96,9 @@ fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Twins(arguments) => over_twins("twins", twins::SETS, twins::table, arguments, isa),
         Study::Coverage(arguments) => {
             over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
+        }
+        Study::Posteriors(arguments) => {
+            over_twins("posteriors", posteriors::REPETITIONS, posteriors::table, arguments, isa)
         }
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     }
