@@ -120,11 +120,7 @@ fn count(posterior: &Posterior, truth: &Point, counts: &mut [Calibration; 8]) {
 }
 
 /// Returns parameter set `number` with velocities; `None` if too many realizations fail.
-fn drawn(
-    twins: &Twins,
-    size: u64,
-    number: u64,
-) -> Result<Option<(Point, Vec<f64>)>, StudyError> {
+fn drawn(twins: &Twins, size: u64, number: u64) -> Result<Option<(Point, Vec<f64>)>, StudyError> {
     let truth = mean_model(twins.seed, number);
     let seed = twins.seed + 1 + number;
     let drawn = MonteCarlo { realizations: size, seed, ..MonteCarlo::default() };
@@ -135,11 +131,8 @@ fn drawn(
 }
 
 fn specification(velocities: Vec<f64>, seed: u64) -> JobSpecification {
-    let range = |(lower, upper): (f64, f64)| Range::Free {
-        start: 0.5 * (lower + upper),
-        lower,
-        upper,
-    };
+    let range =
+        |(lower, upper): (f64, f64)| Range::Free { start: 0.5 * (lower + upper), lower, upper };
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),

@@ -97,13 +97,8 @@ fn of_seven_free_parameters_two_combinations_are_identified() {
     let found = found(&specification(&Parameter::ALL, None), [1e-3, 2e-2]);
     assert_eq!((found.fixed.len(), found.undetermined.len()), (2, 5));
     close(found.bulk_velocity.value, model(&OPTIMUM).mean / 0.99, 1e-12);
-    let known = found.bulk_velocity.known.unwrap();
-    close(known.standard_error / found.bulk_velocity.value, 1e-3, 1e-5);
-    assert!(known.free_share < 1e-4, "{known:?}");
-    let known = found.dispersion.known.unwrap();
-    close(known.standard_error / 0.1029, 2e-2, 1e-4);
-    let half = libm::log(known.interval[1] / known.interval[0]) / 2.0;
-    close(half, 1.96 * 2e-2, 1e-3);
+    // Both still depend on how far the parameters may move along the free directions.
+    assert_eq!((found.bulk_velocity.known, found.dispersion.known), (None, None));
     // No single parameter is determined.
     assert!(found.parameters.iter().all(|(_, quantity)| quantity.known.is_none()));
 }

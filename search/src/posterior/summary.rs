@@ -4,7 +4,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 
-use super::population::{Member, Population, normalised};
+use super::population::{Member, Population, moments as moments_of, normalised};
 use super::{EFFICIENCY_MIN, PosteriorSearch, Stage, pareto};
 
 /// Sobol' points of the population that the result summarises.
@@ -51,8 +51,8 @@ impl PosteriorSearch {
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
-            mean: of_member(&population, |member| libm::exp(member.moments[0])),
-            coefficient_of_variation: of_member(&population, |member| libm::exp(member.moments[1])),
+            mean: of(&|point| self.moment(point, 0)),
+            coefficient_of_variation: of(&|point| self.moment(point, 1)),
             bulk_velocity: of(&|point| {
                 super::closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
@@ -60,6 +60,11 @@ impl PosteriorSearch {
             predictive_p_value: None,
             draws: draws(&population, problem, count),
         })
+    }
+
+    /// Returns mean or coefficient of variation of the interpolated model.
+    fn moment(&self, point: &Point, axis: usize) -> f64 {
+        moments_of(&self.surrogate, point).map_or(f64::NAN, |found| libm::exp(found[axis]))
     }
 
     /// Returns why the result is not accurate; `None` if it is.
@@ -94,11 +99,6 @@ fn summary(
     let equal = vec![1.0 / prior.len() as f64; prior.len()];
     let (_, prior_standard_deviation) = moments(&prior, &equal);
     PosteriorSummary { prior_standard_deviation, ..weighted(values, &population.weights) }
-}
-
-/// Summarises a quantity of the population's members; that of the prior is unknown.
-fn of_member(population: &Population, quantity: impl Fn(&Member) -> f64) -> PosteriorSummary {
-    weighted(population.members.iter().map(quantity).collect(), &population.weights)
 }
 
 fn weighted(values: Vec<f64>, weights: &[f64]) -> PosteriorSummary {

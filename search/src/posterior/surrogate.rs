@@ -133,18 +133,16 @@ impl Surrogate {
         Prediction { mean: both.map(|one| one.0), variance: both.map(|one| one.1) }
     }
 
-    /// Returns for each of several points the part of its covariances with the others that the
-    /// points added so far do not explain: a vector for each process, whose scalar products are
-    /// the covariances they explain.
-    pub(super) fn explained(&self, features: &Features) -> [Vec<f64>; 2] {
-        let at = self.scale.apply(features);
-        [0, 1].map(|k| self.processes[k].explained(&self.inputs, &at))
+    /// Returns a vector for a point such that the scalar product of two points' vectors is the part
+    /// of the covariance of deviation `k` there that the points added so far explain.
+    pub(super) fn explained(&self, features: &Features, k: usize) -> Vec<f64> {
+        self.processes[k].explained(&self.inputs, &self.scale.apply(features))
     }
 
-    /// Returns the prior covariances of the deviations at two points.
-    pub(super) fn covariance(&self, a: &Features, b: &Features) -> Deviations {
-        let (a, b) = (self.scale.apply(a), self.scale.apply(b));
-        [0, 1].map(|k| self.processes[k].variance * self.processes[k].kernel(&a, &b))
+    /// Returns the covariance of deviation `k` at two points without any evaluated point.
+    pub(super) fn covariance(&self, a: &Features, b: &Features, k: usize) -> f64 {
+        let process = &self.processes[k];
+        process.variance * process.kernel(&self.scale.apply(a), &self.scale.apply(b))
     }
 }
 

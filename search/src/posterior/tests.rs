@@ -92,13 +92,16 @@ fn moments(mut values: Vec<(f64, f64)>) -> [f64; 4] {
     let mean = values.iter().map(|(x, w)| w * x).sum::<f64>() / total;
     let square = values.iter().map(|(x, w)| w * (x - mean) * (x - mean)).sum::<f64>() / total;
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Each value stands for half the way to its neighbours.
     let quantile = |level: f64| {
         let mut below = 0.0;
-        let reached = values.iter().find(|(_, weight)| {
+        let reached = values.iter().position(|(_, weight)| {
             below += weight;
             below >= level * total
         });
-        reached.unwrap().0
+        let k = reached.unwrap().clamp(1, values.len() - 2);
+        let width = 0.5 * (values[k + 1].0 - values[k - 1].0);
+        values[k].0 + width * (0.5 - (below - level * total) / values[k].1)
     };
     [mean, square.sqrt(), quantile(0.025), quantile(0.975)]
 }
@@ -162,8 +165,7 @@ fn two_parameters_have_the_posterior_of_quadrature() {
     }
     for axis in [0, 1] {
         let values = (0..nodes).map(|k| (node(axis, k), sums[axis][k]));
-        // The quantiles of the reference are exact to half a node.
-        check(&found.parameters[axis], moments(values.collect()), 3e-3, free[axis].name());
+        check(&found.parameters[axis], moments(values.collect()), 1e-3, free[axis].name());
     }
 }
 
@@ -231,7 +233,7 @@ fn the_same_evaluations_give_the_same_bits() {
     let free = [Parameter::Density, Parameter::TransversePoissonRatio, Parameter::Dispersion];
     let specification = specification(&free, 100, PosteriorSettings::default());
     let (one, other) = (posterior(&specification), posterior(&specification));
-    assert_eq!(one, other);
+    assert!(one == other, "the results differ");
     let bits = |found: &Posterior| -> Vec<u64> {
         found.draws.iter().flat_map(|draw| draw.point.0.map(f64::to_bits)).collect()
     };
@@ -243,6 +245,6 @@ fn the_same_evaluations_give_the_same_bits() {
 fn too_few_evaluations_are_said() {
     let settings = PosteriorSettings { max_evaluations: 20, ..PosteriorSettings::default() };
     let found = posterior(&specification(&Parameter::ALL, 2747, settings));
-    assert!(!found.converged && found.evaluations <= 20, "{found:?}");
+    assert!(!found.converged && found.evaluations <= 20, "{}", found.evaluations);
     assert!(found.reason.unwrap().contains("max_evaluations"));
 }
