@@ -261,7 +261,6 @@ fn prior(prior: &str) -> String {
 #[test]
 fn posterior() {
     let edits = [
-        "posterior = 3\n".to_owned(),
         "[posterior]\ndraws = 99\n".to_owned(),
         "[posterior]\ndraws = 20001\n".to_owned(),
         "[posterior]\nmax_evaluations = 19\n".to_owned(),
@@ -309,7 +308,7 @@ fn a_posterior_needs_two_realizations() {
             edited(sampling, "realizations = 1").replace("\"simplex\"", &format!("\"{method}\""));
         assert_eq!(
             refusal(&format!("{text}\n{section}"), JobKind::Identification),
-            "1 error\n  line 47: monte_carlo.realizations: is 1; a posterior needs the law of \
+            "1 error\n  line 52: monte_carlo.realizations: is 1; a posterior needs the law of \
              velocities that differ, so at least 2"
         );
     }
