@@ -154,6 +154,17 @@ fn draws_are_rows() {
 }
 
 #[test]
+fn the_columns_are_documented() {
+    let page = include_str!("../../../docs/results.md");
+    let section = page.split("\n### ").find(|section| section.starts_with("`posterior.csv`\n"));
+    let rows = section.unwrap().lines().filter(|line| line.starts_with("| `"));
+    let cells: String = rows.filter_map(|line| line.split('|').nth(1)).collect();
+    let told: Vec<&str> = cells.split('`').skip(1).step_by(2).collect();
+    let real: Vec<&str> = HEADER.split(',').chain(["group"]).collect();
+    assert_eq!(told, real);
+}
+
+#[test]
 fn draws_of_groups_follow_each_other() {
     let groups = vec![Group { name: "left".to_owned(), velocities: vec![3900.0, 3950.0] }];
     let job = JobSpecification { data: Some(Data::Groups(groups)), ..specification() };
