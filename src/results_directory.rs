@@ -365,4 +365,4 @@ fn read_if_there(path: &Path) -> anyhow::Result<Option<String>> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -310,6 +310,16 @@ fn the_schemas_are_the_committed_ones_and_describe_every_key() {
     }
 }
 
+/// The keys of a posterior as the schema has them, and as the documentation lists them.
+#[test]
+fn every_key_of_a_posterior_is_documented() {
+    let schema = committed_schema("result");
+    let real: BTreeSet<String> =
+        names(&schema["$defs"]["PosteriorReport"]["properties"]).into_iter().collect();
+    let told: BTreeSet<String> = documented("`posterior` of a result").into_iter().collect();
+    assert_eq!(told, real);
+}
+
 /// Lists the keys of `value` that `schema` does not know, or that it lacks.
 fn unlike(schema: &Value, value: &Value, path: &str, found: &mut Vec<String>) {
     let Some(entries) = value.as_object() else { return };

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::EngineeringConstants;
-use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+use osteon_common::job::{
+    Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
+    Range, Search,
+};
 use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Parameter;
@@ -123,6 +126,44 @@ fn the_default_tolerance_is_that_of_the_method() {
     let loose = Search { cost_tolerance: 1e-6, ..newton };
     check("[search]\nmethod = \"newton\"\ncost_tolerance = 1e-6\n", loose);
     check("[search]\nmethod = \"simplex\"\n", Search::default());
+}
+
+#[test]
+fn a_posterior_is_asked_for_by_its_section_or_by_the_method() {
+    let given = |text: &str| {
+        job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification).posterior
+    };
+    let default = PosteriorSettings::default();
+    assert_eq!((default.draws, default.max_evaluations), (2000, 400));
+    assert_eq!(given(""), None);
+    assert_eq!(given("[posterior]\n"), Some(default));
+    assert_eq!(given("[search]\nmethod = \"posterior\"\n"), Some(default));
+    let mut priors = default.priors;
+    priors[1] = PosteriorPrior::LogNormal { center: 17e9, spread: 0.125 };
+    priors[6] = PosteriorPrior::Normal { center: 0.1, spread: 0.05 };
+    let text = "[posterior]\ndraws = 500\nmax_evaluations = 100\n\n\
+        [posterior.priors.longitudinal_young_modulus]\ndistribution = \"log_normal\"\n\
+        center = 17000000000.0\nspread = 0.125\n\n\
+        [posterior.priors.dispersion]\ndistribution = \"normal\"\ncenter = 0.1\nspread = 0.05\n";
+    let expected = PosteriorSettings { draws: 500, max_evaluations: 100, priors };
+    let read = job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification);
+    assert_eq!(read.posterior, Some(expected));
+    let written = job_file::to_toml(&read);
+    assert!(written.ends_with(&format!("\n\n{text}")), "{written}");
+    // A uniform prior is the default, and is not written.
+    let uniform = "[posterior.priors]\ndispersion = { distribution = \"uniform\" }\n";
+    assert_eq!(given(uniform), Some(default));
+}
+
+#[test]
+fn the_evaluations_of_the_posterior_are_counted() {
+    let count = |text: &str| {
+        let text = format!("{MINIMAL}\n{text}");
+        job(&text, Format::Toml, JobKind::Identification).evaluations_max()
+    };
+    let searched = count("");
+    assert_eq!(count("[posterior]\nmax_evaluations = 100\n"), searched + 100);
+    assert_eq!(count("[search]\nmethod = \"posterior\"\n"), 400);
 }
 
 #[test]

@@ -7,8 +7,8 @@ use std::path::Path;
 use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Sampling, Search,
-    SearchMethod,
+    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior,
+    PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::probe::{Probe, Receivers, Source};
@@ -164,6 +164,28 @@ fn search() -> impl Strategy<Value = Search> {
     )
 }
 
+/// Asked for in one of two jobs; the laws of the priors, and their spreads as a share of the start.
+type AskedPosterior = Option<(u64, u64, [(PriorDistribution, f64); 7])>;
+
+fn posterior() -> impl Strategy<Value = AskedPosterior> {
+    let law = prop::sample::select(PriorDistribution::ALL.to_vec());
+    let laws = prop::array::uniform7((law, 0.01..1.0));
+    prop::option::of((100_u64..=20_000, 20_u64..=2_000, laws))
+}
+
+/// Returns the settings of a posterior whose priors are around the starts.
+fn around_starts(asked: AskedPosterior, parameters: &[Range; 7]) -> Option<PosteriorSettings> {
+    let (draws, max_evaluations, laws) = asked?;
+    let prior = |i: usize| match (laws[i], parameters[i]) {
+        ((law, share), Range::Free { start, .. }) => {
+            PosteriorPrior::new(law, start, share * start.abs())
+        }
+        _ => PosteriorPrior::default(),
+    };
+    let priors = std::array::from_fn(prior);
+    Some(PosteriorSettings { draws, max_evaluations, priors })
+}
+
 /// Almost always valid.
 fn job() -> impl Strategy<Value = JobSpecification> {
     let parameters = (
@@ -176,8 +198,10 @@ fn job() -> impl Strategy<Value = JobSpecification> {
         range(0.02, 0.3),
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
-    (any::<bool>(), setup(), data(), parameters, monte_carlo(), search(), objective).prop_map(
-        |(identification, setup, data, parameters, monte_carlo, mut search, objective)| {
+    let settings = (monte_carlo(), search(), objective, posterior());
+    (any::<bool>(), setup(), data(), parameters, settings).prop_map(
+        |(identification, setup, data, parameters, settings)| {
+            let (monte_carlo, mut search, objective, posterior) = settings;
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
             let parameters = [rho, e_l, nu_l, g_l, e_t, nu_t, delta];
             let by_simplex = search.method == SearchMethod::Simplex;
@@ -192,7 +216,8 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
             let searched = has_law && search.method == SearchMethod::Simplex;
             let objective = if searched { objective } else { Objective::Moments };
-            JobSpecification {
+            let posterior = around_starts(posterior, &parameters).filter(|_| identification);
+            let job = JobSpecification {
                 kind: KINDS[usize::from(!identification)],
                 setup,
                 data: identification.then_some(data),
@@ -200,8 +225,9 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 monte_carlo,
                 objective,
                 search,
-                posterior: None,
-            }
+                posterior,
+            };
+            job.with_implied_posterior()
         },
     )
 }
@@ -209,7 +235,12 @@ fn job() -> impl Strategy<Value = JobSpecification> {
 /// A number of a specification, replaced by another.
 type Edit = fn(&mut JobSpecification, f64);
 
-const EDITS: [Edit; 16] = [
+/// Sets the prior of the dispersion.
+fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
+    job.posterior.get_or_insert_default().priors[6] = prior;
+}
+
+const EDITS: [Edit; 18] = [
     |job, x| job.setup.layers.coupling.thickness = x,
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
@@ -226,6 +257,8 @@ const EDITS: [Edit; 16] = [
     |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
     |job, x| job.monte_carlo.scrambles = x as u64,
     |job, _| job.monte_carlo.sampling = Sampling::MonteCarlo,
+    |job, x| change_prior(job, PosteriorPrior::Normal { center: x, spread: 0.5 }),
+    |job, x| change_prior(job, PosteriorPrior::LogNormal { center: 0.25, spread: x }),
 ];
 
 /// Brackets of a text that the test itself may read as TOML.
@@ -291,6 +324,7 @@ properties! {
         for (edit, value) in edits {
             edit(&mut job, value);
         }
+        let job = job.with_implied_posterior();
         let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();
         let text = job_file::to_toml(&job);
         let found = match job_file::parse(&text, Format::Toml, Path::new(""), job.kind) {

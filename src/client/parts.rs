@@ -160,3 +160,6 @@ impl PointOutcomes {
 fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Malformed {
     Malformed::OutOfRange { field, value, allowed }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,6 +12,7 @@ use super::*;
 use crate::sample_result::{identification, propagation};
 
 mod jobs;
+mod posterior;
 mod simulation;
 
 fn printed(format: OutputFormat, print: impl FnOnce(&mut dyn Output)) -> String {

@@ -1,12 +1,13 @@
 use osteon_common::inference::Conclusions;
-use osteon_common::job::{Objective, Sampling, Search};
+use osteon_common::job::{Objective, PosteriorSettings, Sampling, Search};
 use osteon_common::results::{JobFailure, JobResult};
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::version::Program;
 
 use super::*;
+use crate::sample_result::drawn_posterior;
 
-fn specification() -> JobSpecification {
+pub(crate) fn specification() -> JobSpecification {
     let values = [
         ("density", 1598.8),
         ("longitudinal_young_modulus", 17.717e9),
@@ -23,7 +24,7 @@ fn specification() -> JobSpecification {
     job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
 }
 
-fn fetched(status: Status) -> Fetched {
+pub(crate) fn fetched(status: Status) -> Fetched {
     let result = JobResult {
         status,
         failure: (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint),
@@ -109,6 +110,31 @@ fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
     let refusal = refused(kind);
     let expected = "is the result of a propagation, not of a identification";
     assert!(refusal.contains(expected), "{refusal}");
+}
+
+#[test]
+fn the_draws_have_a_file_if_the_job_asks_for_them() {
+    let written = |change: &dyn Fn(&mut Fetched)| {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = ResultsDirectory::open(scratch.path()).unwrap();
+        let mut fetched = fetched(Status::Converged);
+        change(&mut fetched);
+        directory.write_results(JobKind::Identification, &fetched).unwrap();
+        let provenance = fs::read_to_string(scratch.path().join("provenance.json")).unwrap();
+        let text = fs::read_to_string(scratch.path().join(POSTERIOR)).ok();
+        assert_eq!(provenance.contains(POSTERIOR), text.is_some(), "{provenance}");
+        text.map(|text| text.lines().count())
+    };
+    let asks = |fetched: &mut Fetched| {
+        fetched.specification.posterior = Some(PosteriorSettings::default());
+    };
+    assert_eq!(written(&|_| {}), None);
+    assert_eq!(written(&asks), Some(1));
+    let found = |fetched: &mut Fetched| {
+        asks(fetched);
+        fetched.result.conclusions.posterior = Some(drawn_posterior());
+    };
+    assert_eq!(written(&found), Some(3));
 }
 
 #[test]

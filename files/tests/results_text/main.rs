@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
 mod groups;
+mod posterior;
 
 use std::path::Path;
 
@@ -184,6 +185,7 @@ fn the_result_says_how_it_was_searched_and_what_its_point_is() {
     check(SearchMethod::Newton, 2e-11, "the one with the least cost");
     check(SearchMethod::Simplex, 1e-12, "that match the data, the one where the simplex ended");
     check(SearchMethod::Simplex, 2e-11, "the one with the least cost");
+    check(SearchMethod::Posterior, 1e-12, "the one with the least cost");
 }
 
 #[test]

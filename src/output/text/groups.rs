@@ -3,6 +3,7 @@
 
 use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
+use osteon_common::visible;
 use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
 
 use super::result::scale;
@@ -197,7 +198,10 @@ fn note(group: &Group) -> Option<String> {
 }
 
 fn notes(groups: &[Group]) -> String {
-    let note = |group: &Group| Some(format!("* {}: {}\n", group.name, note(group)?));
+    let note = |group: &Group| {
+        let note = format!("* {}: {}", group.name, note(group)?);
+        Some(format!("{}\n", visible::line(&note)))
+    };
     let notes: String = groups.iter().filter_map(note).collect();
     if notes.is_empty() { notes } else { format!("\n{notes}") }
 }

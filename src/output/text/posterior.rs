@@ -30,7 +30,7 @@ fn fixed(found: &PosteriorReport) -> String {
     let level = glued("95 %");
     format!(
         "The data fix the mean velocity ({mean}) and the coefficient of variation ({variation}); \
-         {level}. Posterior of what follows from them:"
+         {level}. Posterior of the model behind them:"
     )
 }
 
@@ -56,8 +56,14 @@ fn row(name: &str, quantity: &QuantityPosterior, scale: f64, unit: &str) -> [Str
         name.to_owned(),
         format!("{}{unit}", measured(mean, deviation)),
         limits(quantity, scale, unit),
-        format!("{:.0} %", 100.0 * quantity.explained),
+        explained(quantity),
     ]
+}
+
+/// Returns the explained share in whole per cent; only what has no variance left is fully known.
+fn explained(quantity: &QuantityPosterior) -> String {
+    let percent = 100.0 * quantity.explained;
+    if (99.5..100.0).contains(&percent) { "> 99 %".to_owned() } else { format!("{percent:.0} %") }
 }
 
 /// Returns the ends of the 95 % interval, with two digits of the standard deviation.
@@ -75,7 +81,9 @@ fn limits(quantity: &QuantityPosterior, scale: f64, unit: &str) -> String {
 fn effort(found: &PosteriorReport) -> String {
     let PosteriorReport { evaluations, draws, .. } = found;
     let effective = found.effective_draws.map_or("?".to_owned(), |count| format!("{count:.0}"));
-    format!("{draws} draws, {effective} of them effective, from {evaluations} evaluations.")
+    format!(
+        "{effective} effective draws from {evaluations} evaluations; posterior.csv has {draws} draws."
+    )
 }
 
 /// Returns the warnings: an accuracy that was not reached, and data that the model hardly explains.

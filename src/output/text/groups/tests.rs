@@ -1,7 +1,7 @@
 use serde_json::{Value, json};
 
 use super::*;
-use crate::sample_result::put;
+use crate::sample_result::{posterior, put};
 
 /// Returns the table of groups with these keys; all other keys are those of an unknown uncertainty.
 fn table(groups: &[Value]) -> String {
@@ -82,6 +82,22 @@ fn a_table_of_groups_shows_intervals_and_reasons() {
     let mut unmatched = known("P04", 2e10);
     unmatched["identified"] = nothing;
     insta::assert_snapshot!(table(&[known("P01", 1.7717e10), outlier, lonely, unmatched]));
+}
+
+#[test]
+fn a_posterior_takes_the_place_of_the_intervals_of_a_group() {
+    let with = |name: &str, change: &dyn Fn(&mut Value)| {
+        let mut group = known(name, 1.7717e10);
+        group["posterior"] = serde_json::to_value(posterior()).unwrap();
+        change(&mut group);
+        group
+    };
+    let vague = with("P02", &|group| {
+        group["posterior"]["converged"] = json!(false);
+        group["posterior"]["reason"] = json!("the evaluations are used up");
+    });
+    let unmatched = with("P03", &|group| group["identified"]["matched"] = json!(false));
+    insta::assert_snapshot!(table(&[with("P01", &|_| {}), vague, unmatched]));
 }
 
 #[test]

@@ -36,5 +36,8 @@ fn numbers_that_are_none_are_unknown() {
     found.mean.interval_95 = [None, None];
     found.bulk_velocity.standard_deviation = None;
     let text = text(&found);
-    assert!(text.contains("the mean velocity (unknown)") && text.contains("? of them"), "{text}");
+    assert!(
+        text.contains("the mean velocity (unknown)") && text.contains("? effective draws"),
+        "{text}"
+    );
 }
