@@ -71,7 +71,7 @@ fn a_minimal_job_has_the_documented_defaults() {
     let expected = JobSpecification {
         kind: JobKind::Identification,
         setup: DEFAULT_SETUP,
-        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: [
             Range::Fixed(1598.8),
             Range::Free { start: 15e9, lower: 12e9, upper: 25e9 },
@@ -147,7 +147,7 @@ fn a_complete_job_means_what_it_says() {
         }
     );
     // An integer stands for a number.
-    assert_eq!(given.data, Some(Data::Velocities(vec![3900.5, 4000.0, 3950.25])));
+    assert_eq!(given.data, Some(Data::from_velocities(vec![3900.5, 4000.0, 3950.25])));
     assert_eq!(given.range(Parameter::LongitudinalShearModulus), Range::Fixed(4.795e9));
     assert_eq!(
         given.range(Parameter::TransversePoissonRatio),

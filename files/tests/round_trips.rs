@@ -114,20 +114,20 @@ fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
 /// Data that points within the bounds can come near to.
 fn data() -> impl Strategy<Value = Data> {
     prop_oneof![
-        prop::collection::vec(2e3..6e3, 2..40).prop_map(Data::Velocities),
+        prop::collection::vec(2e3..6e3, 2..40).prop_map(Data::from_velocities),
         prop::collection::btree_map(
             "[ -~äβ骨\"\\\\]{1,20}",
             prop::collection::vec(2e3..6e3, 2..9),
             1..5
         )
         .prop_map(|groups| {
-            let group = |(name, velocities)| Group { name, velocities };
-            Data::Groups(groups.into_iter().map(group).collect())
+            let group = |(name, velocities): (String, _)| Group::new(name, velocities);
+            Data::from_groups(groups.into_iter().map(group).collect())
         }),
-        (2e3..6e3, 0.02..0.1).prop_map(|(mean, coefficient_of_variation)| Data::Moments {
+        (2e3..6e3, 0.02..0.1).prop_map(|(mean, coefficient_of_variation)| Data::from_moments(
             mean,
             coefficient_of_variation
-        }),
+        )),
     ]
 }
 
@@ -189,7 +189,8 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                     *prior = Some(Prior { value: start, weight: 1.0 + lower.abs() / 7.0 });
                 }
             }
-            let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
+            let has_law =
+                (!data.is_grouped() && !data.has_only_moments()) && monte_carlo.realizations > 1;
             let searched = has_law && search.method == SearchMethod::Simplex;
             let objective = if searched { objective } else { Objective::Moments };
             JobSpecification {
@@ -223,7 +224,7 @@ const EDITS: [Edit; 16] = [
     |job, x| job.parameters[5] = Range::Fixed(x),
     |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
     |job, x| job.search.initial_step = x,
-    |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
+    |job, x| job.data = Some(Data::from_velocities(vec![x, 1.0])),
     |job, x| job.monte_carlo.scrambles = x as u64,
     |job, _| job.monte_carlo.sampling = Sampling::MonteCarlo,
 ];
@@ -287,7 +288,7 @@ properties! {
         ),
     ) {
         job.kind = JobKind::Identification;
-        job.data.get_or_insert(Data::Moments { mean: 1.0, coefficient_of_variation: 1.0 });
+        job.data.get_or_insert(Data::from_moments(1.0, 1.0));
         for (edit, value) in edits {
             edit(&mut job, value);
         }

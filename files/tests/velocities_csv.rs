@@ -46,7 +46,7 @@ fn warnings(text: &str, more: &str) -> Vec<String> {
 
 #[test]
 fn what_is_read() {
-    let expected = Some(Data::Velocities(vec![3900.5, 4000.0]));
+    let expected = Some(Data::from_velocities(vec![3900.5, 4000.0]));
     for text in [
         "velocity\n3900.5\n4000\n",
         "velocity\r\n3900.5\r\n4e3",
@@ -67,8 +67,9 @@ fn groups_stand_in_the_order_in_which_they_begin() {
     let group = |(name, velocities): (&str, [f64; 2])| Group {
         name: name.to_owned(),
         velocities: velocities.to_vec(),
+        subjects: None,
     };
-    let expected = Data::Groups(groups.map(group).to_vec());
+    let expected = Data::from_groups(groups.map(group).to_vec());
     assert_eq!(read_as(text.as_bytes(), "group = \"bone\""), Ok(Some(expected)));
 }
 
@@ -76,7 +77,7 @@ fn groups_stand_in_the_order_in_which_they_begin() {
 fn a_group_of_one_velocity_is_a_group() {
     let read =
         read_as(b"bone,velocity\na,3900\na,3950\nb,4000\nc,4010\nc,4010\n", "group = \"bone\"");
-    let Ok(Some(Data::Groups(groups))) = read else { panic!("{read:?}") };
+    let groups = read.unwrap().unwrap().groups().to_vec();
     let unsearched: Vec<_> = groups.iter().map(Group::no_variation).collect();
     let equal = NoVariation::AllEqual { count: 2, velocity: 4010.0 };
     assert_eq!(unsearched, [None, Some(NoVariation::OneVelocity), Some(equal)]);

@@ -42,17 +42,18 @@ fn data() -> impl Strategy<Value = Data> {
         // The fixed first value keeps the velocities from being all equal.
         proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
             velocities.insert(0, 1999.0);
-            Data::Velocities(velocities)
+            Data::from_velocities(velocities)
         }),
         proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
             let group = |(i, name): (usize, &String)| Group {
                 name: format!("{name}{i}"),
                 velocities: vec![1999.0, 2000.0 + i as f64],
+                subjects: None,
             };
-            Data::Groups(names.iter().enumerate().map(group).collect())
+            Data::from_groups(names.iter().enumerate().map(group).collect())
         }),
         (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
-            Data::Moments { mean, coefficient_of_variation }
+            Data::from_moments(mean, coefficient_of_variation)
         }),
     ]
 }
@@ -138,7 +139,7 @@ fn message() -> v1::JobSpecification {
     to_message(&JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: std::array::from_fn(free),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
