@@ -228,7 +228,7 @@ mod tests {
     fn names_are_numbered_by_their_first_appearance() {
         assert_eq!(numbered(["b", "a", "b", "c", "a"]), [0, 1, 0, 2, 1]);
         assert_eq!(numbered([7_u32, 7, 3]), [0, 0, 1]);
-        assert_eq!(numbered::<u32>([]), []);
+        assert!(numbered::<u32>([]).is_empty());
     }
 
     #[test]

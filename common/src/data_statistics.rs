@@ -22,10 +22,11 @@ impl DataSummary {
     /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
     /// of a second.
     pub fn from_data(data: &Data, set: usize) -> Self {
+        let given = data.set(set);
         Self {
             moments: data.moments(set),
-            count: data.count(set),
-            intervals: data.set(set).as_ref().and_then(moment_intervals),
+            count: given.map(|given| given.velocities.len() as u64),
+            intervals: given.as_ref().and_then(moment_intervals),
         }
     }
 }

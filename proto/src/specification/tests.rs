@@ -2,6 +2,7 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Sampling, SearchMethod};
+use osteon_common::moments::Moments;
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_files::document::Format;
 use osteon_files::job_file;
@@ -38,7 +39,8 @@ fn parameters() -> impl Strategy<Value = [Range; 7]> {
 }
 
 fn data() -> impl Strategy<Value = Data> {
-    prop_oneof![
+    let noise = (any::<bool>(), 2_usize..9, 0.0..0.9);
+    let exact = prop_oneof![
         // The fixed first value keeps the velocities from being all equal.
         proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
             velocities.insert(0, 1999.0);
@@ -55,7 +57,31 @@ fn data() -> impl Strategy<Value = Data> {
         (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
             Data::from_moments(mean, coefficient_of_variation)
         }),
-    ]
+    ];
+    (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
+}
+
+/// Adds what may be known of the noise, by chance.
+fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
+    if !known {
+        return data;
+    }
+    let numbers = |count: usize| Some(numbered((0..count).map(|k| (k * k) % few)));
+    let smallest = (0..data.sets()).map(|set| {
+        let Moments { mean, coefficient_of_variation } = data.moments(set);
+        mean * coefficient_of_variation
+    });
+    data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
+    match &mut data.measurements {
+        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Groups(groups) => {
+            for group in groups.iter_mut().step_by(2) {
+                group.subjects = numbers(group.velocities.len());
+            }
+        }
+        Measurements::Moments { count, .. } => *count = Some(few as u64),
+    }
+    data
 }
 
 fn solver() -> impl Strategy<Value = SolverSettings> {
