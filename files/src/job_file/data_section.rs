@@ -123,12 +123,7 @@ fn given(
             None
         }
     };
-    let repeatability = match table.has("repeatability") {
-        true => reader.number(&table, "repeatability"),
-        false => Some(0.0),
-    };
-    // A wrong type is recorded; the rest of the data can still be checked.
-    let repeatability = repeatability.unwrap_or(0.0);
+    let repeatability = reader.number(&table, "repeatability").unwrap_or(0.0);
     let data = measurements.map(|measurements| Data { measurements, repeatability });
     if kind == JobKind::Identification {
         return data;
