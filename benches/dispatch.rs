@@ -227,7 +227,7 @@ async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(Vec<Point>
 fn identification(propagation: &JobSpecification) -> JobSpecification {
     let mut job = propagation.clone();
     job.kind = JobKind::Identification;
-    job.data = Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.0271 });
+    job.data = Some(Data::from_moments(3906.0, 0.0271));
     for (parameter, lower, upper) in
         [(Parameter::LongitudinalYoungModulus, 12e9, 25e9), (Parameter::Dispersion, 0.02, 0.3)]
     {

@@ -190,7 +190,7 @@ impl ResultsDirectory {
                 let history = results_csv::history(&fetched.specification, &fetched.history);
                 files.write(HISTORY, &history)?;
             }
-            if matches!(fetched.specification.data, Some(Data::Groups(_))) {
+            if fetched.specification.data.as_ref().is_some_and(Data::is_grouped) {
                 let Fetched { result, history, .. } = fetched;
                 let groups = results_csv::groups(&fetched.specification, result, history);
                 files.write(GROUPS, &groups)?;
@@ -250,7 +250,7 @@ pub(crate) fn given(path: &Path) -> Result<Option<String>, CommandFailure> {
 
 /// Returns the table of the realizations at the best point, or at those of the groups.
 fn realizations(fetched: &Fetched) -> String {
-    if matches!(fetched.specification.data, Some(Data::Groups(_))) {
+    if fetched.specification.data.as_ref().is_some_and(Data::is_grouped) {
         let groups = fetched.result.groups.iter();
         let left_out =
             |group: &&GroupResult| group.best.as_ref().is_some_and(|best| best.outcomes.is_empty());

@@ -67,7 +67,7 @@ fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     let names: Vec<&str> = data.names().collect();
     let mut missed = 0;
     for set in 0..data.sets() {
-        let count = data.velocities(set).map(<[f64]>::len);
+        let count = data.count(set);
         let of_set = solved.missed(specification, data.moments(set), count);
         missed += usize::from(!of_set.is_empty());
         if missed > GROUPS_LISTED_MAX {
@@ -122,7 +122,7 @@ impl ClosedFormMoments {
         &self,
         specification: &JobSpecification,
         data: Moments,
-        count: Option<usize>,
+        count: Option<u64>,
     ) -> Vec<(&'static str, String)> {
         let ranges = &specification.parameters;
         let count = count.map_or(f64::INFINITY, |count| count as f64);

@@ -6,7 +6,7 @@
 
 use crate::bulk_velocity::bulk_velocity;
 use crate::case::Setup;
-use crate::job::{Data, JobKind, JobSpecification, Range};
+use crate::job::{JobKind, JobSpecification, Measurements, Range};
 use crate::moments::Moments;
 use crate::parameters::{Parameter, Point};
 use crate::plausible::short;
@@ -26,7 +26,7 @@ const MEAN_EXCESS_MAX: f64 = 2.0;
 const VARIATION_EXCESS_MAX: f64 = 5.0;
 /// With fewer velocities than this the coefficient of variation can be that far off by chance, and is
 /// not checked.
-const VELOCITIES_MIN: usize = 10;
+const VELOCITIES_MIN: u64 = 10;
 /// If a receiver is nearer to the source than this factor times the sum of both heights above the bone,
 /// a reflection may arrive first, and its apparent velocity has no upper limit.
 const NEAR_FACTOR: f64 = 2.0;
@@ -111,18 +111,18 @@ pub(crate) fn unattainable_data(
         AttainableMoments::from_ranges(&specification.parameters, &specification.setup);
     let mut first = None;
     for set in 0..data.sets() {
-        let count = data.velocities(set).map(<[f64]>::len);
+        let count = data.count(set);
         // If other groups can be matched, one that cannot be is not an error.
         let found = attainable.unattainable_moment(data.moments(set), count)?;
         first.get_or_insert(found);
     }
     let (moment, value, reached) = first?;
-    Some(match data {
-        Data::Moments { .. } => (moment.field(), format!("is {value:?}; {reached}")),
-        Data::Velocities(_) => {
+    Some(match &data.measurements {
+        Measurements::Moments { .. } => (moment.field(), format!("is {value:?}; {reached}")),
+        Measurements::Velocities { .. } => {
             ("data.velocities", format!("their {} is {}; {reached}", moment.name(), short(value)))
         }
-        Data::Groups(groups) => (
+        Measurements::Groups(groups) => (
             "data.groups",
             format!(
                 "none of the {} groups can be matched; the {} of the first is {}; {reached}",
@@ -163,7 +163,7 @@ impl AttainableMoments {
     fn unattainable_moment(
         &self,
         data: Moments,
-        count: Option<usize>,
+        count: Option<u64>,
     ) -> Option<(MomentKind, f64, String)> {
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
         let (lowest, highest) = self.velocity;

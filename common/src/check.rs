@@ -3,6 +3,7 @@
 //! Fields are named as in a job file, e.g. `layers.coupling.density`. A field that is already known
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
+mod data;
 mod job;
 mod posterior;
 mod priors;
@@ -13,7 +14,8 @@ mod value;
 use crate::job::JobSpecification;
 use crate::violations::Violations;
 
-pub use self::job::{DATA_FORMS, VELOCITIES_MIN, VELOCITY, data, job, job_from, no_data};
+pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
+pub use self::job::{job, job_from};
 pub use self::posterior::posterior;
 pub use self::setup::setup;
 pub use self::value::{number, quantity};

@@ -92,7 +92,8 @@ pub struct Sensitivity {
 /// Relative standard errors of both moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseErrors {
-    /// Errors due to the noise of the data; `None` if only their moments are known.
+    /// Errors due to the noise of the data; `None` if only their moments are known, and not the number
+    /// of velocities behind them.
     pub data: Option<Moments>,
     /// Errors due to sampling.
     pub sampling: Moments,

@@ -1,24 +1,15 @@
 //! Statistics of measured velocities: how precisely they determine their moments, and whether they
 //! can come from the model's law.
 
-use rand_chacha::ChaCha20Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+mod intervals;
 
 use crate::job::{Data, Sampling};
-use crate::moments::{ConfidenceInterval, KolmogorovTest, MomentIntervals, Moments};
+use crate::moments::KolmogorovTest;
 use crate::outcome::Outcome;
-use crate::quantile::quantile;
 use crate::results::DataSummary;
-use crate::special::standard_normal_quantile;
-use crate::statistics::{Sum, moments};
 
-/// Probability with which an interval contains the moment of the law.
-pub const CONFIDENCE: f64 = 0.95;
-/// Number of bootstrap resamples.
-const RESAMPLES: usize = 2000;
-/// Largest number of velocities that are resampled, which takes a fraction of a second; for more,
-/// the normal approximation of their moments gives the same result.
-const RESAMPLED_MAX: usize = 5_000;
+pub use self::intervals::{CONFIDENCE, moment_intervals};
+
 /// Number of independent draws to which a Sobol' point is equivalent for a distribution function,
 /// on the safe side. Measured at the paper's optimum by the scatter of the fractions of velocities
 /// below their 7, 30, 50 and 90 % quantiles over 40 scrambles: 14 to 52 at the dispersion 0.1 and 8
@@ -27,41 +18,15 @@ const SOBOL_WORTH: f64 = 10.0;
 /// Terms of Kolmogorov's series; the next one is smaller than rounding errors.
 const SERIES_TERMS: usize = 12;
 
-/// Returns confidence intervals by the bootstrap, bias-corrected and accelerated (B. Efron, J. Am.
-/// Stat. Assoc. 82 (1987)): skewed laws and small samples get intervals that are not symmetric.
-///
-/// `None` for fewer than two different velocities. The resamples are the same for the same number
-/// of velocities and do not depend on the seed of a job.
-pub fn moment_intervals(velocities: &[f64]) -> Option<MomentIntervals> {
-    let found = moments(velocities)?;
-    if found.coefficient_of_variation.is_nan() || found.coefficient_of_variation <= 0.0 {
-        return None;
-    }
-    let influences = Influences::from_velocities(velocities, found);
-    if velocities.len() > RESAMPLED_MAX {
-        return Some(influences.normal(found));
-    }
-    let [means, variations] = resampled(velocities)?;
-    Some(MomentIntervals {
-        mean: accelerated(means, found.mean, &influences.mean)?,
-        coefficient_of_variation: accelerated(
-            variations,
-            found.coefficient_of_variation,
-            &influences.coefficient_of_variation,
-        )?,
-        level: CONFIDENCE,
-    })
-}
-
 impl DataSummary {
     /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
     /// of a second.
     pub fn from_data(data: &Data, set: usize) -> Self {
-        let velocities = data.velocities(set);
+        let given = data.set(set);
         Self {
             moments: data.moments(set),
-            count: velocities.map(|velocities| velocities.len() as u64),
-            intervals: velocities.and_then(moment_intervals),
+            count: given.map(|given| given.velocities.len() as u64),
+            intervals: given.as_ref().and_then(moment_intervals),
         }
     }
 }
@@ -70,6 +35,8 @@ impl DataSummary {
 /// which are the successes among `outcomes` (N. V. Smirnov, Ann. Math. Stat. 19 (1948)). Uses the
 /// limit law at √n_e + 0.12 + 0.11/√n_e times the distance (M. A. Stephens, J. R. Stat. Soc. B 32
 /// (1970)). `None` if there are no data, or no successes.
+///
+/// The data have to be independent, and without scatter that the model does not contain.
 ///
 /// n_e = n m / (n + m) for n data and m independent realizations; a Sobol' point counts as several
 /// independent realizations.
@@ -90,94 +57,6 @@ pub fn kolmogorov_test(
     let distance = distance(&sorted(data.iter().copied()), &model);
     let root = (n * m / (n + m)).sqrt();
     Some(KolmogorovTest { distance, p_value: exceeded((root + 0.12 + 0.11 / root) * distance) })
-}
-
-/// Influence of each velocity on the moments, multiplied by their number.
-struct Influences {
-    mean: Vec<f64>,
-    coefficient_of_variation: Vec<f64>,
-}
-
-impl Influences {
-    fn from_velocities(velocities: &[f64], at: Moments) -> Self {
-        let Moments { mean, coefficient_of_variation: variation } = at;
-        let variance = (variation * mean) * (variation * mean);
-        let of_variation = |velocity: f64| {
-            let deviation = velocity - mean;
-            variation * (0.5 * (deviation * deviation / variance - 1.0) - deviation / mean)
-        };
-        Self {
-            mean: velocities.iter().map(|velocity| velocity - mean).collect(),
-            coefficient_of_variation: velocities.iter().map(|&v| of_variation(v)).collect(),
-        }
-    }
-
-    /// Returns intervals by the normal approximation of the moments.
-    fn normal(&self, at: Moments) -> MomentIntervals {
-        let interval = |value: f64, influences: &[f64]| {
-            let n = influences.len() as f64;
-            let squares = sum(influences.iter().map(|influence| influence * influence));
-            let half = standard_normal_quantile(0.5 * (1.0 + CONFIDENCE)) * squares.sqrt() / n;
-            ConfidenceInterval { low: value - half, high: value + half }
-        };
-        MomentIntervals {
-            mean: interval(at.mean, &self.mean),
-            coefficient_of_variation: interval(
-                at.coefficient_of_variation,
-                &self.coefficient_of_variation,
-            ),
-            level: CONFIDENCE,
-        }
-    }
-}
-
-/// Returns the means and coefficients of variation of the resamples.
-fn resampled(velocities: &[f64]) -> Option<[Vec<f64>; 2]> {
-    let mut rng = ChaCha20Rng::from_seed([0; 32]);
-    let mut found = [Vec::with_capacity(RESAMPLES), Vec::with_capacity(RESAMPLES)];
-    let mut resample = vec![0.0; velocities.len()];
-    for _ in 0..RESAMPLES {
-        for velocity in &mut resample {
-            // The high half of a product of 64 bits with n: uniform to one part in 2⁶⁴/n.
-            let at = (u128::from(rng.next_u64()) * velocities.len() as u128) >> 64;
-            *velocity = velocities[at as usize];
-        }
-        let Moments { mean, coefficient_of_variation } = moments(&resample)?;
-        found[0].push(mean);
-        found[1].push(coefficient_of_variation);
-    }
-    Some(found)
-}
-
-/// Returns the interval of resampled values around the value `found` for the sample.
-fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<ConfidenceInterval> {
-    values.sort_unstable_by(f64::total_cmp);
-    let count = values.len() as f64;
-    let below = values.partition_point(|&value| value < found) as f64;
-    // Kept half a resample away from both ends, where the normal law has no quantile.
-    let bias = standard_normal_quantile((below.clamp(0.5, count - 0.5)) / count);
-    let squares = sum(influences.iter().map(|influence| influence * influence));
-    let cubes = sum(influences.iter().map(|i| i * i * i));
-    // At most a sixth, and `shifted` at most 5.3: the denominator below stays above 0.
-    let acceleration = cubes / (6.0 * squares * squares.sqrt());
-    let end = |probability: f64| {
-        let shifted = bias + standard_normal_quantile(probability);
-        let level = normal_probability(bias + shifted / (1.0 - acceleration * shifted));
-        quantile(&values, level)
-    };
-    let tail = 0.5 * (1.0 - CONFIDENCE);
-    Some(ConfidenceInterval { low: end(tail)?, high: end(1.0 - tail)? })
-}
-
-/// Returns the probability of the standard normal law below `z`.
-fn normal_probability(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
-}
-
-fn sum(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sum = Sum::default();
-    values.for_each(|value| sum.add(value));
-    sum.total()
 }
 
 fn sorted(sample: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -231,66 +110,12 @@ mod tests {
     use crate::outcome::FailureKind;
     use crate::parameters::Point;
     use crate::realization::Ensemble;
+    use crate::special::standard_normal_quantile;
 
     /// Draws `count` values of a normal law with mean 3900 and coefficient of variation 0.03.
     fn normal(seed: u64, count: usize) -> Vec<f64> {
         let germs = (0..).flat_map(|index| *Germs::draw(seed, index).values());
         germs.take(count).map(|u| 3900.0 * (1.0 + 0.03 * standard_normal_quantile(u))).collect()
-    }
-
-    fn holds(interval: ConfidenceInterval, value: f64) -> bool {
-        interval.low <= value && value <= interval.high
-    }
-
-    /// Counts in how many of `repetitions` each interval contains the law's moment.
-    fn coverage(count: usize, repetitions: u64) -> [u64; 2] {
-        let mut covered = [0, 0];
-        for seed in 0..repetitions {
-            let intervals = moment_intervals(&normal(1000 + seed, count)).unwrap();
-            covered[0] += u64::from(holds(intervals.mean, 3900.0));
-            covered[1] += u64::from(holds(intervals.coefficient_of_variation, 0.03));
-        }
-        covered
-    }
-
-    #[test]
-    fn intervals_hold_the_moments_of_the_law_as_often_as_they_say() {
-        // Of 200 repetitions 190 are expected, with a standard deviation of 3. For small samples
-        // the bootstrap's intervals are too short.
-        for (count, least) in [(40, 176), (300, 181)] {
-            let covered = coverage(count, 200);
-            assert!(covered.iter().all(|&c| c >= least && c <= 199), "{count}: {covered:?}");
-        }
-    }
-
-    #[test]
-    fn many_velocities_have_the_intervals_of_the_normal_law() {
-        let few = normal(1, RESAMPLED_MAX);
-        let by_bootstrap = moment_intervals(&few).unwrap();
-        let by_law = Influences::from_velocities(&few, moments(&few).unwrap())
-            .normal(moments(&few).unwrap());
-        let close = |a: f64, b: f64, width: f64| (a - b).abs() < 0.06 * width;
-        for (a, b) in [
-            (by_bootstrap.mean, by_law.mean),
-            (by_bootstrap.coefficient_of_variation, by_law.coefficient_of_variation),
-        ] {
-            let width = b.high - b.low;
-            assert!(close(a.low, b.low, width) && close(a.high, b.high, width), "{a:?} {b:?}");
-        }
-        assert!(moment_intervals(&normal(1, RESAMPLED_MAX + 1)).is_some());
-    }
-
-    #[test]
-    fn velocities_that_do_not_differ_have_no_interval() {
-        assert_eq!(moment_intervals(&[]), None);
-        assert_eq!(moment_intervals(&[3900.0]), None);
-        assert_eq!(moment_intervals(&[3900.0; 5]), None);
-    }
-
-    #[test]
-    fn the_same_velocities_have_the_same_interval() {
-        let velocities = normal(3, 50);
-        assert_eq!(moment_intervals(&velocities), moment_intervals(&velocities));
     }
 
     #[test]

@@ -14,7 +14,8 @@
 //!
 //! C is the sum of two parts. The data's part, known if the velocities are, is the covariance of
 //! the influences of each velocity on both logarithms (the delta method, without the assumption of
-//! a normal law). The model's part has the squares of the reported relative standard errors on its
+//! a normal law), or of the sums of influences over each subject, if subjects are named. Of moments
+//! with a number of velocities it is that of a normal law. The model's part has the squares of the reported relative standard errors on its
 //! diagonal; the correlation of the two errors is neglected.
 
 mod conclusions;
@@ -36,7 +37,7 @@ use self::linear::{Linear, NoiseResponse};
 
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
-pub use self::noise::{Noise, noise};
+pub use self::noise::{DataNoise, Noise, data_noise, noise};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
 pub use crate::conclusions::{

@@ -1,11 +1,10 @@
 //! The specification of a job: everything that its result depends on.
 
-use thiserror::Error;
-
 use crate::case::Setup;
 use crate::fields::{Key, Section};
 use crate::parameters::{Parameter, Point};
 
+pub use crate::data::{Data, Group, Measurements, NoVariation, VelocitySet};
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
 pub use crate::posterior_settings::{
     DRAWS_MAX, POSTERIOR_EVALUATIONS_MAX, PosteriorPrior, PosteriorSettings, PriorDistribution,
@@ -27,101 +26,6 @@ impl JobKind {
         match self {
             Self::Identification => "identification",
             Self::Propagation => "propagation",
-        }
-    }
-}
-
-/// The measured velocities, or their moments.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Data {
-    /// The velocities themselves, m/s, each finite and above 0, at least two.
-    Velocities(Vec<f64>),
-    /// Several sets of velocities. Each group is identified separately, in this order; at least one
-    /// of them has two different velocities.
-    Groups(Vec<Group>),
-    /// Their moments.
-    Moments {
-        /// Mean, m/s.
-        mean: f64,
-        /// Coefficient of variation.
-        coefficient_of_variation: f64,
-    },
-}
-
-/// The measured velocities of one group: a bone, a patient, a site.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
-    /// Unique name; not empty, no control characters.
-    pub name: String,
-    /// Velocities, m/s, each finite and above 0, at least one.
-    pub velocities: Vec<f64>,
-}
-
-/// Reason why velocities have no coefficient of variation that a model could match.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-pub enum NoVariation {
-    /// There is only one velocity.
-    #[error("only one velocity: {NEEDS_TWO}")]
-    OneVelocity,
-    /// All velocities are equal.
-    #[error("all {count} velocities are {velocity:?} m/s: {NEEDS_TWO}")]
-    AllEqual {
-        /// Number of velocities.
-        count: usize,
-        /// The velocity, m/s.
-        velocity: f64,
-    },
-}
-
-const NEEDS_TWO: &str = "a coefficient of variation needs at least two different ones";
-
-impl Group {
-    /// Returns the reason why this group cannot be searched; `None` if it can.
-    pub fn no_variation(&self) -> Option<NoVariation> {
-        match self.velocities.as_slice() {
-            [_] => Some(NoVariation::OneVelocity),
-            [velocity, others @ ..] if others.iter().all(|other| other == velocity) => {
-                Some(NoVariation::AllEqual { count: self.velocities.len(), velocity: *velocity })
-            }
-            _ => None,
-        }
-    }
-}
-
-impl Data {
-    /// Returns the groups; none if the data are not grouped.
-    pub fn groups(&self) -> &[Group] {
-        match self {
-            Self::Groups(groups) => groups,
-            Self::Velocities(_) | Self::Moments { .. } => &[],
-        }
-    }
-
-    /// Returns the number of sets of data, each of which is identified separately.
-    pub fn sets(&self) -> usize {
-        match self {
-            Self::Groups(groups) => groups.len(),
-            Self::Velocities(_) | Self::Moments { .. } => 1,
-        }
-    }
-
-    /// Returns the number of sets that can be searched.
-    pub fn searched(&self) -> usize {
-        let unsearched = self.groups().iter().filter(|group| group.no_variation().is_some());
-        self.sets() - unsearched.count()
-    }
-
-    /// Returns the name of each group; none if the data are not grouped.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.groups().iter().map(|group| group.name.as_str())
-    }
-
-    /// Returns the velocities of a set, by its number; `None` if only their moments are known.
-    pub fn velocities(&self, set: usize) -> Option<&[f64]> {
-        match self {
-            Self::Velocities(velocities) => Some(velocities),
-            Self::Groups(groups) => groups.get(set).map(|group| group.velocities.as_slice()),
-            Self::Moments { .. } => None,
         }
     }
 }

@@ -16,6 +16,7 @@ pub mod bulk_velocity;
 pub mod case;
 pub mod check;
 pub mod conclusions;
+pub mod data;
 pub mod data_likelihood;
 pub mod data_statistics;
 pub mod digest;

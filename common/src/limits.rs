@@ -16,6 +16,11 @@ pub const SEED_MAX: u64 = (1 << 63) - 1;
 pub const EVALUATIONS_MAX: u64 = 1_000_000;
 /// Maximum number of measured velocities of one job.
 pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
+/// Maximum number of measured velocities of one job with a subject: with both lists inlined, a job
+/// file has as many values as with [`DATA_VELOCITIES_MAX`] velocities.
+pub const DATA_SUBJECTS_MAX: usize = DATA_VELOCITIES_MAX / 2;
+/// Maximum number of velocities behind given moments.
+pub const DATA_COUNT_MAX: u64 = 1_000_000_000;
 /// Maximum number of groups of measured velocities of one job.
 pub const GROUPS_MAX: usize = 1000;
 /// Maximum number of searches of one set of data, each from a different start.

@@ -9,6 +9,9 @@ pub struct Origin {
     pub path: PathBuf,
     /// Line of each velocity of each set, from 1.
     pub lines: Vec<Vec<u32>>,
+    /// Name of a column that seems to name the subject of each velocity, and is not used: within a
+    /// set it has several values of which some repeat.
+    pub unused_subjects: Option<String>,
 }
 
 impl Origin {

@@ -10,9 +10,10 @@ mod controlled;
 mod failure_bias;
 mod kernel_density;
 mod likelihood;
+mod measured;
 mod sum;
 
-use crate::job::{Data, MonteCarlo, Sampling};
+use crate::job::{MonteCarlo, Sampling};
 use crate::moments::{Estimate, Moments};
 use crate::outcome::Outcome;
 use crate::parameters::Point;
@@ -23,6 +24,7 @@ use self::controlled::Controlled;
 
 pub use self::failure_bias::failure_bias;
 pub use self::likelihood::{likelihood_cost, likelihood_error};
+pub use self::measured::{covariance_of_logarithms, without_repeatability};
 pub(crate) use self::sum::Sum;
 
 /// Returns mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no
@@ -39,38 +41,6 @@ pub(crate) use self::sum::Sum;
 /// ```
 pub fn moments(velocities: &[f64]) -> Option<Moments> {
     central(velocities.iter().copied()).map(|central| central.moments())
-}
-
-impl Data {
-    /// Returns the moments of a set, by its number; NaN if there is no such set.
-    pub fn moments(&self, set: usize) -> Moments {
-        if let Self::Moments { mean, coefficient_of_variation } = *self {
-            return Moments { mean, coefficient_of_variation };
-        }
-        self.velocities(set).and_then(moments).unwrap_or(Moments::UNKNOWN)
-    }
-}
-
-/// Returns the covariance of the logarithms of mean and coefficient of variation of independent
-/// velocities, by the delta method, or `None` if there are no two different ones.
-///
-/// It is the covariance of the mean of their influences, with division by N - 1.
-pub fn covariance_of_logarithms(velocities: &[f64]) -> Option<[[f64; 2]; 2]> {
-    let central = central(velocities.iter().copied()).filter(Central::scatters)?;
-    let moments = central.moments();
-    let mut sums = [Sum::default(); 3];
-    for &velocity in velocities {
-        let [mean, variation] = central.influence(velocity);
-        let [mean, variation] = [mean / moments.mean, variation / moments.coefficient_of_variation];
-        for (sum, product) in
-            sums.iter_mut().zip([mean * mean, mean * variation, variation * variation])
-        {
-            sum.add(product);
-        }
-    }
-    let pairs = central.count * (central.count - 1.0);
-    let [mean, both, variation] = sums.map(|sum| sum.total() / pairs);
-    Some([[mean, both], [both, variation]])
 }
 
 /// Returns the moments over the successes of an evaluation at `point` with their standard errors,

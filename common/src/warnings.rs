@@ -5,7 +5,7 @@ use std::fmt;
 use crate::case::{Case, Setup};
 use crate::field_path::entry_path;
 use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
-use crate::job::{Data, JobSpecification, Range};
+use crate::job::{Data, JobSpecification, Measurements, Range};
 use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
@@ -16,6 +16,9 @@ use crate::plausible::{self, PlausibleRange, short};
 const OUTLIER: f64 = 3.0;
 /// Maximum number of outliers that are listed for one set.
 const OUTLIERS_LISTED_MAX: usize = 5;
+/// Number of equal velocities in a row that are not expected by chance, and smallest number of
+/// velocities in a block that repeats.
+const COPIES_MIN: usize = 5;
 /// Maximum number of groups with individual warnings.
 const GROUPS_LISTED_MAX: usize = 5;
 
@@ -118,16 +121,25 @@ impl Warnings {
     }
 
     fn data(&mut self, data: &Data, origin: Option<&Origin>) {
-        match data {
-            Data::Moments { mean, coefficient_of_variation } => {
+        if let Some(column) = origin.and_then(|origin| origin.unused_subjects.as_deref()) {
+            self.add(
+                "data.velocities",
+                format!(
+                    "the column {column:?} of the file repeats; if these are velocities of the same \
+                     subject, name it: subject = {column:?}"
+                ),
+            );
+        }
+        match &data.measurements {
+            Measurements::Moments { mean, coefficient_of_variation, .. } => {
                 self.number("data.mean", *mean, &plausible::VELOCITY);
                 let variation = *coefficient_of_variation;
                 self.number("data.coefficient_of_variation", variation, &plausible::VARIATION);
             }
-            Data::Velocities(velocities) => {
+            Measurements::Velocities { velocities, .. } => {
                 self.velocities("data.velocities", velocities, (origin, 0));
             }
-            Data::Groups(groups) => {
+            Measurements::Groups(groups) => {
                 let mut warned = 0;
                 for (set, group) in groups.iter().enumerate() {
                     let mut of_group = Self::default();
@@ -146,6 +158,30 @@ impl Warnings {
         }
     }
 
+    /// Doubts that all velocities of a set are measurements of their own.
+    fn copies(&mut self, field: &str, velocities: &[f64], place: (Option<&Origin>, usize)) {
+        if let Some((first, count)) = longest_run(velocities).filter(|run| run.1 >= COPIES_MIN) {
+            self.add(
+                field,
+                format!(
+                    "{count} velocities in a row are {:?} m/s, from {} on: are these copies?",
+                    velocities[first],
+                    place_of(place, first)
+                ),
+            );
+        }
+        if let Some(period) = period(velocities) {
+            let times = velocities.len() / period;
+            self.add(
+                field,
+                format!(
+                    "the first {period} velocities are repeated in the same order, {times} times in \
+                     all: are these copies?"
+                ),
+            );
+        }
+    }
+
     /// Checks the median and the scatter of a set, and lists outliers.
     fn velocities(
         &mut self,
@@ -159,6 +195,7 @@ impl Warnings {
         if let Some(doubt) = plausible::VELOCITY.doubt(median) {
             self.add(field, format!("their median {doubt}"));
         }
+        self.copies(field, velocities, (origin, set));
         let outside = |velocity: f64| velocity > OUTLIER * median || velocity < median / OUTLIER;
         let outliers: Vec<(usize, f64)> = velocities
             .iter()
@@ -172,9 +209,8 @@ impl Warnings {
         let listed: Vec<String> = outliers
             .iter()
             .take(OUTLIERS_LISTED_MAX)
-            .map(|&(index, velocity)| match origin.and_then(|origin| origin.line(set, index)) {
-                Some(line) => format!("{} (line {line})", short(velocity)),
-                None => format!("{} (number {})", short(velocity), index + 1),
+            .map(|&(index, velocity)| {
+                format!("{} ({})", short(velocity), place_of((origin, set), index))
             })
             .collect();
         let more = match outliers.len() - listed.len() {
@@ -191,6 +227,84 @@ impl Warnings {
                 listed.join(", "),
                 short(median)
             ),
+        );
+    }
+}
+
+/// Returns the line of a velocity, or its number in the list.
+fn place_of((origin, set): (Option<&Origin>, usize), index: usize) -> String {
+    match origin.and_then(|origin| origin.line(set, index)) {
+        Some(line) => format!("line {line}"),
+        None => format!("number {}", index + 1),
+    }
+}
+
+/// Returns the first of the longest runs of equal velocities: its first index, and its length.
+fn longest_run(velocities: &[f64]) -> Option<(usize, usize)> {
+    let mut longest: Option<(usize, usize)> = None;
+    let mut first = 0;
+    for run in velocities.chunk_by(|a, b| a == b) {
+        if longest.is_none_or(|(_, count)| run.len() > count) {
+            longest = Some((first, run.len()));
+        }
+        first += run.len();
+    }
+    longest
+}
+
+/// Returns the length of the shortest block of which all velocities are repetitions; `None` if it
+/// would have fewer than [`COPIES_MIN`] velocities, or equal ones only.
+fn period(velocities: &[f64]) -> Option<usize> {
+    let count = velocities.len();
+    let is_period = |&period: &usize| {
+        count.is_multiple_of(period) && velocities[period..] == velocities[..count - period]
+    };
+    let period = (1..=count / 2).find(is_period)?;
+    (period >= COPIES_MIN).then_some(period)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_and_repeated_blocks_are_found() {
+        let six: Vec<f64> = (0..6).map(|k| 3900.0 + f64::from(k * k)).collect();
+        for (velocities, run, block) in [
+            (vec![], None, None),
+            (vec![3900.0; 7], Some((0, 7)), None),
+            (vec![1.0, 2.0, 2.0, 3.0, 3.0], Some((1, 2)), None),
+            (six.clone(), Some((0, 1)), None),
+            (six.repeat(2), Some((0, 1)), Some(6)),
+            (six.repeat(3), Some((0, 1)), Some(6)),
+            (six.repeat(4), Some((0, 1)), Some(6)),
+            (six[..4].repeat(4), Some((0, 1)), None),
+            ([&six[..], &six[..5]].concat(), Some((0, 1)), None),
+        ] {
+            assert_eq!((longest_run(&velocities), period(&velocities)), (run, block));
+        }
+    }
+
+    #[test]
+    fn copies_and_an_unused_column_of_subjects_cause_a_warning() {
+        let velocities = [[3900.0; 5], [3911.0, 3922.0, 3933.0, 3944.0, 3955.0]].concat().repeat(2);
+        let origin = Origin {
+            path: "v.csv".into(),
+            lines: vec![(2..22).collect()],
+            unused_subjects: Some("patient".to_owned()),
+        };
+        let mut warnings = Warnings::default();
+        warnings.data(&Data::from_velocities(velocities), Some(&origin));
+        let found: Vec<String> = warnings.0.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            found,
+            [
+                "data.velocities: the column \"patient\" of the file repeats; if these are velocities of \
+                 the same subject, name it: subject = \"patient\"",
+                "data.velocities: 5 velocities in a row are 3900.0 m/s, from line 2 on: are these copies?",
+                "data.velocities: the first 10 velocities are repeated in the same order, 2 times in all: \
+                 are these copies?",
+            ]
         );
     }
 }

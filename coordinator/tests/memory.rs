@@ -53,7 +53,7 @@ fn ended_jobs_take_little_memory() {
     react(&mut state, fake::attached(1), Duration::ZERO);
     let mut one_more = |seed| {
         let mut specification = fake::identification(REALIZATIONS, 2, seed);
-        specification.data = Some(Data::Velocities([3900.0, 3901.0].repeat(50_000)));
+        specification.data = Some(Data::from_velocities([3900.0, 3901.0].repeat(50_000)));
         run(&mut state, &mut store, fake::submission(&specification, ""));
         assert!(state.is_idle());
     };

@@ -15,7 +15,7 @@ pub fn posterior(specification: &JobSpecification, result: &JobResult) -> String
     let parameters = Parameter::ALL.map(Parameter::name).join(",");
     let moments = "mean,coefficient_of_variation";
     let mut out = format!("draw,{parameters},bulk_velocity,{moments},log_density");
-    let grouped = matches!(specification.data, Some(Data::Groups(_)));
+    let grouped = specification.data.as_ref().is_some_and(Data::is_grouped);
     out.push_str(if grouped { ",group\n" } else { "\n" });
     add(&mut out, result.conclusions.posterior.as_ref(), "");
     for group in &result.groups {

@@ -81,6 +81,16 @@ impl Reader {
         }
     }
 
+    /// Returns the table `node` at `path`, which may have `keys` and no others.
+    pub(crate) fn table_at<'a>(
+        &mut self,
+        node: &'a Node,
+        path: String,
+        keys: &[&'static str],
+    ) -> Table<'a> {
+        self.open(node, path, keys)
+    }
+
     fn open<'a>(&mut self, node: &'a Node, path: String, keys: &[&'static str]) -> Table<'a> {
         let Value::Table(entries) = &node.value else {
             let keys = keys.join(", ");
@@ -204,19 +214,42 @@ impl Reader {
 
     /// Reads the numbers `elements` of the list at `path`; `None` if one is not a number.
     pub(crate) fn numbers(&mut self, path: &str, elements: &[Node]) -> Option<Vec<f64>> {
-        let numbers: Vec<f64> =
-            elements.iter().filter_map(|element| as_number(&element.value)).collect();
-        if numbers.len() == elements.len() {
-            return Some(numbers);
+        self.elements(path, elements, "a number", as_number)
+    }
+
+    /// Reads the whole numbers `elements` of the list at `path`; `None` if one is not such a number,
+    /// or not within `accepted`.
+    pub(crate) fn whole_numbers(
+        &mut self,
+        path: &str,
+        elements: &[Node],
+        accepted: WholeRange,
+    ) -> Option<Vec<u64>> {
+        self.elements(path, elements, &accepted.to_string(), |value| match *value {
+            Value::Integer(value) => u64::try_from(value).ok().filter(|&n| accepted.contains(n)),
+            _ => None,
+        })
+    }
+
+    /// Reads the elements of the list at `path`; `None` if one is not as expected.
+    fn elements<T>(
+        &mut self,
+        path: &str,
+        elements: &[Node],
+        expected: &str,
+        read: impl Fn(&Value) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let found: Vec<T> = elements.iter().filter_map(|element| read(&element.value)).collect();
+        if found.len() == elements.len() {
+            return Some(found);
         }
-        let wrong =
-            elements.iter().enumerate().filter(|(_, node)| as_number(&node.value).is_none());
+        let wrong = elements.iter().enumerate().filter(|(_, node)| read(&node.value).is_none());
         for (count, (index, node)) in wrong.enumerate() {
             if count == REPORTED_MAX {
                 self.violations.add_more(path, "more elements that are not numbers are not listed");
                 break;
             }
-            self.wrong_type(element_path(path, index), "a number", &node.value);
+            self.wrong_type(element_path(path, index), expected, &node.value);
         }
         None
     }

@@ -6,11 +6,13 @@ use std::fmt::{self, Write as _};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
-use osteon_common::job::{Data, JobSpecification, PosteriorSettings, Prior, Range, Search};
+use osteon_common::job::{
+    Data, Group, JobSpecification, Measurements, PosteriorSettings, Prior, Range, Search,
+};
 use osteon_common::parameters::Parameter;
 
 /// Number of velocities per line of an inlined data set.
-const VELOCITIES_PER_LINE: usize = 6;
+const NUMBERS_PER_LINE: usize = 6;
 
 /// Returns the complete case file of `case`, with `mandel`.
 ///
@@ -117,26 +119,50 @@ fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {
 }
 
 fn data(out: &mut String, data: &Data) -> fmt::Result {
-    match data {
-        Data::Groups(_) => writeln!(out, "\n[data.groups]  # m/s")?,
-        Data::Velocities(_) | Data::Moments { .. } => writeln!(out, "\n[data]  # m/s")?,
+    let repeatability = data.repeatability;
+    if !data.is_grouped() || repeatability != 0.0 {
+        writeln!(out, "\n[data]  # m/s")?;
     }
-    match data {
-        Data::Velocities(measured) => velocities(out, "velocities", measured),
-        Data::Groups(groups) => groups
-            .iter()
-            .try_for_each(|group| velocities(out, &quoted(&group.name), &group.velocities)),
-        Data::Moments { mean, coefficient_of_variation } => {
+    match &data.measurements {
+        Measurements::Velocities { velocities: measured, subjects } => {
+            set(out, measured, subjects.as_deref())?;
+        }
+        Measurements::Groups(_) => {}
+        Measurements::Moments { mean, coefficient_of_variation, count } => {
             writeln!(out, "mean = {mean:?}")?;
-            writeln!(out, "coefficient_of_variation = {coefficient_of_variation:?}")
+            writeln!(out, "coefficient_of_variation = {coefficient_of_variation:?}")?;
+            if let Some(count) = count {
+                writeln!(out, "count = {count}")?;
+            }
         }
     }
+    if repeatability != 0.0 {
+        writeln!(out, "repeatability = {repeatability:?}")?;
+    }
+    if data.is_grouped() { groups(out, data.groups()) } else { Ok(()) }
 }
 
-fn velocities(out: &mut String, key: &str, velocities: &[f64]) -> fmt::Result {
+/// Writes groups in their order: as lists of one table, or, if any has subjects, each as a table.
+fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
+    if groups.iter().any(|group| group.subjects.is_some()) {
+        return groups.iter().try_for_each(|group| {
+            writeln!(out, "\n[data.groups.{}]  # m/s", quoted(&group.name))?;
+            set(out, &group.velocities, group.subjects.as_deref())
+        });
+    }
+    writeln!(out, "\n[data.groups]  # m/s")?;
+    groups.iter().try_for_each(|group| list(out, &quoted(&group.name), &group.velocities))
+}
+
+fn set(out: &mut String, velocities: &[f64], subjects: Option<&[u32]>) -> fmt::Result {
+    list(out, "velocities", velocities)?;
+    subjects.map_or(Ok(()), |subjects| list(out, "subjects", subjects))
+}
+
+fn list(out: &mut String, key: &str, numbers: &[impl fmt::Debug]) -> fmt::Result {
     writeln!(out, "{key} = [")?;
-    for line in velocities.chunks(VELOCITIES_PER_LINE) {
-        let line: Vec<_> = line.iter().map(|velocity| format!("{velocity:?}")).collect();
+    for line in numbers.chunks(NUMBERS_PER_LINE) {
+        let line: Vec<_> = line.iter().map(|number| format!("{number:?}")).collect();
         writeln!(out, "    {},", line.join(", "))?;
     }
     writeln!(out, "]")

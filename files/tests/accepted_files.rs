@@ -74,7 +74,7 @@ fn a_minimal_job_has_the_documented_defaults() {
     let expected = JobSpecification {
         kind: JobKind::Identification,
         setup: DEFAULT_SETUP,
-        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: [
             Range::Fixed(1598.8),
             Range::Free { start: 15e9, lower: 12e9, upper: 25e9 },
@@ -188,7 +188,7 @@ fn a_complete_job_means_what_it_says() {
         }
     );
     // An integer stands for a number.
-    assert_eq!(given.data, Some(Data::Velocities(vec![3900.5, 4000.0, 3950.25])));
+    assert_eq!(given.data, Some(Data::from_velocities(vec![3900.5, 4000.0, 3950.25])));
     assert_eq!(given.range(Parameter::LongitudinalShearModulus), Range::Fixed(4.795e9));
     assert_eq!(
         given.range(Parameter::TransversePoissonRatio),
@@ -318,4 +318,37 @@ fn reference(name: &str) -> serde_json::Value {
 fn as_json(text: &str) -> String {
     let table: toml::Table = toml::from_str(text).unwrap();
     serde_json::to_string(&table).unwrap()
+}
+
+/// Subjects are numbered anew, and the canonical text is read as it is written.
+#[test]
+fn noise_of_the_data_is_inlined() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let grouped = "groups.b = { velocities = [3900, 4000, 3950], subjects = [9, 3, 9] }\n\
+                   groups.a = [3900.0, 4000.0]\nrepeatability = 2";
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.027\ncount = 2747";
+    for (data, expected) in [
+        (
+            format!("{given}\nsubjects = [7, 2, 7]\nrepeatability = 5"),
+            "[data]  # m/s\nvelocities = [\n    3900.5, 4000.0, 3950.25,\n]\n\
+             subjects = [\n    0, 1, 0,\n]\nrepeatability = 5.0\n",
+        ),
+        (
+            grouped.to_owned(),
+            "[data]  # m/s\nrepeatability = 2.0\n\n\
+             [data.groups.\"b\"]  # m/s\nvelocities = [\n    3900.0, 4000.0, 3950.0,\n]\n\
+             subjects = [\n    0, 1, 0,\n]\n\n\
+             [data.groups.\"a\"]  # m/s\nvelocities = [\n    3900.0, 4000.0,\n]\n",
+        ),
+        (
+            moments.to_owned(),
+            "[data]  # m/s\nmean = 3906.0\ncoefficient_of_variation = 0.027\ncount = 2747\n",
+        ),
+    ] {
+        let text = include_str!("files/job.toml").replace(given, &data);
+        let read = job(&text, Format::Toml, JobKind::Identification);
+        let written = job_file::to_toml(&read);
+        assert!(written.contains(expected), "{written}");
+        assert_eq!(job(&written, Format::Toml, JobKind::Identification), read);
+    }
 }

@@ -383,6 +383,50 @@ fn data() {
 }
 
 #[test]
+fn noise_of_the_data() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let moments = "mean = 3900.0\ncoefficient_of_variation = 0.03\n";
+    let edits = [
+        format!("{given}\nrepeatability = -1.0"),
+        format!("{given}\nrepeatability = nan"),
+        format!("{given}\nrepeatability = \"5 m/s\""),
+        // The standard deviation of the three is 40.621.
+        format!("{given}\nrepeatability = 40.6"),
+        format!("{given}\nrepeatability = 40.7"),
+        format!("{moments}repeatability = 117.1"),
+        "groups = { a = [3900.0], b = [3900.0, 4000.0] }\nrepeatability = 50.0".to_owned(),
+        format!("{moments}count = 1"),
+        format!("{moments}count = 2.5"),
+        format!("{moments}count = 1_000_000_001"),
+        format!("{given}\ncount = 3"),
+        format!("{given}\nsubject = \"patient\""),
+        format!("{given}\nsubjects = [0, 1]"),
+        format!("{given}\nsubjects = []"),
+        format!("{given}\nsubjects = [7, 7, 7]"),
+        format!("{given}\nsubjects = [0, -1, \"a\"]"),
+        format!("{given}\nsubjects = \"patient\""),
+        format!("{moments}subject = \"patient\"\nsubjects = [0, 1]"),
+        "velocities = \"v.csv\"\nsubjects = [0, 1]".to_owned(),
+        "velocities = \"v.csv\"\nsubject = 3".to_owned(),
+        "groups.a = { velocities = [3900.0, 4000.0], subjects = [5, 5] }".to_owned(),
+        "groups.a = { velocities = [3900.0, 4000.0], subjects = [5], subject = 1 }".to_owned(),
+        "groups.a = { subjects = [0, 1] }".to_owned(),
+    ];
+    let edits = edits.each_ref().map(|to| (given, to.as_str()));
+    check("rejected_data_noise", JobKind::Identification, &edits);
+}
+
+#[test]
+fn a_likelihood_does_not_contain_the_instruments_scatter() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let text = edited(given, &format!("{given}\nrepeatability = 5.0"));
+    assert_eq!(refusal(&text, JobKind::Identification), "ACCEPTED");
+    let text = text.replace("kind = \"moments\"", "kind = \"likelihood\"");
+    let refused = refusal(&text, JobKind::Identification);
+    assert!(refused.contains("data.repeatability: is 5.0; the objective.kind"), "{refused}");
+}
+
+#[test]
 fn a_likelihood_needs_the_velocities_themselves() {
     let moments = edited(
         "velocities = [3900.5, 4000, 3950.25]",

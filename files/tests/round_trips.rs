@@ -5,12 +5,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use osteon_common::case::{Bone, Case, Setup};
+use osteon_common::data::numbered;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior,
+    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, PosteriorPrior,
     PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
+use osteon_common::moments::Moments;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
@@ -113,22 +115,47 @@ fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
 
 /// Data that points within the bounds can come near to.
 fn data() -> impl Strategy<Value = Data> {
-    prop_oneof![
-        prop::collection::vec(2e3..6e3, 2..40).prop_map(Data::Velocities),
+    let noise = (any::<bool>(), 2_usize..9, 0.0..0.9);
+    let exact = prop_oneof![
+        prop::collection::vec(2e3..6e3, 2..40).prop_map(Data::from_velocities),
         prop::collection::btree_map(
             "[ -~äβ骨\"\\\\]{1,20}",
             prop::collection::vec(2e3..6e3, 2..9),
             1..5
         )
         .prop_map(|groups| {
-            let group = |(name, velocities)| Group { name, velocities };
-            Data::Groups(groups.into_iter().map(group).collect())
+            let group = |(name, velocities): (String, _)| Group::new(name, velocities);
+            Data::from_groups(groups.into_iter().map(group).collect())
         }),
-        (2e3..6e3, 0.02..0.1).prop_map(|(mean, coefficient_of_variation)| Data::Moments {
+        (2e3..6e3, 0.02..0.1).prop_map(|(mean, coefficient_of_variation)| Data::from_moments(
             mean,
             coefficient_of_variation
-        }),
-    ]
+        )),
+    ];
+    (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
+}
+
+/// Adds what may be known of the noise, by chance.
+fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
+    if !known {
+        return data;
+    }
+    let numbers = |count: usize| Some(numbered((0..count).map(|k| (k * k) % few)));
+    let smallest = (0..data.sets()).map(|set| {
+        let Moments { mean, coefficient_of_variation } = data.moments(set);
+        mean * coefficient_of_variation
+    });
+    data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
+    match &mut data.measurements {
+        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Groups(groups) => {
+            for group in groups.iter_mut().step_by(2) {
+                group.subjects = numbers(group.velocities.len());
+            }
+        }
+        Measurements::Moments { count, .. } => *count = Some(few as u64),
+    }
+    data
 }
 
 fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
@@ -213,7 +240,10 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                     *prior = Some(Prior { value: start, weight: 1.0 + lower.abs() / 7.0 });
                 }
             }
-            let has_law = matches!(data, Data::Velocities(_)) && monte_carlo.realizations > 1;
+            let has_law = !data.is_grouped()
+                && !data.has_only_moments()
+                && data.repeatability == 0.0
+                && monte_carlo.realizations > 1;
             let searched = has_law && search.method == SearchMethod::Simplex;
             let objective = if searched { objective } else { Objective::Moments };
             let posterior = around_starts(posterior, &parameters).filter(|_| identification);
@@ -254,7 +284,7 @@ const EDITS: [Edit; 18] = [
     |job, x| job.parameters[5] = Range::Fixed(x),
     |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
     |job, x| job.search.initial_step = x,
-    |job, x| job.data = Some(Data::Velocities(vec![x, 1.0])),
+    |job, x| job.data = Some(Data::from_velocities(vec![x, 1.0])),
     |job, x| job.monte_carlo.scrambles = x as u64,
     |job, _| job.monte_carlo.sampling = Sampling::MonteCarlo,
     |job, x| change_prior(job, PosteriorPrior::Normal { center: x, spread: 0.5 }),
@@ -320,7 +350,7 @@ properties! {
         ),
     ) {
         job.kind = JobKind::Identification;
-        job.data.get_or_insert(Data::Moments { mean: 1.0, coefficient_of_variation: 1.0 });
+        job.data.get_or_insert(Data::from_moments(1.0, 1.0));
         for (edit, value) in edits {
             edit(&mut job, value);
         }

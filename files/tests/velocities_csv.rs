@@ -46,7 +46,7 @@ fn warnings(text: &str, more: &str) -> Vec<String> {
 
 #[test]
 fn what_is_read() {
-    let expected = Some(Data::Velocities(vec![3900.5, 4000.0]));
+    let expected = Some(Data::from_velocities(vec![3900.5, 4000.0]));
     for text in [
         "velocity\n3900.5\n4000\n",
         "velocity\r\n3900.5\r\n4e3",
@@ -67,8 +67,9 @@ fn groups_stand_in_the_order_in_which_they_begin() {
     let group = |(name, velocities): (&str, [f64; 2])| Group {
         name: name.to_owned(),
         velocities: velocities.to_vec(),
+        subjects: None,
     };
-    let expected = Data::Groups(groups.map(group).to_vec());
+    let expected = Data::from_groups(groups.map(group).to_vec());
     assert_eq!(read_as(text.as_bytes(), "group = \"bone\""), Ok(Some(expected)));
 }
 
@@ -76,10 +77,92 @@ fn groups_stand_in_the_order_in_which_they_begin() {
 fn a_group_of_one_velocity_is_a_group() {
     let read =
         read_as(b"bone,velocity\na,3900\na,3950\nb,4000\nc,4010\nc,4010\n", "group = \"bone\"");
-    let Ok(Some(Data::Groups(groups))) = read else { panic!("{read:?}") };
+    let groups = read.unwrap().unwrap().groups().to_vec();
     let unsearched: Vec<_> = groups.iter().map(Group::no_variation).collect();
     let equal = NoVariation::AllEqual { count: 2, velocity: 4010.0 };
     assert_eq!(unsearched, [None, Some(NoVariation::OneVelocity), Some(equal)]);
+}
+
+#[test]
+fn subjects_are_numbered_in_each_group() {
+    let text = "bone,patient,velocity\na, p ,3900\nb,q,3910\na,q,3920\nb,p,3930\na,\"p\",3940\n";
+    let subjects = |more: &str| {
+        let data = read_as(text.as_bytes(), more).unwrap().unwrap();
+        (0..data.sets()).map(|set| data.subjects(set).map(<[u32]>::to_vec)).collect::<Vec<_>>()
+    };
+    for (more, expected) in [
+        ("", vec![None]),
+        ("subject = \"patient\"", vec![Some(vec![0, 1, 1, 0, 0])]),
+        ("group = \"bone\"", vec![None, None]),
+        ("group = \"bone\"\nsubject = \"patient\"", vec![Some(vec![0, 1, 0]), Some(vec![0, 1])]),
+    ] {
+        assert_eq!(subjects(more), expected, "{more}");
+    }
+}
+
+#[test]
+fn subjects_that_are_refused() {
+    let check = |text: &str, more: &str, expected: &str| {
+        let more = format!("subject = \"patient\"\n{more}");
+        let message = read_as(text.as_bytes(), &more).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    let no_column = "data.velocities: DIR/data/v.csv, line 1: no column `patient`; the header has \
+                     `site`, `velocity`";
+    check("site,velocity\na,3900\na,3910\n", "", no_column);
+    let empty = "data.velocities: DIR/data/v.csv, line 3: patient is empty; it must name the subject \
+                 of the velocity";
+    check("patient,velocity\na,3900\n\" \",3910\n", "", empty);
+    let one = "data.subject: all 2 velocities are of one subject; at least two subjects are needed to \
+               see by how much they differ";
+    check("patient,velocity\na,3900\na,3910\n", "", one);
+    let grouped = "site,patient,velocity\nx,a,3900\nx,b,3910\ny,a,3900\ny,a,3910\nz,a,3900\n";
+    let one = "data.subject: in the group \"y\": all 2 velocities are of one subject";
+    check(grouped, "group = \"site\"", one);
+    let many = format!("patient,velocity\n{}", "a,3900\nb,3901\n".repeat(250_001));
+    check(&many, "", "has more than 500000 velocities, the most that can have subjects");
+}
+
+#[test]
+fn a_column_that_seems_to_name_subjects_is_pointed_out() {
+    let hint = |column: &str| {
+        format!(
+            "data.velocities: the column {column:?} of the file repeats; if these are velocities of the \
+             same subject, name it: subject = {column:?}"
+        )
+    };
+    let rows = "a,3900\nb,3910\na,3920\n";
+    for column in ["patient", "Subject", "specimen_id", "id"] {
+        assert_eq!(warnings(&format!("{column},velocity\n{rows}"), ""), [hint(column)]);
+    }
+    let silent =
+        |text: &str, more: &str| assert_eq!(warnings(text, more), [""; 0], "{text} {more}");
+    silent("patient,velocity\na,3900\nb,3910\na,3920\n", "subject = \"patient\"");
+    silent("patient,velocity\na,3900\na,3950\nb,3910\nb,3970\n", "group = \"patient\"");
+    silent("operator,velocity\na,3900\nb,3910\na,3920\n", "");
+    silent("id,velocity\n1,3900\n2,3910\n3,3920\n", "");
+    silent("id,velocity\n1,3900\n1,3910\n1,3920\n", "");
+    // Each patient is a group.
+    silent("site,id,velocity\nx,1,3900\nx,1,3950\ny,2,3910\ny,2,3970\n", "group = \"site\"");
+}
+
+#[test]
+fn copies_are_doubted() {
+    let rows = "3900\n3911\n3922\n3933\n3944\n";
+    assert_eq!(
+        warnings(&format!("velocity\n{rows}{rows}"), ""),
+        [
+            "data.velocities: the first 5 velocities are repeated in the same order, 2 times in all: \
+          are these copies?"
+        ]
+    );
+    assert_eq!(
+        warnings(&format!("velocity\n{rows}{}3950\n", "3944\n".repeat(4)), ""),
+        [
+            "data.velocities: 5 velocities in a row are 3944.0 m/s, from line 6 on: are these copies?"
+        ]
+    );
+    assert_eq!(warnings(&format!("velocity\n{rows}{}", "3944\n".repeat(3)), ""), [""; 0]);
 }
 
 #[test]
@@ -171,11 +254,11 @@ fn single_velocities_far_from_the_others_are_warned_of_with_their_line() {
           in other units, or a slip of the decimal point?"
         ]
     );
-    let many = format!("velocity\n{}{}", "3900\n4000\n".repeat(20), "390\n".repeat(7));
+    let many = format!("velocity\n{}{}390\n", "3900\n4000\n".repeat(20), "390\n391\n".repeat(3));
     let found = warnings(&many, "");
     assert_eq!(found.len(), 1, "{found:?}");
     let listed =
-        "390 (line 42), 390 (line 43), 390 (line 44), 390 (line 45), 390 (line 46) and 2 more m/s";
+        "390 (line 42), 391 (line 43), 390 (line 44), 391 (line 45), 390 (line 46) and 2 more m/s";
     assert!(found[0].contains(listed), "{found:?}");
     assert_eq!(warnings("velocity\n3900.5\n3950\n2000\n8000\n", ""), [""; 0]);
     let grouped = "bone,velocity\na,3900\nb,4000\na,3950\na,390\nb,3900\n";

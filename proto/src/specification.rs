@@ -1,8 +1,10 @@
 //! A job's specification as a message.
 
 use osteon_common::check;
+use osteon_common::data::numbered;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Prior, Range, Search,
+    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Prior, Range,
+    Search,
 };
 use osteon_common::parameters::Parameter;
 use osteon_common::violations::Violations;
@@ -93,39 +95,62 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
 }
 
 fn data_to_message(data: &Data) -> v1::Data {
-    match data {
-        Data::Velocities(velocities) => {
-            v1::Data { velocities: velocities.clone(), ..v1::Data::default() }
+    let message = v1::Data { repeatability: Some(data.repeatability), ..v1::Data::default() };
+    let numbers = |subjects: &Option<Vec<u32>>| subjects.clone().unwrap_or_default();
+    match &data.measurements {
+        Measurements::Velocities { velocities, subjects } => {
+            v1::Data { velocities: velocities.clone(), subjects: numbers(subjects), ..message }
         }
-        Data::Groups(groups) => {
-            let group = |Group { name, velocities }: &Group| v1::VelocityGroup {
+        Measurements::Groups(groups) => {
+            let group = |Group { name, velocities, subjects }: &Group| v1::VelocityGroup {
                 name: name.clone(),
                 velocities: velocities.clone(),
+                subjects: numbers(subjects),
             };
-            v1::Data { groups: groups.iter().map(group).collect(), ..v1::Data::default() }
+            v1::Data { groups: groups.iter().map(group).collect(), ..message }
         }
-        Data::Moments { mean, coefficient_of_variation } => v1::Data {
+        Measurements::Moments { mean, coefficient_of_variation, count } => v1::Data {
             mean: Some(*mean),
             coefficient_of_variation: Some(*coefficient_of_variation),
-            ..v1::Data::default()
+            count: *count,
+            ..message
         },
     }
 }
 
 fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<Data> {
-    let v1::Data { velocities, mean, coefficient_of_variation, groups } = message;
-    let moments = (*mean, *coefficient_of_variation);
-    match (velocities.is_empty(), groups.is_empty(), moments) {
+    let measurements = measurements(message, violations)?;
+    let has_velocities = matches!(measurements, Measurements::Velocities { .. });
+    if !message.subjects.is_empty() && !has_velocities {
+        violations.add("data.subjects", "has no velocities beside it; leave it out");
+    }
+    if message.count.is_some() && !matches!(measurements, Measurements::Moments { .. }) {
+        let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
+                       they are not given; leave it out";
+        violations.add("data.count", message);
+    }
+    Some(Data { measurements, repeatability: message.repeatability.unwrap_or(0.0) })
+}
+
+fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measurements> {
+    let v1::Data { velocities, mean, coefficient_of_variation, groups, .. } = message;
+    let numbers = |subjects: &[u32]| (!subjects.is_empty()).then(|| numbered(subjects));
+    match (velocities.is_empty(), groups.is_empty(), (*mean, *coefficient_of_variation)) {
         (true, true, (Some(mean), Some(coefficient_of_variation))) => {
-            Some(Data::Moments { mean, coefficient_of_variation })
+            let count = message.count;
+            Some(Measurements::Moments { mean, coefficient_of_variation, count })
         }
-        (false, true, (None, None)) => Some(Data::Velocities(velocities.clone())),
+        (false, true, (None, None)) => {
+            let subjects = numbers(&message.subjects);
+            Some(Measurements::Velocities { velocities: velocities.clone(), subjects })
+        }
         (true, false, (None, None)) => {
             let group = |group: &v1::VelocityGroup| Group {
                 name: group.name.clone(),
                 velocities: group.velocities.clone(),
+                subjects: numbers(&group.subjects),
             };
-            Some(Data::Groups(groups.iter().map(group).collect()))
+            Some(Measurements::Groups(groups.iter().map(group).collect()))
         }
         (true, true, (None, None)) => {
             violations.add(

@@ -104,7 +104,7 @@ pub enum IdentifyError<E> {
 /// let specification = JobSpecification {
 ///     kind: JobKind::Identification,
 ///     setup: Setup::default(),
-///     data: Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
+///     data: Some(Data::from_moments(3900.0, 0.03)),
 ///     parameters,
 ///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
 ///     objective: Objective::Moments,

@@ -24,7 +24,7 @@ mod surrogate;
 mod tests;
 
 use osteon_common::data_likelihood::DataLikelihood;
-use osteon_common::job::JobSpecification;
+use osteon_common::job::{JobSpecification, Measurements};
 use osteon_common::parameters::Point;
 use osteon_common::posterior::Posterior;
 use osteon_common::results::{BestPoint, Evaluation, Moments};
@@ -54,7 +54,18 @@ const GROWTH: f64 = 1.5;
 /// Returns the likelihood of set number `set` of the data; `None` if their noise is unknown.
 pub(crate) fn likelihood(specification: &JobSpecification, set: usize) -> Option<DataLikelihood> {
     let data = specification.data.as_ref()?;
-    DataLikelihood::independent(data.velocities(set)?, 0.0)
+    let instrument = data.repeatability;
+    match (&data.measurements, data.velocities(set), data.subjects(set)) {
+        (&Measurements::Moments { mean, coefficient_of_variation, count }, ..) => {
+            let moments = Moments { mean, coefficient_of_variation };
+            DataLikelihood::from_moments(moments, count?, instrument)
+        }
+        (_, Some(velocities), Some(subjects)) => {
+            DataLikelihood::of_subjects(velocities, subjects, instrument)
+        }
+        (_, Some(velocities), None) => DataLikelihood::independent(velocities, instrument),
+        (_, None, _) => None,
+    }
 }
 
 /// Returns the posterior of set number `set` of the data, given the best point of its search and all

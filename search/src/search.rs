@@ -311,7 +311,7 @@ impl Search {
 
     /// Returns whether the data are groups.
     pub fn is_grouped(&self) -> bool {
-        matches!(self.specification.data, Some(Data::Groups(_)))
+        self.specification.data.as_ref().is_some_and(Data::is_grouped)
     }
 
     fn propagated(&self, statistics: &PointStatistics) -> Ending {
@@ -345,7 +345,10 @@ impl Summary {
         let row = self.history.iter().find(|row| row.number == number)?;
         let JobSpecification { monte_carlo, objective, .. } = specification;
         let data = specification.data.as_ref();
-        let measured = data.and_then(|data| data.velocities(row.role.group as usize));
+        let given = data.and_then(|data| data.set(row.role.group as usize));
+        let measured = given.map(|set| set.velocities);
+        // The test holds for independent velocities with no scatter but the model's.
+        let tested = given.filter(|set| set.subjects.is_none() && set.repeatability == 0.0);
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
         let mut best = BestPoint {
             point: row.point,
@@ -357,8 +360,8 @@ impl Summary {
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
             velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
             failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
-            kolmogorov: measured
-                .and_then(|measured| kolmogorov_test(measured, outcomes, monte_carlo.sampling)),
+            kolmogorov: tested
+                .and_then(|set| kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling)),
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),
@@ -378,8 +381,7 @@ impl Summary {
         best: Option<BestPoint>,
         groups: Vec<GroupResult>,
     ) -> JobResult {
-        let of_one_set = !matches!(specification.data, Some(Data::Groups(_)));
-        let data = specification.data.as_ref().filter(|_| of_one_set);
+        let data = specification.data.as_ref().filter(|data| !data.is_grouped());
         let conclusions = data.map(|_| self.conclusions(specification, 0, best.as_ref()));
         let searched = self.history.iter().filter(|row| row.role.is_of_search());
         JobResult {

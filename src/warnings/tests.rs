@@ -24,7 +24,7 @@ fn job(data: Data, density: Range) -> JobSpecification {
 }
 
 fn moments(mean: f64, coefficient_of_variation: f64) -> Data {
-    Data::Moments { mean, coefficient_of_variation }
+    Data::from_moments(mean, coefficient_of_variation)
 }
 
 const FIXED: Range = Range::Fixed(1598.8);
@@ -86,7 +86,7 @@ fn a_coefficient_of_variation_out_of_reach_is_told() {
     let lines = out_of_reach(&fixed);
     assert!(lines[0].ends_with("; free parameters.dispersion"), "{lines:?}");
     // Two velocities may differ by any amount.
-    let two = Data::Velocities(vec![3600.0, 4400.0]);
+    let two = Data::from_velocities(vec![3600.0, 4400.0]);
     assert_eq!(out_of_reach(&job(two, FIXED)), [""; 0]);
 }
 
@@ -95,10 +95,11 @@ fn groups_are_named_and_counted() {
     let group = |name: String, mean: f64| Group {
         name,
         velocities: (0..20).map(|i| mean * (1.0 + 0.01 * f64::from(i % 5))).collect(),
+        subjects: None,
     };
     let mut groups = vec![group("fine".to_owned(), 3900.0)];
     groups.extend((0..7).map(|i| group(format!("P{i}"), 5500.0)));
-    let lines = out_of_reach(&job(Data::Groups(groups), FIXED));
+    let lines = out_of_reach(&job(Data::from_groups(groups), FIXED));
     assert_eq!(lines.len(), 6, "{lines:?}");
     assert!(lines[0].starts_with("the mean of the group \"P0\" is 5610, above"), "{lines:?}");
     assert_eq!(lines[5], "2 more groups are out of reach of the bounds");

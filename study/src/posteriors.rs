@@ -136,7 +136,7 @@ fn specification(velocities: Vec<f64>, seed: u64) -> JobSpecification {
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Velocities(velocities)),
+        data: Some(Data::from_velocities(velocities)),
         parameters: BOUNDS.map(range),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,

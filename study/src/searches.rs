@@ -121,7 +121,7 @@ fn found(
     let specification = JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean, coefficient_of_variation }),
+        data: Some(Data::from_moments(mean, coefficient_of_variation)),
         parameters: std::array::from_fn(|i| {
             let (lower, upper) = BOUNDS[i];
             Range::Free { start: start.0[i], lower, upper }

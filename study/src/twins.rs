@@ -188,7 +188,7 @@ fn specification(
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Velocities(velocities)),
+        data: Some(Data::from_velocities(velocities)),
         parameters: Parameter::ALL.map(range),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,

@@ -1,42 +1,22 @@
-//! Rules on data, parameters, the Monte Carlo loop and the search.
-
-use std::collections::BTreeSet;
+//! Rules on parameters, the Monte Carlo loop and the search.
 
 use crate::accepted::{Interval, written};
 use crate::attainable_moments;
-use crate::field_path::{element_path, entry_path};
 use crate::job::{
-    Data, Group, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search,
-    SearchMethod,
+    Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
 use crate::limits;
 use crate::origin::Origin;
 use crate::parameters::Parameter;
-use crate::plausible::{self, PlausibleRange, short};
-use crate::quantile::quantile;
-use crate::statistics;
+use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
-use crate::visible;
 
+use super::data::{data_from, no_data};
 use super::posterior::posterior_of_job;
 use super::priors::priors;
 use super::section::section;
 use super::setup::setup;
 use super::value::{known_wrong, number, quantity};
-
-/// Accepted values of a measured velocity.
-pub const VELOCITY: Interval = Interval::above(0.0, "m/s");
-/// Accepted values of the data's coefficient of variation.
-const VARIATION: Interval = Interval::above(0.0, "");
-const MOMENTS_NEED: &str = "a coefficient of variation above 0 needs";
-/// Minimum number of velocities that have a coefficient of variation.
-pub const VELOCITIES_MIN: usize = 2;
-/// The forms in which `[data]` may be given.
-pub const DATA_FORMS: &str =
-    "give either velocities, or groups, or mean and coefficient_of_variation";
-
-/// Maximum number of velocities that are refused individually.
-const REFUSED_MAX: usize = 10;
 
 /// Records all violations of `specification`.
 ///
@@ -79,194 +59,6 @@ pub fn job_from(
     likelihood(specification, violations);
     posterior_of_job(specification, violations);
     within_reach(specification, violations);
-}
-
-/// Returns the message for an identification without data.
-pub fn no_data() -> String {
-    format!("is missing; an identification needs it: {DATA_FORMS}")
-}
-
-/// Records all violations of measured `data`.
-pub fn data(data: &Data, violations: &mut Violations) {
-    data_from(data, None, violations);
-}
-
-fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut Violations) {
-    match data {
-        Data::Velocities(measured) => {
-            velocities("data.velocities", measured, (origin, 0), violations);
-        }
-        Data::Groups(measured) => groups(measured, origin, violations),
-        Data::Moments { mean, coefficient_of_variation } => {
-            quantity("data.mean", *mean, VELOCITY, &plausible::VELOCITY, violations);
-            if !violations.has_at_or_below("data.mean")
-                && let Some(refusal) = no_velocity(*mean)
-            {
-                violations.add("data.mean", refusal);
-            }
-            quantity(
-                "data.coefficient_of_variation",
-                *coefficient_of_variation,
-                VARIATION,
-                &plausible::VARIATION,
-                violations,
-            );
-        }
-    }
-}
-
-/// Returns the message that refuses a number which cannot be a velocity of sound in bone.
-fn no_velocity(value: f64) -> Option<String> {
-    let (from, to) = plausible::VELOCITY.possible();
-    plausible::VELOCITY.is_impossible(value).then(|| {
-        let (from, to) = (short(from), short(to));
-        format!("is {value:?}; no velocity of sound in bone is outside {from} to {to} (m/s)")
-    })
-}
-
-fn groups(groups: &[Group], origin: Option<&Origin>, violations: &mut Violations) {
-    const FIELD: &str = "data.groups";
-    let count = groups.len();
-    if count == 0 || count > limits::GROUPS_MAX {
-        let most = limits::GROUPS_MAX;
-        violations.add(FIELD, format!("has {count} groups; 1 to {most} are allowed"));
-        return;
-    }
-    let all: usize = groups.iter().map(|group| group.velocities.len()).sum();
-    if all > limits::DATA_VELOCITIES_MAX {
-        let most = limits::DATA_VELOCITIES_MAX;
-        violations.add(FIELD, format!("has {all} velocities in all groups; at most {most}"));
-        return;
-    }
-    let mut names = BTreeSet::new();
-    for (set, group) in groups.iter().enumerate() {
-        let Group { name, velocities: measured } = group;
-        let field = entry_path(FIELD, name);
-        if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
-            let most = limits::NAME_BYTES_MAX;
-            violations
-                .add(&field, format!("is not a valid group name: it must have 1 to {most} bytes"));
-        } else if let Some(c) = name.chars().find(|&c| visible::is_hidden(c)) {
-            let code = u32::from(c);
-            violations.add(
-                &field,
-                format!(
-                    "has the character U+{code:04X}, which is not seen or changes how others are: two \
-                     names could look the same; leave it out"
-                ),
-            );
-        } else if !names.insert(name) {
-            violations.add(&field, "is the name of two groups");
-        }
-        match group.no_variation() {
-            // A group that cannot be searched is accepted: the job is run for the others.
-            Some(_) if !each_velocity(&field, measured, violations) => {}
-            Some(_) => impossible(&field, measured, (origin, set), violations),
-            None => velocities(&field, measured, (origin, set), violations),
-        }
-    }
-    if !violations.has_at_or_below("data")
-        && groups.iter().all(|group| group.no_variation().is_some())
-    {
-        violations.add(
-            FIELD,
-            format!("none of the {count} has two velocities that differ, which {MOMENTS_NEED}"),
-        );
-    }
-}
-
-/// Checks velocities individually, and their number. Returns whether all are valid.
-fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> bool {
-    if known_wrong(field, violations) {
-        return false;
-    }
-    let count = measured.len();
-    if count > limits::DATA_VELOCITIES_MAX {
-        let max = limits::DATA_VELOCITIES_MAX;
-        violations.add(field, format!("has {count} velocities; at most {max}"));
-        return false;
-    }
-    let refused =
-        measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
-    for (refusals, (index, &velocity)) in refused.enumerate() {
-        if refusals == REFUSED_MAX {
-            violations.add_more(field, "more velocities out of range are not listed");
-            return false;
-        }
-        violations.add(element_path(field, index), VELOCITY.refusal(velocity));
-    }
-    !violations.has_at_or_below(field)
-}
-
-/// Checks the velocities of one set, given its number in the file that they come from.
-fn velocities(
-    field: &str,
-    measured: &[f64],
-    (origin, set): (Option<&Origin>, usize),
-    violations: &mut Violations,
-) {
-    if !each_velocity(field, measured, violations) {
-        return;
-    }
-    let count = measured.len();
-    if count < VELOCITIES_MIN {
-        let contains = if count == 0 { "no velocity" } else { "only one velocity" };
-        violations
-            .add(field, format!("contains {contains}; {MOMENTS_NEED} at least two velocities"));
-    } else if measured.iter().all(|velocity| velocity == &measured[0]) {
-        let velocity = measured[0];
-        violations.add(
-            field,
-            format!("all {count} are {velocity:?} m/s; {MOMENTS_NEED} different velocities"),
-        );
-    } else {
-        impossible(field, measured, (origin, set), violations);
-    }
-    if violations.has_at_or_below(field) {
-        return;
-    }
-    if let Some(moments) = statistics::moments(measured) {
-        // Extreme numbers overflow or underflow when they are squared.
-        let variation = moments.coefficient_of_variation;
-        if !VARIATION.contains(variation) {
-            let message =
-                format!("their coefficient of variation {}", VARIATION.refusal(variation));
-            violations.add(field, message);
-        }
-    }
-}
-
-/// Refuses velocities that are in another unit, either all of them or some.
-fn impossible(
-    field: &str,
-    measured: &[f64],
-    (origin, set): (Option<&Origin>, usize),
-    violations: &mut Violations,
-) {
-    let mut ascending = measured.to_vec();
-    ascending.sort_unstable_by(f64::total_cmp);
-    let median = quantile(&ascending, 0.5).unwrap_or(f64::NAN);
-    if let Some(refusal) = no_velocity(median) {
-        let rounded = short(median).parse().unwrap_or(median);
-        let question = plausible::VELOCITY.question(&[rounded], VELOCITY);
-        let asked_for = plausible::VELOCITY.asked_for();
-        let refusal = question
-            .map_or(refusal, |question| format!("is {}; {asked_for}: {question}", short(median)));
-        violations.add(field, format!("their median {refusal}"));
-        return;
-    }
-    let refused = measured
-        .iter()
-        .enumerate()
-        .filter_map(|(index, &velocity)| Some((index, no_velocity(velocity)?)));
-    for (refusals, (index, refusal)) in refused.enumerate() {
-        if refusals == REFUSED_MAX {
-            violations.add_more(field, "more velocities out of range are not listed");
-            return;
-        }
-        let (element, place) = (element_path(field, index), Origin::place(origin, set, index));
-        violations.add(element, format!("{place}{refusal}; their median is {}", short(median)));
-    }
 }
 
 fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
@@ -447,13 +239,21 @@ fn likelihood(specification: &JobSpecification, violations: &mut Violations) {
     if !asked || known_wrong(FIELD, violations) {
         return;
     }
-    if matches!(specification.data, Some(Data::Moments { .. }))
-        && !violations.has_at_or_below("data")
-    {
+    let data = specification.data.as_ref().filter(|_| !violations.has_at_or_below("data"));
+    if data.is_some_and(Data::has_only_moments) {
         violations.add(
             FIELD,
             "is \"likelihood\", which needs the measured velocities as data.velocities; with data.mean and \
              data.coefficient_of_variation alone it must be \"moments\"",
+        );
+    }
+    if let Some(repeatability) = data.map(Data::repeatability).filter(|&found| found > 0.0) {
+        violations.add(
+            "data.repeatability",
+            format!(
+                "is {repeatability:?}; the objective.kind \"likelihood\" compares the velocities with \
+                 the model's law, which does not contain it: it must be 0, or the kind \"moments\""
+            ),
         );
     }
     if specification.search.method == SearchMethod::Newton

@@ -3,37 +3,76 @@
 use crate::conclusions::NoiseErrors;
 #[cfg(doc)]
 use crate::data_statistics::CONFIDENCE;
-use crate::job::Data;
+use crate::job::{Data, Measurements};
 use crate::results::{Estimate, Moments};
 use crate::statistics;
 
 /// Quantile of the standard normal law at (1 + [`CONFIDENCE`]) / 2.
 const NORMAL: f64 = 1.959_963_984_540_054;
+/// Quantiles of Student's law with 1 to 5 degrees of freedom, where its expansion is too short.
+const FEW: [f64; 5] = [
+    12.706_204_736_174_7,
+    4.302_652_729_749_46,
+    3.182_446_305_283_71,
+    2.776_445_105_197_8,
+    2.570_581_835_636_31,
+];
 
 /// Covariances of (ln v, ln Δ).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Covariance of the data's moments, with the number of velocities; `None` if only the moments
-    /// are known, since their uncertainty is then unknown.
-    pub data: Option<([[f64; 2]; 2], usize)>,
+    /// Noise of the data's moments; `None` if only the moments are known, and not the number of
+    /// velocities behind them.
+    pub data: Option<DataNoise>,
     /// Variances of the model's moments by sampling.
     pub model: [f64; 2],
 }
 
+/// Noise of the data's moments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DataNoise {
+    /// Covariance of (ln v, ln Δ).
+    pub covariance: [[f64; 2]; 2],
+    /// Degrees of freedom: one less than there are independent velocities, or subjects.
+    pub freedom: u64,
+}
+
 /// Returns the noise of set number `set` of the data, and of a model's estimate.
 pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
-    let velocities = data.velocities(set);
-    let covariance = velocities.and_then(statistics::covariance_of_logarithms);
-    Noise {
-        data: covariance.zip(velocities.map(<[f64]>::len)),
-        model: model.relative_errors().map(|error| error * error),
+    Noise { data: data_noise(data, set), model: model.relative_errors().map(|error| error * error) }
+}
+
+/// Returns the noise of set number `set` of the data; `None` if it is not known.
+pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
+    if let Measurements::Moments { mean, coefficient_of_variation, count } = data.measurements {
+        let measured = Moments { mean, coefficient_of_variation };
+        return of_normal_law(measured, data.moments(set), count?);
     }
+    let velocities = data.set(set)?;
+    let covariance = statistics::covariance_of_logarithms(&velocities)?;
+    Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
+}
+
+/// Returns the noise of the moments of `count` independent velocities with a normal law, given
+/// their measured moments and those that are matched, without the instrument's own scatter.
+fn of_normal_law(measured: Moments, matched: Moments, count: u64) -> Option<DataNoise> {
+    if count < 2 {
+        return None;
+    }
+    let ratio = measured.coefficient_of_variation / matched.coefficient_of_variation;
+    let of_mean = measured.coefficient_of_variation * measured.coefficient_of_variation;
+    let of_mean = of_mean / count as f64;
+    // Mean and variance of a normal sample are independent. By the ratio's square a relative change
+    // of the variance is larger for the part that is matched.
+    let of_deviation = (ratio * ratio) * (ratio * ratio) / (2.0 * (count - 1) as f64);
+    let covariance = [[of_mean, -of_mean], [-of_mean, of_deviation + of_mean]];
+    covariance[1][1].is_finite().then_some(DataNoise { covariance, freedom: count - 1 })
 }
 
 impl Noise {
     /// Returns the covariance of both together.
     pub fn covariance(&self) -> [[f64; 2]; 2] {
-        let mut sum = self.data.map_or([[0.0; 2]; 2], |(covariance, _)| covariance);
+        let mut sum = self.data.map_or([[0.0; 2]; 2], |data| data.covariance);
         for (axis, variance) in self.model.into_iter().enumerate() {
             sum[axis][axis] += variance;
         }
@@ -46,21 +85,26 @@ impl Noise {
             let [mean, coefficient_of_variation] = variances.map(f64::sqrt);
             Moments { mean, coefficient_of_variation }
         };
-        let data = self.data.map(|([[mean, _], [_, variation]], _)| errors([mean, variation]));
-        NoiseErrors { data, sampling: errors(self.model) }
+        let variances =
+            |DataNoise { covariance: [[mean, _], [_, variation]], .. }| errors([mean, variation]);
+        NoiseErrors { data: self.data.map(variances), sampling: errors(self.model) }
     }
 
     /// Returns how many standard errors an interval extends to each side.
     pub fn quantile(&self) -> f64 {
-        self.data.map_or(NORMAL, |(_, count)| quantile(count))
+        self.data.map_or(NORMAL, |data| quantile(data.freedom))
     }
 }
 
-/// Returns the quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 for a sample of `count`: the
-/// first terms of its expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5),
-/// accurate to 1e-3 from six degrees of freedom on, too small below three.
-pub(super) fn quantile(count: usize) -> f64 {
-    let freedom = count.saturating_sub(1).max(1) as f64;
+/// Returns the quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 with `freedom` degrees of
+/// freedom, of which there is at least one: from a table for the first few, and then the first
+/// terms of its expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5), accurate to
+/// 1e-3.
+pub(super) fn quantile(freedom: u64) -> f64 {
+    if let Some(&known) = FEW.get(freedom.max(1) as usize - 1) {
+        return known;
+    }
+    let freedom = freedom as f64;
     let square = NORMAL * NORMAL;
     let terms = [
         (square + 1.0) / 4.0,

@@ -23,7 +23,8 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(
-            velocities.map_or(Data::Moments { mean, coefficient_of_variation }, Data::Velocities),
+            velocities
+                .map_or(Data::from_moments(mean, coefficient_of_variation), Data::from_velocities),
         ),
         parameters: Parameter::ALL.map(|parameter| {
             let (start, (lower, upper)) = (OPTIMUM.get(parameter), BOUNDS[parameter as usize]);
@@ -175,10 +176,10 @@ fn what_the_search_has_left_lengthens_the_intervals() {
     let mut specification = specification(&free, None);
     let full = found(&specification, [1e-3, 2e-2]);
     let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
-    specification.data = Some(Data::Moments {
-        mean: mean * libm::exp(1e-3),
-        coefficient_of_variation: coefficient_of_variation * libm::exp(-2e-2),
-    });
+    specification.data = Some(Data::from_moments(
+        mean * libm::exp(1e-3),
+        coefficient_of_variation * libm::exp(-2e-2),
+    ));
     let stopped = found(&specification, [1e-3, 2e-2]);
     for (full, stopped, left) in [
         (full.bulk_velocity, stopped.bulk_velocity, 1e-3),
@@ -196,7 +197,7 @@ fn what_the_search_has_left_lengthens_the_intervals() {
 #[test]
 fn nothing_is_known_where_the_model_does_not_match() {
     let mut specification = specification(&Parameter::ALL, None);
-    specification.data = Some(Data::Moments { mean: 3000.0, coefficient_of_variation: 0.1 });
+    specification.data = Some(Data::from_moments(3000.0, 0.1));
     let mut rows = vec![row(OPTIMUM, None)];
     for parameter in Parameter::ALL {
         let mut point = OPTIMUM;
@@ -215,8 +216,18 @@ fn nothing_is_known_where_the_model_does_not_match() {
 /// Compares with tabulated quantiles.
 #[test]
 fn quantiles_are_students() {
-    for (count, expected) in [(7, 2.4469), (11, 2.2281), (31, 2.0423), (101, 1.9840)] {
-        close(quantile(count), expected, 1e-3);
+    for (freedom, expected) in [
+        (1, 12.7062),
+        (2, 4.3027),
+        (3, 3.1824),
+        (4, 2.7764),
+        (5, 2.5706),
+        (6, 2.4469),
+        (10, 2.2281),
+        (30, 2.0423),
+        (100, 1.9840),
+    ] {
+        close(quantile(freedom), expected, 1e-3);
     }
     close(quantile(1_000_000), 1.95996, 1e-5);
 }

@@ -27,10 +27,23 @@ impl Central {
     /// Returns the influence of one value on N times mean and coefficient of variation, to first
     /// order.
     pub(super) fn influence(&self, value: f64) -> [f64; 2] {
+        self.influence_without(0.0, value)
+    }
+
+    /// Same as [`Self::influence`], on the coefficient of variation after the variance `known` is
+    /// subtracted, which is smaller than that of the set.
+    pub(super) fn influence_without(&self, known: f64, value: f64) -> [f64; 2] {
         let deviation = value - self.mean;
-        let variation = self.m2.sqrt() / self.mean;
-        let relative = 0.5 * (deviation * deviation / self.m2 - 1.0) - deviation / self.mean;
+        let left = self.m2 - known;
+        let variation = left.sqrt() / self.mean;
+        let relative = 0.5 * (deviation * deviation / self.m2 - 1.0) * (self.m2 / left)
+            - deviation / self.mean;
         [deviation, variation * relative]
+    }
+
+    /// Returns the variance of the set.
+    pub(super) fn variance(&self) -> f64 {
+        self.m2
     }
 
     /// Returns the standard errors for independent values.

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use osteon_common::job::{Data, JobSpecification};
+use osteon_common::job::JobSpecification;
 use osteon_common::outcome::Outcome;
 use osteon_common::results::{BestPoint, Evaluation, GroupResult, JobResult};
 use osteon_search::Summary;
@@ -93,7 +93,7 @@ impl StoredOutput {
     /// Returns the number of groups of the data whose searches have ended.
     pub(crate) fn groups(&self) -> usize {
         match &self.specification.data {
-            Some(Data::Groups(groups)) => groups.len().min(self.summary.groups.len()),
+            Some(data) if data.is_grouped() => data.sets().min(self.summary.groups.len()),
             _ => 0,
         }
     }

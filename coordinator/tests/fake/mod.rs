@@ -40,7 +40,7 @@ pub(crate) fn identification(
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: RANGES.map(|(start, lower, upper)| Range::Free { start, lower, upper }),
         monte_carlo: MonteCarlo {
             realizations,

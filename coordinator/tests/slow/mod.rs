@@ -16,7 +16,8 @@ use crate::fake;
 /// Returns a job whose submission is large enough to need a permit.
 pub(crate) fn large() -> JobSpecification {
     let count = SMALL_SUBMISSION_BYTES_MAX as u32 / 4;
-    let data = Some(Data::Velocities((0..count).map(|i| 3900.0 + f64::from(i % 10)).collect()));
+    let data =
+        Some(Data::from_velocities((0..count).map(|i| 3900.0 + f64::from(i % 10)).collect()));
     JobSpecification { data, ..fake::identification(100, 10, 7) }
 }
 

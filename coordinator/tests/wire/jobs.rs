@@ -13,10 +13,11 @@ fn velocities(mean: f64, width: f64, count: u32) -> Vec<f64> {
 pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
     let plain = fake::identification(300, 60, 7);
     let search = Search { sensitivities: true, ..plain.search };
-    let measured = Data::Velocities(velocities(3900.0, 360.0, 40));
+    let measured = Data::from_velocities(velocities(3900.0, 360.0, 40));
     let group = |name: &str, mean, width| Group {
         name: name.to_owned(),
         velocities: velocities(mean, width, 25),
+        subjects: None,
     };
     let groups = vec![group("left", 3900.0, 360.0), group("right, \"distal\"", 3800.0, 420.0)];
     let mut priors = [None; 7];
@@ -33,6 +34,6 @@ pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
         ..plain.clone()
     };
     let drawn = JobSpecification { search: Search { priors, ..search }, ..plain.clone() };
-    let grouped = JobSpecification { data: Some(Data::Groups(groups)), search, ..plain };
+    let grouped = JobSpecification { data: Some(Data::from_groups(groups)), search, ..plain };
     [("several", several), ("likelihood", likelihood), ("drawn", drawn), ("grouped", grouped)]
 }

@@ -33,9 +33,10 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
         let group = |name: &str, velocity: f64| Group {
             name: name.to_owned(),
             velocities: vec![0.97 * velocity, 1.03 * velocity],
+            subjects: None,
         };
         specification.data =
-            Some(Data::Groups(vec![group("left", 3900.0), group("right", 4000.0)]));
+            Some(Data::from_groups(vec![group("left", 3900.0), group("right", 4000.0)]));
     }
     specification.search.starts = 1 + u64::from(seed % 4 == 1);
     specification.search.sensitivities = !seed.is_multiple_of(3);

@@ -2,20 +2,21 @@
 
 use std::path::Path;
 
-use osteon_common::check::{self, DATA_FORMS};
+use osteon_common::check::{self, COUNT, DATA_FORMS};
+use osteon_common::data::numbered;
 use osteon_common::field_path::entry_path;
-use osteon_common::fields::Key;
-use osteon_common::job::{Data, Group, JobKind};
+use osteon_common::fields::{Key, WholeRange};
+use osteon_common::job::{Data, Group, JobKind, Measurements};
 use osteon_common::origin::Origin;
 
-use crate::document::Value;
+use crate::document::{Node, Value};
 use crate::reader::{Reader, Table};
-use crate::velocities::{self, Measured};
+use crate::velocities::{self, CsvError, Measured, NamedColumns};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]`.
-pub(super) const KEYS: [Key; 5] = [
+pub(super) const KEYS: [Key; 9] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
@@ -28,8 +29,19 @@ pub(super) const KEYS: [Key; 5] = [
                   velocity; at most 1000 groups, see [below](#groups-of-velocities)",
     },
     Key {
+        name: "subject",
+        meaning: "name of the CSV column that holds the subject (patient, specimen) of each velocity: \
+                  velocities of one subject are not independent, see [below](#noise-of-the-data); at \
+                  least two subjects, in each group",
+    },
+    Key {
         name: "groups",
-        meaning: "instead of a file: a table with a list of velocities for each group name",
+        meaning: "instead of a file: a table with a list of velocities for each group name, or with a \
+                  table of `velocities` and `subjects`",
+    },
+    Key {
+        name: "subjects",
+        meaning: "with a list of velocities: the subject of each, a whole number",
     },
     Key {
         name: MOMENTS[0],
@@ -40,7 +52,20 @@ pub(super) const KEYS: [Key; 5] = [
         name: MOMENTS[1],
         meaning: "coefficient of variation of the velocities, above 0; required with `data.mean`",
     },
+    Key {
+        name: "count",
+        meaning: "number of independent velocities behind `data.mean` and \
+                  `data.coefficient_of_variation`, at least 2; without it their noise is not known",
+    },
+    Key {
+        name: "repeatability",
+        meaning: "standard deviation of repeated measurements of one place (m/s, default 0, below the \
+                  standard deviation of the velocities): the instrument's own scatter, which is a part \
+                  of the data's variance and not of the model's",
+    },
 ];
+/// Largest number that names a subject.
+const SUBJECT: WholeRange = WholeRange { min: 0, max: u32::MAX as u64 };
 
 /// Returns the measured data, or `None` after recording the violation, and their file, if any. For
 /// a propagation it is always `None`, and `[data]` is checked as far as possible without another
@@ -52,21 +77,21 @@ pub(super) fn read(
     kind: JobKind,
 ) -> (Option<Data>, Option<Origin>) {
     let mut origin = None;
-    let data = given(reader, root, kind, |path, column| {
-        let (data, stands) = from_file(&directory.join(path), column)?;
+    let data = given(reader, root, kind, |path, named| {
+        let (measurements, stands) = from_file(&directory.join(path), named)?;
         origin = Some(stands);
-        Ok(data)
+        Ok(measurements)
     });
     (data, origin)
 }
 
-/// Returns the measured data; those in a file are read by `from_file`, given its name and the
-/// column of groups.
+/// Returns the measured data; those in a file are read by `from_file`, given its name and the named
+/// columns.
 fn given(
     reader: &mut Reader,
     root: &Table<'_>,
     kind: JobKind,
-    from_file: impl FnOnce(&str, Option<&str>) -> Result<Data, Vec<velocities::CsvError>>,
+    from_file: impl FnOnce(&str, NamedColumns<'_>) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Data> {
     let table = reader.table(root, "data", &KEYS.map(|key| key.name));
     if !table.is_table() {
@@ -77,12 +102,8 @@ fn given(
     }
     let [has_mean, has_variation] = MOMENTS.map(|key| table.has(key));
     let has_moments = has_mean || has_variation;
-    if table.has("group") && !table.has("velocities") {
-        let message =
-            "names a column of the file of velocities, and there is none; give `velocities`";
-        reader.lacks(&table.path("group"), &[table.path("velocities")], message);
-    }
-    let data = match (table.has("velocities"), table.has("groups"), has_moments) {
+    unneeded(reader, &table, has_moments);
+    let measurements = match (table.has("velocities"), table.has("groups"), has_moments) {
         (true, false, false) => velocities(reader, &table, kind, from_file),
         (false, true, false) => groups(reader, &table),
         (false, false, true) => moments(reader, &table),
@@ -102,6 +123,8 @@ fn given(
             None
         }
     };
+    let repeatability = reader.number(&table, "repeatability").unwrap_or(0.0);
+    let data = measurements.map(|measurements| Data { measurements, repeatability });
     if kind == JobKind::Identification {
         return data;
     }
@@ -111,16 +134,38 @@ fn given(
     None
 }
 
-fn moments(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
+/// Records keys that say nothing about data of this form.
+fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
+    let has_velocities = table.has("velocities");
+    for key in ["group", "subject"].into_iter().filter(|key| table.has(key)) {
+        if !has_velocities {
+            let message =
+                "names a column of the file of velocities, and there is none; give `velocities`";
+            reader.lacks(&table.path(key), &[table.path("velocities")], message);
+        }
+    }
+    if table.has("subjects") && !has_velocities {
+        let message = "has a subject for each of `velocities`, and there are none";
+        reader.lacks(&table.path("subjects"), &[table.path("velocities")], message);
+    }
+    if table.has("count") && !has_moments {
+        let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
+                       they are not given; leave it out";
+        reader.lacks(&table.path("count"), &MOMENTS.map(|key| table.path(key)), message);
+    }
+}
+
+fn moments(reader: &mut Reader, table: &Table<'_>) -> Option<Measurements> {
     for key in MOMENTS.into_iter().filter(|key| !table.has(key)) {
         reader.missing(table, key, format_args!("a number above 0; {DATA_FORMS}"));
     }
     let [mean, variation] = MOMENTS.map(|key| reader.number(table, key));
-    Some(Data::Moments { mean: mean?, coefficient_of_variation: variation? })
+    let count = reader.whole(table, "count", COUNT);
+    Some(Measurements::Moments { mean: mean?, coefficient_of_variation: variation?, count })
 }
 
-/// Reads the table `groups`: a list of velocities for each name.
-fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
+/// Reads the table `groups`: a list of velocities for each name, or a table.
+fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Measurements> {
     let path = table.path("groups");
     let expected = "a table with a list of velocities (m/s) for each group";
     let value = &table.get("groups")?.value;
@@ -128,33 +173,53 @@ fn groups(reader: &mut Reader, table: &Table<'_>) -> Option<Data> {
         reader.wrong_type(path, expected, value);
         return None;
     };
-    let mut groups = Vec::new();
-    let mut complete = true;
-    for (name, node) in entries {
-        let path = entry_path(&path, name);
-        let velocities = match &node.value {
-            Value::List(elements) => reader.numbers(&path, elements),
-            other => {
-                reader.wrong_type(path, "a list of velocities (m/s)", other);
-                None
+    let groups: Vec<Option<Group>> =
+        entries.iter().map(|(name, node)| group(reader, &path, name, node)).collect();
+    groups.into_iter().collect::<Option<_>>().map(Measurements::Groups)
+}
+
+fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<Group> {
+    let path = entry_path(groups, name);
+    match &node.value {
+        Value::List(elements) => Some(Group::new(name, reader.numbers(&path, elements)?)),
+        Value::Table(_) => {
+            let table = reader.table_at(node, path, &["velocities", "subjects"]);
+            let expected = "a list of velocities (m/s)";
+            if !table.has("velocities") {
+                reader.missing(&table, "velocities", expected);
             }
-        };
-        complete &= velocities.is_some();
-        if let Some(velocities) = velocities {
-            groups.push(Group { name: name.clone(), velocities });
+            let elements = reader.list(&table, "velocities", expected);
+            let subjects = subjects(reader, &table);
+            let velocities = reader.numbers(&table.path("velocities"), elements?)?;
+            Some(Group { name: name.to_owned(), velocities, subjects: subjects? })
+        }
+        other => {
+            let expected = "a list of velocities (m/s), or a table with velocities and subjects";
+            reader.wrong_type(path, expected, other);
+            None
         }
     }
-    complete.then_some(Data::Groups(groups))
+}
+
+/// Reads the list `subjects`, if there is one; `None` if it is wrong.
+fn subjects(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<u32>>> {
+    if !table.has("subjects") {
+        return Some(None);
+    }
+    let elements =
+        reader.list(table, "subjects", "a list with a whole number for each velocity")?;
+    let whole = reader.whole_numbers(&table.path("subjects"), elements, SUBJECT)?;
+    Some(Some(numbered(whole)))
 }
 
 fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
     kind: JobKind,
-    from_file: impl FnOnce(&str, Option<&str>) -> Result<Data, Vec<velocities::CsvError>>,
-) -> Option<Data> {
+    from_file: impl FnOnce(&str, NamedColumns<'_>) -> Result<Measurements, Vec<CsvError>>,
+) -> Option<Measurements> {
     let path = table.path("velocities");
-    let column = column(reader, table);
+    let [group, subject] = ["group", "subject"].map(|key| column(reader, table, key));
     match &table.get("velocities")?.value {
         Value::List(_) if table.has("group") => {
             let message = "names a column of a file, but velocities is a list; \
@@ -162,9 +227,25 @@ fn velocities(
             reader.violations.add(table.path("group"), message);
             None
         }
-        Value::List(elements) => reader.numbers(&path, elements).map(Data::Velocities),
+        Value::List(_) if table.has("subject") => {
+            let message = "names a column of a file, but velocities is a list; \
+                           give the name of a CSV file, or the list `subjects`";
+            reader.violations.add(table.path("subject"), message);
+            None
+        }
+        Value::List(elements) => {
+            let subjects = subjects(reader, table);
+            let velocities = reader.numbers(&path, elements)?;
+            Some(Measurements::Velocities { velocities, subjects: subjects? })
+        }
+        Value::Text(_) if table.has("subjects") => {
+            let message = "has a subject for each of a list of velocities, but velocities is a file; \
+                           name its column: subject = \"…\"";
+            reader.violations.add(table.path("subjects"), message);
+            None
+        }
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match from_file(name, column) {
+        Value::Text(name) => match from_file(name, NamedColumns { group, subject }) {
             Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
@@ -184,13 +265,13 @@ fn velocities(
     }
 }
 
-/// Returns the name of the column of groups.
-fn column<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<&'a str> {
-    match &table.get("group")?.value {
+/// Returns the name of a column.
+fn column<'a>(reader: &mut Reader, table: &Table<'a>, key: &str) -> Option<&'a str> {
+    match &table.get(key)?.value {
         Value::Text(column) => Some(column),
         other => {
             let expected = "the name of a column of the file of velocities";
-            reader.wrong_type(table.path("group"), expected, other);
+            reader.wrong_type(table.path(key), expected, other);
             None
         }
     }
@@ -198,16 +279,18 @@ fn column<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<&'a str> {
 
 fn from_file(
     path: &Path,
-    column: Option<&str>,
-) -> Result<(Data, Origin), Vec<velocities::CsvError>> {
-    Ok(match column {
-        Some(column) => {
-            let Measured { data, origin } = velocities::read_groups(path, column)?;
-            (Data::Groups(data), origin)
+    named: NamedColumns<'_>,
+) -> Result<(Measurements, Origin), Vec<CsvError>> {
+    let Measured { data: mut groups, origin } = velocities::read(path, named)?;
+    let measurements = match (named.group, groups.pop()) {
+        // Without a column of groups all velocities are in one.
+        (None, Some(Group { velocities, subjects, .. })) => {
+            Measurements::Velocities { velocities, subjects }
         }
-        None => {
-            let Measured { data, origin } = velocities::read(path)?;
-            (Data::Velocities(data), origin)
+        (_, last) => {
+            groups.extend(last);
+            Measurements::Groups(groups)
         }
-    })
+    };
+    Ok((measurements, origin))
 }

@@ -1,6 +1,7 @@
 //! The JSON Schema of job files, by which editors complete them.
 
 use osteon_common::case::Setup;
+use osteon_common::check::{COUNT, REPEATABILITY};
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
@@ -95,12 +96,21 @@ fn described(mut schema: Json, Key { meaning, .. }: Key) -> Json {
 fn data() -> Json {
     let above_zero = || json!({ "type": "number", "exclusiveMinimum": 0 });
     let list = || json!({ "type": "array", "items": above_zero() });
+    let name = || json!({ "type": "string" });
+    let subjects = || json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } });
+    let mut group = object(json!({ "velocities": list(), "subjects": subjects() }));
+    group["required"] = json!(["velocities"]);
+    let group = json!({ "anyOf": [list(), group] });
     let types = [
-        json!({ "anyOf": [{ "type": "string" }, list()] }),
-        json!({ "type": "string" }),
-        json!({ "type": "object", "additionalProperties": list() }),
+        json!({ "anyOf": [name(), list()] }),
+        name(),
+        name(),
+        json!({ "type": "object", "additionalProperties": group }),
+        subjects(),
         above_zero(),
         above_zero(),
+        json!({ "type": "integer", "minimum": COUNT.min, "maximum": COUNT.max }),
+        number(Some(0.0), REPEATABILITY),
     ];
     let properties = data_section::KEYS.into_iter().zip(types);
     let properties = properties.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));

@@ -66,7 +66,7 @@ impl From<&Inference> for Identified {
 /// Relative standard errors of both moments, by their causes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Noise {
-    /// Errors by the noise of the data; null where only their moments are known.
+    /// Errors by the noise of the data; null where only their moments are known, and not `data.count`.
     pub data: Option<Moments>,
     /// Errors by the sampling of the model.
     pub sampling: Moments,

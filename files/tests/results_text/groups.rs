@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::*;
 
 fn group(name: &str, status: Status, best: Option<BestPoint>) -> GroupResult {
-    let velocities = vec![3850.0, 3900.0, 3925.0, 4000.0];
-    let data = DataSummary::from_data(&Data::Velocities(velocities), 0);
+    let velocities = vec![3850.0, 3900.0, 3918.75, 3925.0, 4000.0];
+    let data = DataSummary::from_data(&Data::from_velocities(velocities), 0);
     let (name, conclusions) = (name.to_owned(), Conclusions::default());
     GroupResult { name, status, reason: None, best, data, conclusions }
 }

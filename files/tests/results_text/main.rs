@@ -195,7 +195,7 @@ fn a_likelihood_has_an_error_and_no_tolerance() {
     (best.cost, best.cost_error) = (Some(6.0625), Some(0.0025));
     let job = JobSpecification {
         objective: Objective::Likelihood,
-        data: Some(Data::Velocities(vec![3900.0, 3950.0, 3925.5])),
+        data: Some(Data::from_velocities(vec![3900.0, 3950.0, 3925.5])),
         ..specification()
     };
     check("result_likelihood", &identified_by(&job, &result));
@@ -382,8 +382,8 @@ fn history() {
 #[test]
 fn the_history_names_start_and_group() {
     let mut specification = specification();
-    let group = |name: &str| Group { name: name.to_owned(), velocities: vec![3900.0, 3950.0] };
-    specification.data = Some(Data::Groups(vec![group("left"), group("right, \"distal\"")]));
+    let group = |name: &str| Group::new(name, vec![3900.0, 3950.0]);
+    specification.data = Some(Data::from_groups(vec![group("left"), group("right, \"distal\"")]));
     specification.search.starts = 2;
     let row = Evaluation {
         number: 7,

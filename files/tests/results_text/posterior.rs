@@ -166,8 +166,8 @@ fn the_columns_are_documented() {
 
 #[test]
 fn draws_of_groups_follow_each_other() {
-    let groups = vec![Group { name: "left".to_owned(), velocities: vec![3900.0, 3950.0] }];
-    let job = JobSpecification { data: Some(Data::Groups(groups)), ..specification() };
+    let groups = vec![Group::new("left", vec![3900.0, 3950.0])];
+    let job = JobSpecification { data: Some(Data::from_groups(groups)), ..specification() };
     let rows = |name: &str| ROWS.map(|row| format!("{row},{name}\n")).concat();
     assert_eq!(
         posterior_csv::posterior(&job, &of_groups()),

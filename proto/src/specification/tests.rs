@@ -4,6 +4,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
+use osteon_common::moments::Moments;
 use osteon_common::settings::{Method, SolverSettings};
 use osteon_files::document::Format;
 use osteon_files::job_file;
@@ -40,23 +41,49 @@ fn parameters() -> impl Strategy<Value = [Range; 7]> {
 }
 
 fn data() -> impl Strategy<Value = Data> {
-    prop_oneof![
+    let noise = (any::<bool>(), 2_usize..9, 0.0..0.9);
+    let exact = prop_oneof![
         // The fixed first value keeps the velocities from being all equal.
         proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
             velocities.insert(0, 1999.0);
-            Data::Velocities(velocities)
+            Data::from_velocities(velocities)
         }),
         proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
             let group = |(i, name): (usize, &String)| Group {
                 name: format!("{name}{i}"),
                 velocities: vec![1999.0, 2000.0 + i as f64],
+                subjects: None,
             };
-            Data::Groups(names.iter().enumerate().map(group).collect())
+            Data::from_groups(names.iter().enumerate().map(group).collect())
         }),
         (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
-            Data::Moments { mean, coefficient_of_variation }
+            Data::from_moments(mean, coefficient_of_variation)
         }),
-    ]
+    ];
+    (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
+}
+
+/// Adds what may be known of the noise, by chance.
+fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
+    if !known {
+        return data;
+    }
+    let numbers = |count: usize| Some(numbered((0..count).map(|k| (k * k) % few)));
+    let smallest = (0..data.sets()).map(|set| {
+        let Moments { mean, coefficient_of_variation } = data.moments(set);
+        mean * coefficient_of_variation
+    });
+    data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
+    match &mut data.measurements {
+        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Groups(groups) => {
+            for group in groups.iter_mut().step_by(2) {
+                group.subjects = numbers(group.velocities.len());
+            }
+        }
+        Measurements::Moments { count, .. } => *count = Some(few as u64),
+    }
+    data
 }
 
 fn solver() -> impl Strategy<Value = SolverSettings> {
@@ -163,7 +190,7 @@ fn message() -> v1::JobSpecification {
     to_message(&JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean: 3906.0, coefficient_of_variation: 0.027 }),
+        data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: std::array::from_fn(free),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),

@@ -27,7 +27,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
     }
 }
 
-const MOMENTS: Data = Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 };
+const MOMENTS: Data = Data::from_moments(3900.0, 0.03);
 
 /// Uses the speed of the bulk wave instead of the solver's velocity.
 fn speeds(realizations: &Realizations) -> Vec<RealizationResult> {
@@ -74,14 +74,15 @@ fn groups_are_found_as_each_of_them_alone() {
         [3800.0, 3900.0, 4000.0].map(|mean| vec![0.97 * mean, 1.01 * mean, 1.02 * mean]);
     let name = |k: usize| format!("group {k}");
     let groups = velocities.iter().enumerate();
-    let groups =
-        groups.map(|(k, velocities)| Group { name: name(k), velocities: velocities.clone() });
+    let groups = groups.map(|(k, velocities)| Group::new(name(k), velocities.clone()));
     let together =
-        identified(&specification(Data::Groups(groups.collect()), SearchMethod::Newton)).result;
+        identified(&specification(Data::from_groups(groups.collect()), SearchMethod::Newton))
+            .result;
     assert_eq!((together.status, together.groups.len()), (Status::Converged, 3));
     assert_eq!(together.best, None);
     for (k, (group, velocities)) in together.groups.iter().zip(velocities).enumerate() {
-        let alone = identified(&specification(Data::Velocities(velocities), SearchMethod::Newton));
+        let alone =
+            identified(&specification(Data::from_velocities(velocities), SearchMethod::Newton));
         let (best, alone) = (group.best.as_ref().unwrap(), alone.result.best.unwrap());
         assert_eq!(group.name, name(k));
         assert_eq!(

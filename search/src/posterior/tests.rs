@@ -62,7 +62,7 @@ fn specification(
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Velocities(velocities(&OPTIMUM, count))),
+        data: Some(Data::from_velocities(velocities(&OPTIMUM, count))),
         parameters,
         monte_carlo: MonteCarlo::default(),
         objective: Objective::Moments,

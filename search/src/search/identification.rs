@@ -94,8 +94,9 @@ impl IdentificationSearch {
     pub(super) fn ending(&self, specification: &JobSpecification) -> Ending {
         let endings = self.endings();
         match (&specification.data, endings.as_slice()) {
-            (Some(Data::Groups(groups)), endings) => {
-                let (unsearched, searched): (Vec<_>, Vec<_>) = groups
+            (Some(data), endings) if data.is_grouped() => {
+                let (unsearched, searched): (Vec<_>, Vec<_>) = data
+                    .groups()
                     .iter()
                     .zip(endings)
                     .partition(|(group, _)| group.no_variation().is_some());

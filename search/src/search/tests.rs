@@ -23,7 +23,7 @@ fn specification(max_evaluations: u64) -> JobSpecification {
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
+        data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
         monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
         objective: Objective::default(),
@@ -98,7 +98,7 @@ fn newton_finds_what_made_the_data() {
 #[test]
 fn newton_says_why_it_settled_above_its_tolerance() {
     let mut job = by_newton(400);
-    job.data = Some(Data::Moments { mean: 2000.0, coefficient_of_variation: 0.03 });
+    job.data = Some(Data::from_moments(2000.0, 0.03));
     let (search, _) = run(&job);
     let Ending { status, reason, .. } = ending(&search);
     let reason = reason.unwrap();
@@ -320,7 +320,7 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
     let data = statistics::estimate(&other, &truth, &explained(&other, &truth)).unwrap().moments;
     let Moments { mean, coefficient_of_variation } = data;
     let specification = Arc::new(JobSpecification {
-        data: Some(Data::Moments { mean, coefficient_of_variation }),
+        data: Some(Data::from_moments(mean, coefficient_of_variation)),
         monte_carlo: asked,
         ..specification(400)
     });

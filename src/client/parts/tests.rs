@@ -15,8 +15,8 @@ fn output(grouped: bool) -> Fetched {
         return output;
     }
     let groups = ["left", "right"].map(|name| (name.to_owned(), vec![3900.0, 3950.0]));
-    let data = groups.map(|(name, velocities)| Group { name, velocities }).to_vec();
-    let data = Data::Groups(data);
+    let data = groups.map(|(name, velocities)| Group::new(name, velocities)).to_vec();
+    let data = Data::from_groups(data);
     let group = |(set, name): (usize, &str)| {
         let mut conclusions = output.result.conclusions.clone();
         conclusions.posterior.clone_from(&posterior);

@@ -135,7 +135,7 @@ fn propagation(realizations: u64) -> JobSpecification {
 fn identification(realizations: u64) -> JobSpecification {
     let mut job = propagation(realizations);
     job.kind = JobKind::Identification;
-    job.data = Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 });
+    job.data = Some(Data::from_moments(3900.0, 0.03));
     job.parameters[6] = Range::Free { start: 0.1, lower: 0.02, upper: 0.3 };
     job
 }

@@ -29,7 +29,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
     let specification = Arc::new(JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
+        data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
         monte_carlo: MonteCarlo { realizations: 2, ..MonteCarlo::default() },
         objective: Objective::default(),

@@ -23,7 +23,7 @@ pub(super) fn job(id: u64) -> JobRecord {
     let specification = JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::Velocities(vec![3900.25, 3901.5])),
+        data: Some(Data::from_velocities(vec![3900.25, 3901.5])),
         parameters,
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),

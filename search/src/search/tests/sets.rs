@@ -109,9 +109,10 @@ fn grouped(means: &[f64]) -> JobSpecification {
     let group = |(k, mean): (usize, &f64)| Group {
         name: format!("group {k}"),
         velocities: vec![0.97 * mean, 1.03 * mean],
+        subjects: None,
     };
     let groups = means.iter().enumerate().map(group).collect();
-    JobSpecification { data: Some(Data::Groups(groups)), ..by_newton(60) }
+    JobSpecification { data: Some(Data::from_groups(groups)), ..by_newton(60) }
 }
 
 #[test]
@@ -196,8 +197,9 @@ fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
     let group = |(name, velocities): &(&str, &[f64])| Group {
         name: (*name).to_owned(),
         velocities: velocities.to_vec(),
+        subjects: None,
     };
-    let data = Some(Data::Groups(groups.iter().map(group).collect()));
+    let data = Some(Data::from_groups(groups.iter().map(group).collect()));
     JobSpecification { data, ..specification(400) }
 }
 

@@ -4,7 +4,7 @@ use std::ops::Bound;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::{Data, Group, JobSpecification};
+use osteon_common::job::{Data, Group, JobSpecification, VelocitySet};
 use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
@@ -116,17 +116,17 @@ fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
 
 /// Returns the approximate memory of a specification, bytes.
 fn bytes(specification: &JobSpecification) -> u64 {
-    let velocities = match &specification.data {
-        Some(Data::Velocities(velocities)) => size_of_val(velocities.as_slice()),
-        Some(Data::Groups(groups)) => {
-            let of = |group: &Group| {
-                size_of::<Group>() + group.name.len() + size_of_val(group.velocities.as_slice())
-            };
-            groups.iter().map(of).sum()
-        }
-        Some(Data::Moments { .. }) | None => 0,
+    let of_data = |data: &Data| {
+        let names: usize =
+            data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
+        let of_set = |set: VelocitySet<'_>| {
+            size_of_val(set.velocities) + set.subjects.map_or(0, |subjects| size_of_val(subjects))
+        };
+        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
+        names + sets
     };
-    (size_of::<JobSpecification>() + velocities) as u64
+    let data = specification.data.as_ref().map_or(0, of_data);
+    (size_of::<JobSpecification>() + data) as u64
 }
 
 fn resubmit(

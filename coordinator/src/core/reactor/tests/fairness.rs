@@ -57,7 +57,7 @@ fn large_evaluations_wait_for_room() {
 fn what_waits_is_bounded_in_bytes() {
     let of = |client: &str, velocities: usize| {
         let mut specification = identification(1);
-        specification.data = Some(Data::Velocities(vec![3900.0; velocities]));
+        specification.data = Some(Data::from_velocities(vec![3900.0; velocities]));
         let (specification, client) = (Arc::new(specification), client.to_owned());
         request(
             0,

@@ -1,0 +1,79 @@
+//! What can be wrong with a CSV file of velocities, or with one of its lines.
+
+use std::io;
+
+use osteon_common::check::VELOCITY;
+use osteon_common::{limits, visible};
+use thiserror::Error;
+
+/// The column of the velocities.
+pub(super) const COLUMN: &str = "velocity";
+/// Maximum number of characters of a file's text that a message quotes.
+const SHOWN_CHARACTERS_MAX: usize = 60;
+
+/// What is wrong, as the rest of a sentence about a file or a line.
+#[derive(Debug, Error)]
+pub(super) enum Problem {
+    #[error("cannot be read: {0} (its path is relative to the job file)")]
+    Unreadable(io::Error),
+    #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
+    TooLarge,
+    #[error(
+        "is longer than {} bytes; a line has the fields of one velocity",
+        limits::LINE_BYTES_MAX
+    )]
+    LongLine,
+    #[error("is not UTF-8 text")]
+    NotUtf8,
+    #[error("has no header; its first line must name the columns, one of them `{COLUMN}`")]
+    Empty,
+    #[error("is not a header; it must name the columns, one of them `{COLUMN}`")]
+    NoHeader,
+    #[error("no column `{column}`; the header has {columns}")]
+    NoColumn { column: String, columns: String },
+    #[error("the header has the column `{column}` twice")]
+    RepeatedColumn { column: String },
+    #[error("{column} is empty; it must name the {named} of the velocity")]
+    NoName { column: String, named: &'static str },
+    #[error(
+        "no group of the column `{column}` has two velocities that differ; a coefficient of variation \
+         needs at least two different ones"
+    )]
+    NoVariation { column: String },
+    #[error("has more than {} groups", limits::GROUPS_MAX)]
+    TooManyGroups,
+    #[error("the number of fields is {found}; the header has {expected}")]
+    FieldCount { found: usize, expected: usize },
+    #[error("a quote is not closed, or stands inside a field")]
+    Quote,
+    #[error("velocity is empty; it must be a number above 0 (m/s)")]
+    NoNumber,
+    #[error("velocity is {found:?}; it must be a number above 0 (m/s)")]
+    NotANumber { found: String },
+    #[error("velocity {}", VELOCITY.refusal(*.found))]
+    Refused { found: f64 },
+    #[error("has no rows; a coefficient of variation needs at least two velocities")]
+    NoRows,
+    #[error("has one velocity; a coefficient of variation needs at least two")]
+    OneRow,
+    #[error("has more than {} velocities", limits::DATA_VELOCITIES_MAX)]
+    TooMany,
+    #[error(
+        "has more than {} velocities, the most that can have subjects",
+        limits::DATA_SUBJECTS_MAX
+    )]
+    TooManySubjects,
+    #[error("more lines with errors are not listed")]
+    More,
+}
+
+/// Returns the beginning of a text, on one line.
+pub(super) fn shortened(text: &str) -> String {
+    visible::line(&text.chars().take(SHOWN_CHARACTERS_MAX).collect::<String>()).into_owned()
+}
+
+/// Returns a list of names, shortened.
+pub(super) fn listed(names: &[String]) -> String {
+    let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    shortened(&names.join(", "))
+}
