@@ -255,6 +255,9 @@ mod tests {
     use std::sync::mpsc as blocking;
 
     use futures::FutureExt as _;
+    use osteon_common::parameters::Point;
+    use osteon_common::posterior::PosteriorDraw;
+    use prost::Message as _;
     use tokio::sync::{OwnedSemaphorePermit, Semaphore};
     use tokio::time::advance;
     use tonic::Code;
@@ -381,6 +384,27 @@ mod tests {
         assert_eq!(last.code(), Code::DeadlineExceeded);
         assert!(last.message().contains("not read and computed"), "{last}");
         assert_eq!(semaphore.available_permits(), 1);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn draws_follow_the_realizations_in_blocks_that_follow_each_other() {
+        let draw = PosteriorDraw {
+            point: Point([1.0; 7]),
+            log_density: -1.5,
+            mean: 3900.0,
+            coefficient_of_variation: 0.03,
+        };
+        let blocks = ResultBlocks { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
+        let stream =
+            paced((), |reader| async move { send_blocks(Some(3), &blocks, &reader).await });
+        let parts: Vec<_> = stream.map(|part| part.unwrap().part.unwrap()).collect().await;
+        let [Part::Realizations(_), Part::Draws(first), Part::Draws(last)] = parts.as_slice()
+        else {
+            panic!("{} other parts", parts.len());
+        };
+        assert_eq!((first.group, first.first, first.draws.len()), (Some(3), 0, DRAW_BLOCK));
+        assert_eq!((last.group, last.first, last.draws.len()), (Some(3), DRAW_BLOCK as u64, 1));
+        assert!(first.encoded_len() < 1 << 20, "{} bytes", first.encoded_len());
     }
 
     /// Advances time until the stream has an item.
