@@ -105,7 +105,7 @@ impl PosteriorSettings {
     pub const KEY: Key = Key {
         name: "posterior",
         meaning: "if this section is there, even without keys, the posterior of the free parameters \
-                  is computed after the search ([searches.md](searches.md)); it requires at least \
+                  is computed after the search ([searches.md](searches.md#posterior)); it requires at least \
                   two realizations, and `identify`",
     };
 }

@@ -5,7 +5,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 
 use super::population::{Member, Population, moments as moments_of, normalised};
-use super::{EFFICIENCY_MIN, PosteriorSearch, Stage, pareto};
+use super::{EFFICIENCY_MIN, PosteriorSearch, pareto};
 
 /// Sobol' points of the population that the result summarises.
 const POINTS: u64 = 1 << 14;
@@ -22,7 +22,7 @@ impl PosteriorSearch {
         specification: &JobSpecification,
         errors: [f64; 2],
     ) -> Option<Posterior> {
-        let problem = self.problem.as_ref().filter(|_| self.stage == Stage::Done)?;
+        let problem = self.problem.as_ref().filter(|_| self.done)?;
         let problem = &problem.with_model_errors(errors);
         let population = problem.population(&self.surrogate, POINTS, self.populations);
         if population.members.is_empty() {

@@ -32,8 +32,8 @@ const BOUNDS: [[f64; 2]; 7] = [
 fn model(point: &Point) -> Option<Moments> {
     let closed = closed_form(point)?;
     let at = features(point)?;
-    let mean = -0.012 + 0.01 * libm::exp(at[0]) * at[1] - 0.004 * libm::sin(2.0 * at[2]);
-    let variation = -1.33 + 0.05 * at[1] * at[1] + 0.03 * libm::exp(2.0 * at[6]);
+    let mean = -0.012 + 0.02 * at[0] * at[1] - 0.03 * at[2] * at[2];
+    let variation = -1.33 + 0.1 * at[1] * at[1] + 0.03 * libm::exp(2.0 * at[6]);
     let [mean, variation] = [closed[0] + mean, closed[1] + variation];
     Some(Moments { mean: libm::exp(mean), coefficient_of_variation: libm::exp(variation) })
 }
