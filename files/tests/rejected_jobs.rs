@@ -390,8 +390,7 @@ fn noise_of_the_data() {
         format!("{given}\nrepeatability = -1.0"),
         format!("{given}\nrepeatability = nan"),
         format!("{given}\nrepeatability = \"5 m/s\""),
-        // The standard deviation of the three is 40.621.
-        format!("{given}\nrepeatability = 40.6"),
+        // The standard deviation of the three is 40.62.
         format!("{given}\nrepeatability = 40.7"),
         format!("{moments}repeatability = 117.1"),
         "groups = { a = [3900.0], b = [3900.0, 4000.0] }\nrepeatability = 50.0".to_owned(),
@@ -414,6 +413,8 @@ fn noise_of_the_data() {
     ];
     let edits = edits.each_ref().map(|to| (given, to.as_str()));
     check("rejected_data_noise", JobKind::Identification, &edits);
+    let below = edited(given, &format!("{given}\nrepeatability = 40.6"));
+    assert_eq!(refusal(&below, JobKind::Identification), "ACCEPTED");
 }
 
 #[test]

@@ -98,7 +98,12 @@ fn data() -> Json {
     let list = || json!({ "type": "array", "items": above_zero() });
     let name = || json!({ "type": "string" });
     let subjects = || json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } });
-    let mut group = object(json!({ "velocities": list(), "subjects": subjects() }));
+    let of_group = [
+        (Key { name: "velocities", meaning: "velocities of the group, m/s" }, list()),
+        (Key { name: "subjects", meaning: "subject of each velocity, a whole number" }, subjects()),
+    ];
+    let of_group = of_group.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
+    let mut group = object(of_group.into_iter().collect::<Map<_, _>>().into());
     group["required"] = json!(["velocities"]);
     let group = json!({ "anyOf": [list(), group] });
     let types = [

@@ -195,7 +195,7 @@ fn a_likelihood_has_an_error_and_no_tolerance() {
     (best.cost, best.cost_error) = (Some(6.0625), Some(0.0025));
     let job = JobSpecification {
         objective: Objective::Likelihood,
-        data: Some(Data::from_velocities(vec![3900.0, 3950.0, 3925.5])),
+        data: Some(Data::from_velocities(vec![3900.0, 3950.0, 3925.5, 3910.0, 3940.0])),
         ..specification()
     };
     check("result_likelihood", &identified_by(&job, &result));

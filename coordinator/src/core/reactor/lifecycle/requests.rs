@@ -120,7 +120,7 @@ fn bytes(specification: &JobSpecification) -> u64 {
         let names: usize =
             data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
         let of_set = |set: VelocitySet<'_>| {
-            size_of_val(set.velocities) + set.subjects.map_or(0, |subjects| size_of_val(subjects))
+            size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
         };
         let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
         names + sets
