@@ -128,11 +128,15 @@ fn the_default_tolerance_is_that_of_the_method() {
     check("[search]\nmethod = \"simplex\"\n", Search::default());
 }
 
+/// A minimal job whose data have a noise, as a posterior needs.
+fn counted(text: &str) -> JobSpecification {
+    let minimal = MINIMAL.replace("mean = 3906.0", "mean = 3906.0\ncount = 2747");
+    job(&format!("{minimal}\n{text}"), Format::Toml, JobKind::Identification)
+}
+
 #[test]
 fn a_posterior_is_asked_for_by_its_section_or_by_the_method() {
-    let given = |text: &str| {
-        job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification).posterior
-    };
+    let given = |text: &str| counted(text).posterior;
     let default = PosteriorSettings::default();
     assert_eq!((default.draws, default.max_evaluations), (2000, 400));
     assert_eq!(given(""), None);
@@ -146,7 +150,7 @@ fn a_posterior_is_asked_for_by_its_section_or_by_the_method() {
         center = 17000000000.0\nspread = 0.125\n\n\
         [posterior.priors.dispersion]\ndistribution = \"normal\"\ncenter = 0.1\nspread = 0.05\n";
     let expected = PosteriorSettings { draws: 500, max_evaluations: 100, priors };
-    let read = job(&format!("{MINIMAL}\n{text}"), Format::Toml, JobKind::Identification);
+    let read = counted(text);
     assert_eq!(read.posterior, Some(expected));
     let written = job_file::to_toml(&read);
     assert!(written.ends_with(&format!("\n\n{text}")), "{written}");
@@ -157,10 +161,7 @@ fn a_posterior_is_asked_for_by_its_section_or_by_the_method() {
 
 #[test]
 fn the_evaluations_of_the_posterior_are_counted() {
-    let count = |text: &str| {
-        let text = format!("{MINIMAL}\n{text}");
-        job(&text, Format::Toml, JobKind::Identification).evaluations_max()
-    };
+    let count = |text: &str| counted(text).evaluations_max();
     let searched = count("");
     assert_eq!(count("[posterior]\nmax_evaluations = 100\n"), searched + 100);
     assert_eq!(count("[search]\nmethod = \"posterior\"\n"), 400);

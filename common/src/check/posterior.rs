@@ -54,6 +54,22 @@ pub(super) fn posterior_of_job(specification: &JobSpecification, violations: &mu
         );
     }
     all_draws(specification, settings, violations);
+    noise(specification, violations);
+}
+
+/// Refuses data of which only the moments are known: nothing says how accurate they are.
+fn noise(specification: &JobSpecification, violations: &mut Violations) {
+    let unknown = specification
+        .data
+        .as_ref()
+        .is_some_and(|data| data.has_only_moments() && data.count(0).is_none());
+    if unknown && !known_wrong("data.count", violations) {
+        violations.add(
+            "data.count",
+            "is missing; a posterior needs the number of velocities behind the moments, or the \
+             velocities",
+        );
+    }
 }
 
 /// Checks the number of draws from the posteriors of all groups.
