@@ -184,6 +184,9 @@ fn reason(group: &GroupResult) -> &str {
             "the model does not match the data within their noise: no intervals"
         }
         _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
+        (_, Some(found)) if !found.undetermined.is_empty() => {
+            "the data leave directions free: no intervals without a posterior"
+        }
         _ => "",
     };
     told.unwrap_or(unknown)

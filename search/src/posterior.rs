@@ -104,12 +104,12 @@ pub(crate) struct PosteriorSearch {
     evaluations: u64,
     populations: u64,
     /// The evaluated draws of the last batch.
-    check: Check,
+    check: BatchCheck,
 }
 
 /// Evaluated draws.
 #[derive(Debug, Clone, Default)]
-struct Check {
+struct BatchCheck {
     /// Logarithm of the evaluated density minus that of the interpolated one; minus infinity where
     /// the point is infeasible.
     log_ratios: Vec<f64>,
@@ -135,7 +135,7 @@ impl PosteriorSearch {
             done: false,
             evaluations: 0,
             populations: 0,
-            check: Check::default(),
+            check: BatchCheck::default(),
         };
         known.for_each(|(point, moments)| search.learn(&point, moments));
         search.next_batch();
@@ -197,7 +197,7 @@ impl PosteriorSearch {
             self.done = true;
             return;
         }
-        self.check = Check::default();
+        self.check = BatchCheck::default();
         let draws = population.resampled(BATCH.min(left), 0.5);
         self.pending = draws.into_iter().rev().copied().collect();
     }
@@ -211,7 +211,7 @@ impl PosteriorSearch {
     }
 }
 
-impl Check {
+impl BatchCheck {
     /// Returns the share of the draws that counts after weighting with the ratios, (Σ w)²/(n Σ w²).
     fn efficiency(&self) -> f64 {
         if !self.log_ratios.iter().any(|ratio| ratio.is_finite()) {

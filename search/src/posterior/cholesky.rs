@@ -8,13 +8,13 @@ pub(super) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Appends a row of the matrix, up to and with the diagonal. Returns whether the matrix is
-    /// still positive definite; if not, nothing is appended.
-    pub(super) fn push(&mut self, row: &[f64]) -> bool {
+    /// Appends a row of the matrix, up to and with the diagonal, if the square of the new pivot is
+    /// above `square_min`, at least 0; returns whether it is.
+    pub(super) fn push(&mut self, row: &[f64], square_min: f64) -> bool {
         let Some((&diagonal, others)) = row.split_last() else { return false };
         let mut new = self.solve_lower(others);
         let pivot = diagonal - dot(&new, &new);
-        if !(pivot > 0.0 && pivot.is_finite()) {
+        if !(pivot > square_min && pivot.is_finite()) {
             return false;
         }
         new.push(pivot.sqrt());
@@ -76,7 +76,7 @@ mod tests {
         let matrix = [[4.0, 2.0, 0.6], [2.0, 5.0, 1.0], [0.6, 1.0, 3.0]];
         let mut factor = Cholesky::default();
         for (k, row) in matrix.iter().enumerate() {
-            assert!(factor.push(&row[..=k]));
+            assert!(factor.push(&row[..=k], 0.0));
         }
         let x = factor.solve(&[1.0, 2.0, 3.0]);
         for (row, b) in matrix.iter().zip([1.0, 2.0, 3.0]) {
@@ -84,7 +84,7 @@ mod tests {
         }
         // The determinant of the matrix is 44.6.
         assert!((2.0 * factor.half_log_determinant() - 44.6_f64.ln()).abs() < 1e-12);
-        assert!(!factor.push(&[4.0, 2.0, 0.6, 0.1]), "not positive definite");
+        assert!(!factor.push(&[4.0, 2.0, 0.6, 0.1], 0.0), "not positive definite");
     }
 
     #[test]

@@ -7,8 +7,10 @@ use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANT
 use super::population::{Member, Population, moments as moments_of, normalised};
 use super::{EFFICIENCY_MIN, PosteriorSearch, pareto};
 
-/// Sobol' points of the population that the result summarises.
-const POINTS: u64 = 1 << 14;
+/// Sobol' points of the population that the result summarises, with up to two free parameters and
+/// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
+/// deviation.
+const POINTS: [u64; 2] = [1 << 18, 1 << 14];
 /// Points drawn from the prior for its standard deviations.
 const PRIOR_POINTS: u64 = 4096;
 /// Smallest number of effective draws of a result that counts as converged.
@@ -24,7 +26,8 @@ impl PosteriorSearch {
     ) -> Option<Posterior> {
         let problem = self.problem.as_ref().filter(|_| self.done)?;
         let problem = &problem.with_model_errors(errors);
-        let population = problem.population(&self.surrogate, POINTS, self.populations);
+        let points = POINTS[usize::from(problem.priors.len() > 2)];
+        let population = problem.population(&self.surrogate, points, self.populations);
         if population.members.is_empty() {
             return None;
         }

@@ -28,9 +28,12 @@ const SWEEPS: [f64; 6] = [2.0, 1.6, 1.4, 1.25, 1.15, 1.1];
 const POINTS_FOR_LENGTHS_MAX: usize = 160;
 /// Variance of the noise in units of the process's variance: the velocities jump by some 1e-9
 /// where the solver's sampling changes, and more where a realization begins to fail.
-const NOISE: f64 = 1e-8;
-/// Larger noise, used if two points contradict each other.
-const NOISE_MAX: f64 = 1e-2;
+const NOISE: f64 = 1e-10;
+/// A point whose variance given those before it is smaller than this, in the same units, adds
+/// nothing but rounding errors, and is left out.
+const NEW_MIN: f64 = 1e-9;
+/// Noise while lengths are chosen; lengths with which the points are more alike than this are not.
+const NOISE_FOR_LENGTHS: f64 = 1e-8;
 
 /// The interpolation of both deviations.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +55,8 @@ pub(super) struct Scale {
 #[derive(Debug, Clone, PartialEq)]
 struct Process {
     lengths: Features,
-    noise: f64,
+    /// The points that are used, by their numbers.
+    used: Vec<usize>,
     /// Value about which the trend is taken.
     level: f64,
     /// Variance of the process.
@@ -124,7 +128,7 @@ impl Process {
     fn new(level: f64) -> Self {
         Self {
             lengths: [FIRST_LENGTH; FEATURES],
-            noise: NOISE,
+            used: Vec::new(),
             level,
             variance: 1e-4,
             factor: Cholesky::default(),
@@ -144,32 +148,36 @@ impl Process {
         (1.0 + distance + distance * distance / 3.0) * libm::exp(-distance) + TREND_VARIANCE * trend
     }
 
-    /// Conditions the process on all points, with as little noise as they allow.
+    /// Conditions the process on all points that are not practically known from others.
     fn fit(&mut self, inputs: &[Features], values: &[f64]) {
-        if values.is_empty() {
-            return;
+        self.factor = Cholesky::default();
+        self.used.clear();
+        for (k, input) in inputs.iter().enumerate() {
+            let row = self.row(inputs, input, NOISE);
+            if self.factor.push(&row, NEW_MIN) {
+                self.used.push(k);
+            }
         }
+        let values: Vec<f64> = self.used.iter().map(|k| values[*k]).collect();
+        if !values.is_empty() {
+            self.condition(&values);
+        }
+    }
+
+    /// Returns the covariances of a point with those used, and its variance.
+    fn row(&self, inputs: &[Features], at: &Features, noise: f64) -> Vec<f64> {
+        let mut row: Vec<f64> = self.used.iter().map(|k| self.kernel(&inputs[*k], at)).collect();
+        row.push(self.kernel(at, at) + noise);
+        row
+    }
+
+    /// Computes level, variance and weights from the values at the points used.
+    fn condition(&mut self, values: &[f64]) {
         self.level = values.iter().sum::<f64>() / values.len() as f64;
-        self.noise = NOISE;
-        while !self.factorise(inputs) && self.noise < NOISE_MAX {
-            self.noise *= 10.0;
-        }
         let rests: Vec<f64> = values.iter().map(|value| value - self.level).collect();
         let white = self.factor.solve_lower(&rests);
         self.variance = (dot(&white, &white) / values.len() as f64).max(1e-24);
         self.weights = self.factor.solve(&rests);
-    }
-
-    fn factorise(&mut self, inputs: &[Features]) -> bool {
-        self.factor = Cholesky::default();
-        for (k, a) in inputs.iter().enumerate() {
-            let mut row: Vec<f64> = inputs[..k].iter().map(|b| self.kernel(a, b)).collect();
-            row.push(self.kernel(a, a) + self.noise);
-            if !self.factor.push(&row) {
-                return false;
-            }
-        }
-        true
     }
 
     /// Chooses the lengths by coordinate search for the largest marginal likelihood.
@@ -193,15 +201,22 @@ impl Process {
 
     /// Returns minus the logarithm of the marginal likelihood, with the variance chosen best.
     fn misfit(&mut self, inputs: &[Features], values: &[f64]) -> f64 {
-        self.fit(inputs, values);
-        if self.weights.len() != values.len() {
-            return f64::INFINITY;
+        self.factor = Cholesky::default();
+        self.used.clear();
+        for (k, input) in inputs.iter().enumerate() {
+            let row = self.row(inputs, input, NOISE_FOR_LENGTHS);
+            if !self.factor.push(&row, 0.0) {
+                return f64::INFINITY;
+            }
+            self.used.push(k);
         }
+        self.condition(values);
         0.5 * values.len() as f64 * libm::log(self.variance) + self.factor.half_log_determinant()
     }
 
     fn mean(&self, inputs: &[Features], at: &Features) -> f64 {
-        let products = inputs.iter().zip(&self.weights).map(|(x, w)| w * self.kernel(x, at));
+        let used = self.used.iter().zip(&self.weights);
+        let products = used.map(|(k, weight)| weight * self.kernel(&inputs[*k], at));
         self.level + products.sum::<f64>()
     }
 }

@@ -145,7 +145,7 @@ fn two_parameters_have_the_posterior_of_quadrature() {
     assert!(found.converged, "{:?}", found.reason);
     let likelihood = likelihood(&specification, 0).unwrap();
     // The posterior is negligible outside these ranges.
-    let ranges = [[16.5e9, 19.0e9], [0.075, 0.135]];
+    let ranges = [[16.9e9, 18.5e9], [0.078, 0.135]];
     let nodes = 1500;
     let node = |axis: usize, k: usize| {
         let [lower, upper] = ranges[axis];

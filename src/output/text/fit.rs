@@ -121,8 +121,6 @@ pub(super) fn uniqueness(
         Objective::Moments => "Two moments",
         Objective::Likelihood => "The distribution of one velocity",
     };
-    let constrained =
-        if dispersion { "√(c1111/ρ) and the dispersion are" } else { "√(c1111/ρ) is" };
     let nearest =
         is_reached(found, specification) && specification.search.method == SearchMethod::Newton;
     let this = if nearest {
@@ -132,10 +130,16 @@ pub(super) fn uniqueness(
         "many other parameter sets fit equally well, and this is one of them."
     };
     let mut text = format!(
-        "{known} cannot determine {searched} parameters. Only {constrained} constrained; {this} \
-         Fix parameters that are known from other measurements (`fixed = …`) to narrow the others \
-         down."
+        "{known} cannot determine {searched} parameters. The data fix the mean velocity and the \
+         coefficient of variation; {this} Fix parameters that are known from other measurements \
+         (`fixed = …`) to narrow the others down."
     );
+    if found.posterior().is_none() {
+        text.push_str(
+            " A section `[posterior]` in the job file gives intervals that include what is left \
+             free.",
+        );
+    }
     if !shown_below {
         let dispersion = if dispersion {
             format!(", dispersion {}", significant(point.dispersion(), DIGITS))

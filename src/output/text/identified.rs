@@ -10,7 +10,7 @@ use super::number::{DIGITS, Decimals, digits, measured, significant};
 use super::posterior;
 use super::result::{readable, scale};
 
-/// Name of √(c1111/ρ), which the data always determine where they determine anything.
+/// Name of √(c1111/ρ).
 const SPEED: &str = "√(c1111/ρ)";
 
 /// Returns whether the uncertainty of any quantity is known.
@@ -31,7 +31,6 @@ pub(super) fn text(found: &Identification) -> String {
         text.push_str(&posterior::text(known));
     } else if let Some(known) = found.identified().filter(|_| has_confidence_intervals(found)) {
         text.push_str(&format!("\n{}{}", wrapped(&heading(known)), aligned(&rows(known))));
-        text.push_str(&condition(found, known));
     }
     text.push_str(&solutions(found));
     if let Some(from) = found.search.below_noise_from {
@@ -85,7 +84,6 @@ fn heading(known: &Identified) -> String {
         format!("{} and {}", percent(noise.mean), percent(noise.coefficient_of_variation))
     };
     let level = significant(100.0 * known.level, 3);
-    let given = if leaves_free(known) { ", given the other parameters" } else { "" };
     let sampling = format!("sampling {}", of(&known.noise.sampling));
     let counted = match &known.noise.data {
         Some(data) => format!(
@@ -98,27 +96,7 @@ fn heading(known: &Identified) -> String {
              narrow):"
         ),
     };
-    format!("{level} % confidence intervals{given} {counted}")
-}
-
-/// Returns whether parameters can be moved without changing the moments.
-fn leaves_free(known: &Identified) -> bool {
-    !known.free_directions.is_empty()
-}
-
-/// Returns the assumptions under which the intervals hold.
-fn condition(found: &Identification, known: &Identified) -> String {
-    if !leaves_free(known) {
-        return String::new();
-    }
-    let how_far = match found.solutions.as_ref().map(|solutions| solutions.matching) {
-        Some(2..) => "the ranges below show how far",
-        _ => "`[search] starts` shows how far",
-    };
-    wrapped(&format!(
-        "These intervals hold the other parameters as found. In other parameter sets that fit, \
-         {SPEED} may lie outside its interval; {how_far}."
-    ))
+    format!("{level} % confidence intervals {counted}")
 }
 
 /// Describes how far apart the solutions of several starts are.
