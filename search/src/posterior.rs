@@ -31,7 +31,7 @@ use osteon_common::posterior::Posterior;
 use osteon_common::results::{BestPoint, Evaluation, Moments};
 
 use self::features::features;
-use self::population::{Member, Problem, closed_form, normalised};
+use self::population::{Member, PosteriorProblem, closed_form, normalised};
 use self::surrogate::Surrogate;
 
 /// Sobol' points of the populations from which points to evaluate are drawn.
@@ -93,7 +93,7 @@ pub(crate) fn feasible_moments(row: &Evaluation) -> Option<Moments> {
 /// The search for the points that a posterior needs, as an ask/tell state machine.
 #[derive(Debug, Clone)]
 pub(crate) struct PosteriorSearch {
-    problem: Option<Problem>,
+    problem: Option<PosteriorProblem>,
     max_evaluations: u64,
     surrogate: Surrogate,
     /// Number of points from which the lengths were chosen.
@@ -124,7 +124,8 @@ impl PosteriorSearch {
         known: impl Iterator<Item = (Point, Moments)>,
     ) -> Self {
         let settings = specification.posterior.unwrap_or_default();
-        let problem = likelihood.and_then(|likelihood| Problem::new(specification, likelihood));
+        let problem =
+            likelihood.and_then(|likelihood| PosteriorProblem::new(specification, likelihood));
         let scale = problem.as_ref().map_or_else(|| surrogate::Scale::of(&[]), |one| one.scale);
         let mut search = Self {
             problem,
@@ -203,7 +204,7 @@ impl PosteriorSearch {
     }
 
     /// Returns whether the last batch shows that the interpolation is accurate.
-    fn passes(&self, problem: &Problem) -> bool {
+    fn passes(&self, problem: &PosteriorProblem) -> bool {
         let many = problem.priors.len() > 2;
         self.check.log_ratios.len() == BATCH
             && self.check.efficiency() >= EFFICIENCY_MIN

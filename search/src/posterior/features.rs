@@ -53,10 +53,10 @@ mod tests {
             rows[2][2] / rows[0][0],
             rows[0][2] / rows[0][0],
             0.5 * rows[4][4] / rows[0][0],
-            1598.8_f64.ln(),
+            libm::log(1598.8),
             rows[1][2] / rows[2][2],
-            (rows[0][0] / 1598.8).ln(),
-            0.1029_f64.ln(),
+            libm::log(rows[0][0] / 1598.8),
+            libm::log(0.1029),
         ];
         let found = features(&point).unwrap();
         for (found, expected) in found.iter().zip(expected) {

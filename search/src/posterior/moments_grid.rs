@@ -14,12 +14,12 @@ const NEGLIGIBLE: f64 = 22.0;
 const NARROWED: usize = 6;
 
 /// Interval of one of the moments, as logarithm.
-pub(super) type Span = [f64; 2];
+pub(super) type LogSpan = [f64; 2];
 
 /// A piecewise constant density of the logarithms of mean and coefficient of variation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MomentsGrid {
-    spans: [Span; 2],
+    spans: [LogSpan; 2],
     /// Probability of each cell: rows along the mean, columns along the variation.
     cells: Vec<[f64; CELLS]>,
 }
@@ -36,7 +36,7 @@ pub(super) struct MomentsDraw {
 impl MomentsGrid {
     /// Tabulates the likelihood where it is not negligible within `reach`, the moments that a model
     /// can have.
-    pub(super) fn new(likelihood: &DataLikelihood, reach: [Span; 2]) -> Self {
+    pub(super) fn new(likelihood: &DataLikelihood, reach: [LogSpan; 2]) -> Self {
         let (centre, errors) = (likelihood.moments(), likelihood.errors());
         let mut spans = [0, 1].map(|k| nearby(centre[k], 15.0 * errors[k], reach[k]));
         let mut logs = Vec::new();
@@ -79,7 +79,7 @@ impl MomentsGrid {
 }
 
 impl MomentsDraw {
-    fn take(&mut self, axis: usize, span: Span, cell: usize, within: f64, probability: f64) {
+    fn take(&mut self, axis: usize, span: LogSpan, cell: usize, within: f64, probability: f64) {
         let width = (span[1] - span[0]) / CELLS as f64;
         self.at[axis] = span[0] + (cell as f64 + within) * width;
         self.log_density += libm::log(probability / width);
@@ -87,7 +87,7 @@ impl MomentsDraw {
 }
 
 /// Returns the part of `reach` within a distance of `centre`, or the end of it that is nearest.
-fn nearby(centre: f64, distance: f64, reach: Span) -> Span {
+fn nearby(centre: f64, distance: f64, reach: LogSpan) -> LogSpan {
     let low = (centre - distance).clamp(reach[0], reach[1]);
     let high = (centre + distance).clamp(reach[0], reach[1]);
     if high > low {
@@ -98,11 +98,11 @@ fn nearby(centre: f64, distance: f64, reach: Span) -> Span {
     if centre > reach[1] { [reach[1] - tenth, reach[1]] } else { [reach[0], reach[0] + tenth] }
 }
 
-fn middle(span: Span, cell: usize) -> f64 {
+fn middle(span: LogSpan, cell: usize) -> f64 {
     span[0] + (cell as f64 + 0.5) * (span[1] - span[0]) / CELLS as f64
 }
 
-fn tabulated(likelihood: &DataLikelihood, spans: [Span; 2]) -> Vec<[f64; CELLS]> {
+fn tabulated(likelihood: &DataLikelihood, spans: [LogSpan; 2]) -> Vec<[f64; CELLS]> {
     let row = |i: usize| {
         std::array::from_fn(|j| likelihood.log([middle(spans[0], i), middle(spans[1], j)]))
     };
@@ -110,7 +110,7 @@ fn tabulated(likelihood: &DataLikelihood, spans: [Span; 2]) -> Vec<[f64; CELLS]>
 }
 
 /// Returns the spans of the cells that are not negligible, with one more on either side.
-fn narrowed(logs: &[[f64; CELLS]], spans: [Span; 2]) -> [Span; 2] {
+fn narrowed(logs: &[[f64; CELLS]], spans: [LogSpan; 2]) -> [LogSpan; 2] {
     let largest = largest(logs);
     let mut ends = [[CELLS, 0]; 2];
     for (i, row) in logs.iter().enumerate() {
@@ -180,7 +180,7 @@ mod tests {
                 let uniform = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(count));
                 let draw = grid.draw([true, true], uniform);
                 let log = likelihood.log(draw.at) - likelihood.log(centre);
-                let weight = (log - draw.log_density).exp();
+                let weight = libm::exp(log - draw.log_density);
                 sum += weight;
                 weights_square += weight * weight;
                 for k in 0..2 {
@@ -193,7 +193,7 @@ mod tests {
         let effective = sum * sum / weights_square / f64::from(count * count);
         assert!(effective > 0.97, "{effective}");
         for k in 0..2 {
-            let deviation = (square[k] / sum - (mean[k] / sum).powi(2)).sqrt();
+            let deviation = (square[k] / sum - (mean[k] / sum) * (mean[k] / sum)).sqrt();
             assert!((0.93..1.1).contains(&deviation), "{k}: {deviation}");
         }
         // The law of the logarithm of a standard deviation with 39 degrees of freedom is skew.

@@ -58,7 +58,7 @@ mod tests {
     fn law(k: f64, count: usize) -> Vec<f64> {
         let of = |i: usize| {
             let u = (i as f64 + 0.5) / count as f64;
-            ((1.0 - u).powf(-k) - 1.0) / k
+            (libm::pow(1.0 - u, -k) - 1.0) / k
         };
         (0..count).map(of).collect()
     }

@@ -12,7 +12,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 
 use super::features::{Features, features};
-use super::moments_grid::{MomentsGrid, Span};
+use super::moments_grid::{LogSpan, MomentsGrid};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
 use super::surrogate::{Deviations, RULE_OF_THUMB, Scale, Surrogate};
@@ -35,7 +35,7 @@ const STEP: f64 = 1e-5;
 
 /// Everything that a posterior depends on except for the model.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Problem {
+pub(super) struct PosteriorProblem {
     pub(super) likelihood: DataLikelihood,
     pub(super) priors: Vec<ParameterPrior>,
     pub(super) scale: Scale,
@@ -43,7 +43,7 @@ pub(super) struct Problem {
     base: Point,
     pivots: Pivots,
     /// Moments that models within the bounds can have.
-    reach: [Span; 2],
+    reach: [LogSpan; 2],
     grid: MomentsGrid,
     seed: u64,
 }
@@ -67,7 +67,7 @@ pub(super) struct Population {
     pub(super) weights: Vec<f64>,
 }
 
-impl Problem {
+impl PosteriorProblem {
     /// Creates the problem of a job with this likelihood of its data; `None` if no point within the
     /// bounds is admissible, or no parameter is free.
     pub(super) fn new(

@@ -110,7 +110,7 @@ mod tests {
         let cut = prior(PosteriorPrior::Normal { center: 2000.0, spread: 20.0 });
         assert!((cut.quantile(0.5) - (2000.0 - 0.674_489_75 * 20.0)).abs() < 1e-4);
         let log = prior(PosteriorPrior::LogNormal { center: 1700.0, spread: 0.01 });
-        assert!((log.quantile(0.841_344_746) - 1700.0 * 0.01_f64.exp()).abs() < 1e-3);
+        assert!((log.quantile(0.841_344_746) - 1700.0 * libm::exp(0.01)).abs() < 1e-3);
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
             let density = |u: f64| 1e-4 / (prior.quantile(u + 5e-5) - prior.quantile(u - 5e-5));
             let log = |u: f64| prior.log_density(prior.quantile(u)).unwrap();
             let found = log(0.3) - log(0.8);
-            assert!((found - (density(0.3) / density(0.8)).ln()).abs() < 1e-5, "{law:?}");
+            assert!((found - libm::log(density(0.3) / density(0.8))).abs() < 1e-5, "{law:?}");
             assert_eq!(prior.log_density(1499.0), None);
         }
     }

@@ -171,7 +171,11 @@ fn entries(population: &Population, prior: &[Point]) -> Vec<(usize, usize, Poste
         .collect()
 }
 
-fn draws(population: &Population, problem: &super::Problem, count: usize) -> Vec<PosteriorDraw> {
+fn draws(
+    population: &Population,
+    problem: &super::PosteriorProblem,
+    count: usize,
+) -> Vec<PosteriorDraw> {
     let draw = |member: &Member| {
         let log_prior = problem.priors.iter().map(|prior| {
             prior.log_density(member.point.get(prior.parameter)).unwrap_or(f64::NEG_INFINITY)

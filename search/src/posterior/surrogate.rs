@@ -233,7 +233,7 @@ mod tests {
 
     /// A smooth function of two features.
     fn deviations(x: &Features) -> Deviations {
-        [0.01 * (2.0 * x[0]).sin() * (1.0 + x[1]), -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0]]
+        [0.01 * libm::sin(2.0 * x[0]) * (1.0 + x[1]), -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0]]
     }
 
     #[test]
