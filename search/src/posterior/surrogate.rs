@@ -243,9 +243,8 @@ mod tests {
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         for x in sample(50, 4) {
-            let (found, expected) = (surrogate.mean(&x), deviations(&x));
-            for k in 0..2 {
-                assert!((found[k] - expected[k]).abs() < 2e-3, "{k}: {} {}", found[k], expected[k]);
+            for (found, expected) in surrogate.mean(&x).iter().zip(deviations(&x)) {
+                assert!((found - expected).abs() < 2e-3, "{found} {expected}");
             }
         }
     }
@@ -258,9 +257,8 @@ mod tests {
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         for x in &inputs {
-            let found = surrogate.mean(x);
-            for k in 0..2 {
-                assert!((found[k] - deviations(x)[k]).abs() < 1e-6);
+            for (found, expected) in surrogate.mean(x).iter().zip(deviations(x)) {
+                assert!((found - expected).abs() < 1e-6, "{found} {expected}");
             }
         }
     }

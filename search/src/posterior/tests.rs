@@ -197,9 +197,9 @@ fn seven_parameters_have_the_posterior_of_many_points_of_the_prior() {
 #[test]
 fn narrow_normal_priors_give_the_gaussian_formula() {
     let mut settings = PosteriorSettings::default();
-    let spreads = [20.0, 0.25e9, 0.006, 0.1e9, 0.15e9, 0.008, 0.02];
-    for k in 0..6 {
-        settings.priors[k] = PosteriorPrior::Normal { center: OPTIMUM.0[k], spread: spreads[k] };
+    let spreads = [20.0, 0.25e9, 0.006, 0.1e9, 0.15e9, 0.008];
+    for ((prior, center), spread) in settings.priors.iter_mut().zip(OPTIMUM.0).zip(spreads) {
+        *prior = PosteriorPrior::Normal { center, spread };
     }
     let specification = specification(&Parameter::ALL, 2747, settings);
     let found = posterior(&specification);
