@@ -9,5 +9,5 @@ mod normal;
 mod root_gamma;
 
 pub use gamma::GammaQuantile;
-pub use normal::standard_normal_quantile;
+pub use normal::{normal_probability, standard_normal_quantile};
 pub(crate) use root_gamma::root_gamma_moments;

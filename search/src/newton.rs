@@ -374,6 +374,7 @@ impl Newton {
     }
 }
 
-fn logarithms(moments: Moments) -> Logarithms {
+/// Returns the logarithms of mean velocity (m/s) and coefficient of variation.
+pub(crate) fn logarithms(moments: Moments) -> [f64; 2] {
     [moments.mean, moments.coefficient_of_variation].map(libm::log)
 }

@@ -33,6 +33,7 @@ use osteon_common::results::{BestPoint, Evaluation, Moments};
 use self::features::features;
 use self::population::{Member, PosteriorProblem, closed_form, normalised};
 use self::surrogate::Surrogate;
+use crate::newton::logarithms;
 
 /// Sobol' points of the populations from which points to evaluate are drawn.
 const SCOUTS: u64 = 2048;
@@ -99,8 +100,8 @@ pub(crate) struct PosteriorSearch {
     /// Number of points from which the lengths were chosen.
     chosen_with: usize,
     /// Draws of the current batch that are still to be evaluated, in reverse order.
+    /// Empty once the search has ended.
     pending: Vec<Member>,
-    done: bool,
     evaluations: u64,
     populations: u64,
     /// The evaluated draws of the last batch.
@@ -133,7 +134,6 @@ impl PosteriorSearch {
             surrogate: Surrogate::new(scale),
             chosen_with: 0,
             pending: Vec::new(),
-            done: false,
             evaluations: 0,
             populations: 0,
             check: BatchCheck::default(),
@@ -157,7 +157,8 @@ impl PosteriorSearch {
     pub(crate) fn tell(&mut self, moments: Option<Moments>) {
         let (Some(member), Some(problem)) = (self.pending.pop(), &self.problem) else { return };
         self.evaluations += 1;
-        let exact = moments.map_or(f64::NEG_INFINITY, |found| problem.likelihood.log(logs(found)));
+        let exact =
+            moments.map_or(f64::NEG_INFINITY, |found| problem.likelihood.log(logarithms(found)));
         self.check.log_ratios.push(exact - problem.likelihood.log(member.moments));
         if let Some(moments) = moments {
             self.learn(&member.point, moments);
@@ -168,7 +169,7 @@ impl PosteriorSearch {
     }
 
     fn learn(&mut self, point: &Point, moments: Moments) {
-        let logs = logs(moments);
+        let logs = logarithms(moments);
         let deviations =
             closed_form(point).map(|closed| [logs[0] - closed[0], logs[1] - closed[1]]);
         if let (Some(at), Some(deviations)) = (features(point), deviations)
@@ -178,24 +179,24 @@ impl PosteriorSearch {
         }
     }
 
-    /// Draws the next batch, or ends the search.
+    /// Draws the next batch, or none, which ends the search.
     fn next_batch(&mut self) {
-        let Some(problem) = &self.problem else {
-            self.done = true;
-            return;
-        };
+        let Some(problem) = &self.problem else { return };
         let passed = self.passes(problem);
         let choose = self.surrogate.len() as f64 >= GROWTH * self.chosen_with as f64;
         self.surrogate.fit(choose && self.surrogate.len() > 1);
         if choose {
             self.chosen_with = self.surrogate.len();
         }
+        let number = self.populations;
+        self.populations += 1;
         let left = self.max_evaluations.saturating_sub(self.evaluations);
         let left = usize::try_from(left).unwrap_or(usize::MAX);
-        let population = problem.population(&self.surrogate, SCOUTS, self.populations);
-        self.populations += 1;
-        if passed || left == 0 || population.members.is_empty() {
-            self.done = true;
+        if passed || left == 0 {
+            return;
+        }
+        let population = problem.population(&self.surrogate, SCOUTS, number);
+        if population.members.is_empty() {
             return;
         }
         self.check = BatchCheck::default();
@@ -231,9 +232,4 @@ impl BatchCheck {
         let squares: f64 = finite.map(|ratio| (ratio - mean) * (ratio - mean)).sum();
         (squares / count).sqrt()
     }
-}
-
-/// Returns the logarithms of both moments.
-fn logs(moments: Moments) -> [f64; 2] {
-    [moments.mean, moments.coefficient_of_variation].map(libm::log)
 }

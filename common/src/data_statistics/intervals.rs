@@ -6,7 +6,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use crate::job::VelocitySet;
 use crate::moments::{ConfidenceInterval, MomentIntervals, Moments};
 use crate::quantile::quantile;
-use crate::special::standard_normal_quantile;
+use crate::special::{normal_probability, standard_normal_quantile};
 use crate::statistics::{Sum, moments, without_repeatability};
 
 /// Probability with which an interval contains the moment of the law.
@@ -211,11 +211,6 @@ fn accelerated(mut values: Vec<f64>, found: f64, influences: &[f64]) -> Option<C
     };
     let tail = 0.5 * (1.0 - CONFIDENCE);
     Some(ConfidenceInterval { low: end(tail)?, high: end(1.0 - tail)? })
-}
-
-/// Returns the probability of the standard normal law below `z`.
-fn normal_probability(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 fn sum(values: impl Iterator<Item = f64>) -> f64 {

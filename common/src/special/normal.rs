@@ -104,6 +104,11 @@ const FAR_TAIL: Rational = (
     ],
 );
 
+/// Returns the probability of the standard normal law below `z`.
+pub fn normal_probability(z: f64) -> f64 {
+    0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,4 +1,4 @@
-//! What can be wrong with a CSV file of velocities, or with one of its lines.
+//! Faults of a CSV file of velocities, and of its lines.
 
 use std::io;
 
@@ -11,7 +11,7 @@ pub(super) const COLUMN: &str = "velocity";
 /// Maximum number of characters of a file's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
-/// What is wrong, as the rest of a sentence about a file or a line.
+/// A fault. Its message completes a sentence that begins with the file or the line.
 #[derive(Debug, Error)]
 pub(super) enum Problem {
     #[error("cannot be read: {0} (its path is relative to the job file)")]

@@ -52,7 +52,6 @@ pub(super) struct PosteriorProblem {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Member {
     pub(super) point: Point,
-    pub(super) features: Features,
     /// Logarithms of mean velocity and coefficient of variation by the interpolation.
     pub(super) moments: [f64; 2],
     /// Logarithm of the weight, with any common factor.
@@ -128,7 +127,7 @@ impl PosteriorProblem {
         for prior in self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter)) {
             point.0[prior.parameter as usize] = prior.quantile(*uniforms.next()?);
         }
-        let (point, at) = self.solved(model, point, draw.at, branch)?;
+        let point = self.solved(model, point, draw.at, branch)?;
         let mut log_prior = 0.0;
         for prior in self.priors.iter().filter(|prior| self.is_pivot(prior.parameter)) {
             log_prior += prior.log_density(point.get(prior.parameter))?;
@@ -140,7 +139,7 @@ impl PosteriorProblem {
         let jacobian = self.jacobian(model, &point, moments)?;
         let log_weight =
             log_prior + self.likelihood.log(moments) - draw.log_density - libm::log(jacobian);
-        log_weight.is_finite().then_some(Member { point, features: at, moments, log_weight })
+        log_weight.is_finite().then_some(Member { point, moments, log_weight })
     }
 
     /// Solves for the pivots: returns the point at which the model has the moments `wanted`, as far
@@ -151,7 +150,7 @@ impl PosteriorProblem {
         mut point: Point,
         wanted: [f64; 2],
         branch: usize,
-    ) -> Option<(Point, Features)> {
+    ) -> Option<Point> {
         let mut deviations: Deviations = RULE_OF_THUMB;
         let mut change = f64::INFINITY;
         for _ in 0..CORRECTIONS_MAX {
@@ -163,15 +162,14 @@ impl PosteriorProblem {
                 let value = solve(&point, pivot, wanted[0] - deviations[0], branch)?;
                 self.set(&mut point, pivot, value)?;
             }
-            let at = features(&point)?;
-            let found = model.mean(&at);
+            let found = model.mean(&features(&point)?);
             change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
             deviations = found;
             if change <= CORRECTED {
-                return Some((point, at));
+                return Some(point);
             }
         }
-        (change <= UNSOLVED).then(|| features(&point).map(|at| (point, at))).flatten()
+        (change <= UNSOLVED).then_some(point)
     }
 
     /// Sets a pivot, unless it is far outside its bounds.

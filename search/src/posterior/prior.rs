@@ -2,7 +2,7 @@
 
 use osteon_common::job::{JobSpecification, PosteriorPrior, Range};
 use osteon_common::parameters::Parameter;
-use osteon_common::special::standard_normal_quantile;
+use osteon_common::special::{normal_probability, standard_normal_quantile};
 
 /// The prior law of one free parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,11 +84,6 @@ impl ParameterPrior {
         let tiny = f64::MIN_POSITIVE;
         standard_normal_quantile((low + u * (high - low)).clamp(tiny, 1.0 - f64::EPSILON))
     }
-}
-
-/// Returns the probability of the standard normal law below `z`.
-fn normal_probability(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]

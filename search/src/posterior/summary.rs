@@ -24,7 +24,7 @@ impl PosteriorSearch {
         specification: &JobSpecification,
         errors: [f64; 2],
     ) -> Option<Posterior> {
-        let problem = self.problem.as_ref().filter(|_| self.done)?;
+        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
         let problem = &problem.with_model_errors(errors);
         let points = POINTS[usize::from(problem.priors.len() > 2)];
         let population = problem.population(&self.surrogate, points, self.populations);

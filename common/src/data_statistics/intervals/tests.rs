@@ -175,7 +175,8 @@ fn intervals_of_subjects_hold_the_mean_as_often_as_they_say() {
     assert!(share(ignoring) < 0.75, "{ignoring}");
 }
 
-/// Of 400 samples the intervals by the number of velocities behind their moments hold both.
+/// Counts, over 400 samples, the intervals computed from the moments and the number of velocities
+/// that contain the true moments.
 #[test]
 fn moments_with_a_number_have_the_noise_of_a_normal_law() {
     let mut held = [0; 2];
