@@ -108,6 +108,17 @@ pub(crate) struct PosteriorSearch {
     check: BatchCheck,
 }
 
+/// Why a batch does not show that the interpolation is accurate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Doubt {
+    /// It has only this number of draws.
+    FewDraws(usize),
+    /// Only this share of it counts after weighting.
+    Efficiency(f64),
+    /// The log density has this error, nats.
+    Error(f64),
+}
+
 /// Evaluated draws.
 #[derive(Debug, Clone, Default)]
 struct BatchCheck {
@@ -182,7 +193,7 @@ impl PosteriorSearch {
     /// Draws the next batch, or none, which ends the search.
     fn next_batch(&mut self) {
         let Some(problem) = &self.problem else { return };
-        let passed = self.passes(problem);
+        let passed = self.doubt(problem).is_none();
         let choose = self.surrogate.len() as f64 >= GROWTH * self.chosen_with as f64;
         self.surrogate.fit(choose && self.surrogate.len() > 1);
         if choose {
@@ -204,12 +215,19 @@ impl PosteriorSearch {
         self.pending = draws.into_iter().rev().copied().collect();
     }
 
-    /// Returns whether the last batch shows that the interpolation is accurate.
-    fn passes(&self, problem: &PosteriorProblem) -> bool {
-        let many = problem.priors.len() > 2;
-        self.check.log_ratios.len() == BATCH
-            && self.check.efficiency() >= EFFICIENCY_MIN
-            && (many || self.check.error() <= ERROR_MAX_OF_FEW)
+    /// Returns why the last batch does not show that the interpolation is accurate; `None` if it
+    /// does.
+    fn doubt(&self, problem: &PosteriorProblem) -> Option<Doubt> {
+        let few = problem.priors.len() <= 2;
+        let (drawn, efficiency) = (self.check.log_ratios.len(), self.check.efficiency());
+        if drawn < BATCH {
+            return Some(Doubt::FewDraws(drawn));
+        }
+        if efficiency < EFFICIENCY_MIN {
+            return Some(Doubt::Efficiency(efficiency));
+        }
+        let error = self.check.error();
+        (few && error > ERROR_MAX_OF_FEW).then_some(Doubt::Error(error))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand};
+use osteon_study::posteriors::Scenario;
 
 /// Compares the solvers, samplings and searches of osteon, and prints a table in Markdown
 #[derive(Debug, Parser)]
@@ -45,7 +46,10 @@ pub(crate) enum Study {
     Coverage(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from
     /// the prior with all seven parameters free
-    Posteriors(TwinsArguments),
+    Posteriors(PosteriorsArguments),
+    /// Compare the posterior of the example's data with importance sampling of the model itself, by
+    /// as many evaluated draws as there are realizations asked for
+    PosteriorReference(DrawsArguments),
     /// Measure how the error of the hybrid method falls with element size, order and time step
     Convergence,
 }
@@ -91,6 +95,31 @@ pub(crate) struct TwinsArguments {
     pub(crate) seed: u64,
 }
 
+/// The arguments of the calibration of posteriors.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct PosteriorsArguments {
+    /// How the velocities are made
+    #[arg(long, value_name = "NAME", default_value = Scenario::Independent.name(),
+          value_parser = scenario)]
+    pub(crate) scenario: Scenario,
+    /// Number of velocities of each data set
+    #[arg(long, value_name = "N", default_value_t = osteon_study::posteriors::VELOCITIES,
+          value_parser = clap::value_parser!(u64).range(5..=100_000))]
+    pub(crate) velocities: u64,
+    /// Number of the first parameter set, to continue an earlier table
+    #[arg(long, value_name = "K", default_value_t = 0,
+          value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    pub(crate) first: u64,
+    #[command(flatten)]
+    pub(crate) twins: TwinsArguments,
+}
+
+/// Reads the name of a scenario.
+fn scenario(text: &str) -> Result<Scenario, String> {
+    let found = Scenario::ALL.into_iter().find(|scenario| scenario.name() == text);
+    found.ok_or_else(|| format!("expected one of {}", Scenario::ALL.map(Scenario::name).join(", ")))
+}
+
 /// Most repetitions of a study.
 const REPETITIONS_MAX: u64 = 10_000;
 
@@ -112,6 +141,7 @@ mod tests {
             ("osteon-study nothing", "unrecognized subcommand"),
             ("osteon-study failures --realizations 0", "0 is not in 1..=10000000"),
             ("osteon-study methods --seed -1", "unexpected argument"),
+            ("osteon-study posteriors --scenario odd", "independent, subjects, rounded"),
         ] {
             let error = Arguments::try_parse_from(line.split_whitespace()).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{line}");

@@ -11,14 +11,17 @@ use std::process::ExitCode;
 use clap::Parser as _;
 use osteon_common::version;
 use osteon_solver::Isa;
+use osteon_study::posteriors::{self, PosteriorCalibration, reference};
 use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, posteriors, refinement, searches, setups, variance,
+    failures, methods, models, refinement, searches, setups, variance,
 };
 
-use crate::arguments::{Arguments, DrawsArguments, RepetitionsArguments, Study, TwinsArguments};
+use crate::arguments::{
+    Arguments, DrawsArguments, PosteriorsArguments, RepetitionsArguments, Study, TwinsArguments,
+};
 
 /// A study over draws.
 struct OverDraws {
@@ -50,6 +53,12 @@ const CONTINUITY: OverDraws = OverDraws {
     name: "continuity",
     realizations: continuity::REALIZATIONS,
     table: continuity::table,
+};
+
+const POSTERIOR_REFERENCE: OverDraws = OverDraws {
+    name: "posterior-reference",
+    realizations: reference::REALIZATIONS,
+    table: reference::table,
 };
 
 fn main() -> ExitCode {
@@ -97,9 +106,8 @@ fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Coverage(arguments) => {
             over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
         }
-        Study::Posteriors(arguments) => {
-            over_twins("posteriors", posteriors::REPETITIONS, posteriors::table, arguments, isa)
-        }
+        Study::Posteriors(arguments) => over_posteriors(arguments, isa),
+        Study::PosteriorReference(arguments) => over_draws(&POSTERIOR_REFERENCE, arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
     }
 }
@@ -133,6 +141,19 @@ fn over_twins(
     let seed = arguments.seed;
     let table = table(&Twins { repetitions, seed, isa }, &say)?;
     Ok(titled(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
+}
+
+fn over_posteriors(arguments: PosteriorsArguments, isa: Isa) -> Result<String, StudyError> {
+    let PosteriorsArguments { scenario, velocities, first, twins } = arguments;
+    let repetitions = twins.repetitions.unwrap_or(posteriors::REPETITIONS);
+    let seed = twins.seed;
+    let study = PosteriorCalibration { scenario, velocities, first, repetitions, seed, isa };
+    let command = format!(
+        "posteriors --scenario {} --velocities {velocities} --first {first} --repetitions \
+         {repetitions} --seed {seed}",
+        scenario.name()
+    );
+    Ok(titled(&command, &posteriors::table(&study, &say)?))
 }
 
 /// Returns a table below the command that reproduces it.

@@ -1,98 +1,188 @@
 //! Calibration of posteriors: how often their intervals contain the parameters that made the data,
 //! and where these lie among the draws.
 
+mod data;
+mod ranks;
+pub mod reference;
+
+use std::sync::mpsc;
+
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
     Search, SearchMethod,
 };
-use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
+use osteon_solver::Isa;
+use rayon::prelude::*;
 
-use crate::identify::{RealizationCache, identify, outcomes};
+pub use self::data::Scenario;
+use self::data::simulated;
+use self::ranks::Ranks;
+use crate::identify::{RealizationCache, identify};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::MarkdownTable;
-use crate::twins::Twins;
 use crate::{RowCallback, StudyError};
 
-/// Default number of data sets of each size.
+/// Default number of parameter sets.
 pub const REPETITIONS: u64 = 40;
-/// Numbers of velocities of the data sets.
-const SIZES: [u64; 3] = [20, 100, 2747];
-/// Number of realizations of the model.
-const REALIZATIONS: u64 = 128;
-/// Maximum fraction of failed realizations of the data.
-const FAILED_MAX: f64 = 0.01;
-/// Bins of the histogram of ranks.
-const BINS: usize = 10;
+/// Default number of velocities of each data set.
+pub const VELOCITIES: u64 = 100;
+/// Numbers of realizations of the model with few and with many velocities. With Sobol' points and the control
+/// variate the model's sampling error is then a small part of the data's.
+const REALIZATIONS: [u64; 2] = [32, 64];
+/// Number of velocities from which on there are many.
+const MANY: u64 = 500;
+/// Quantities of a posterior: the seven parameters and √(c1111/ρ).
+const QUANTITIES: usize = 8;
+
+/// Data sets whose posteriors are computed.
+#[derive(Debug, Clone, Copy)]
+pub struct PosteriorCalibration {
+    /// How the velocities are made.
+    pub scenario: Scenario,
+    /// Number of velocities of each data set.
+    pub velocities: u64,
+    /// Number of the first parameter set, to continue an earlier table.
+    pub first: u64,
+    /// Number of parameter sets.
+    pub repetitions: u64,
+    /// Seed of the parameter sets, the data and the germs.
+    pub seed: u64,
+    /// Instruction set, which affects only the time.
+    pub isa: Isa,
+}
 
 /// Counts of one quantity over data sets.
 #[derive(Debug, Clone, Copy, Default)]
 struct Calibration {
     within_95: u64,
     within_50: u64,
-    ranks: [u64; BINS],
+    ranks: Ranks,
+}
+
+/// Results of all data sets so far.
+#[derive(Debug, Default)]
+struct Tally {
+    posteriors: u64,
+    unusable: u64,
+    unconverged: u64,
+    evaluations: u64,
+    quantities: [Calibration; QUANTITIES],
+}
+
+/// One parameter set.
+enum Drawn {
+    /// Too many of its realizations fail.
+    Unusable,
+    Posterior(Box<Posterior>, Point),
 }
 
 /// Draws parameter sets from the prior, all seven within the bounds of the paper's example, and
 /// velocities of each; counts how many posterior intervals contain the parameters, and in which
 /// tenth of the draws they lie (simulation-based calibration: S. Talts et al., arXiv 1804.06788).
 ///
-/// Parameter sets for which more than one realization in a hundred fails are drawn again.
+/// Parameter sets for which more than one realization in a hundred fails are left out. Posteriors
+/// that did not converge are counted like the others.
 ///
 /// # Errors
 /// If a point has no ensemble.
-pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
-    let mut table = MarkdownTable::new(&[
-        "velocities",
-        "quantity",
-        "posteriors",
-        "95 % intervals that hold it (%)",
-        "50 % intervals that hold it (%)",
-        "truths in each tenth of the draws",
-    ]);
-    for size in SIZES {
-        let mut counts = [Calibration::default(); 8];
-        let (mut done, mut candidates) = (0, 0..);
-        while done < twins.repetitions {
-            let Some((truth, data)) = drawn(twins, size, candidates.next().unwrap_or(0))? else {
-                continue;
-            };
-            let specification = specification(data, twins.seed);
-            let found = identify(&specification, &mut RealizationCache::new(), twins.isa)?;
-            done += 1;
-            match found.result.conclusions.posterior {
-                Some(posterior) => {
-                    count(&posterior, &truth, &mut counts);
-                    progress(&format!("{size}: {}", line(done, &posterior, &counts)));
+pub fn table(
+    study: &PosteriorCalibration,
+    progress: RowCallback<'_>,
+) -> Result<MarkdownTable, StudyError> {
+    let mut tally = Tally::default();
+    let numbers = study.first..study.first + study.repetitions;
+    let (sender, drawn) = mpsc::channel();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            // In any order: the counts do not depend on it. The receiver lives longer.
+            numbers.into_par_iter().for_each_with(sender, |sender, number| {
+                drop(sender.send((number, posterior_of(study, number))));
+            });
+        });
+        for (number, drawn) in drawn {
+            match drawn? {
+                Drawn::Unusable => tally.unusable += 1,
+                Drawn::Posterior(posterior, truth) => {
+                    tally.add(&posterior, &truth);
+                    progress(&tally.line(number, &posterior));
                 }
-                None => progress(&format!("{size}: {done} has no posterior")),
             }
         }
-        for (k, counts) in counts.iter().enumerate() {
-            let percent = |count: u64| format!("{:.1}", 100.0 * count as f64 / done as f64);
-            let ranks: Vec<String> = counts.ranks.iter().map(u64::to_string).collect();
-            table.push(vec![
-                size.to_string(),
-                name(k),
-                done.to_string(),
-                percent(counts.within_95),
-                percent(counts.within_50),
-                ranks.join(" "),
-            ]);
-        }
-    }
-    Ok(table)
+        Ok(tally.table())
+    })
 }
 
-fn line(done: u64, posterior: &Posterior, counts: &[Calibration; 8]) -> String {
-    let held: Vec<u64> = counts.iter().map(|counts| counts.within_95).collect();
-    format!(
-        "{done} posteriors, held {held:?}; {} evaluations, {:.0} effective, converged {}",
-        posterior.evaluations, posterior.effective_draws, posterior.converged
-    )
+impl Tally {
+    fn add(&mut self, posterior: &Posterior, truth: &Point) {
+        self.posteriors += 1;
+        self.unconverged += u64::from(!posterior.converged);
+        self.evaluations += posterior.evaluations;
+        for (k, counts) in self.quantities.iter_mut().enumerate() {
+            let summary = posterior.parameters.get(k).unwrap_or(&posterior.bulk_velocity);
+            let truth = quantity(truth, k);
+            let PosteriorSummary { quantiles: [low, _, lower, _, upper, _, high], .. } = *summary;
+            counts.within_95 += u64::from((low..=high).contains(&truth));
+            counts.within_50 += u64::from((lower..=upper).contains(&truth));
+            let below = posterior.draws.iter().filter(|draw| quantity(&draw.point, k) < truth);
+            counts.ranks.add(below.count(), posterior.draws.len());
+        }
+    }
+
+    fn line(&self, number: u64, posterior: &Posterior) -> String {
+        let held: Vec<u64> = self.quantities.iter().map(|counts| counts.within_95).collect();
+        format!(
+            "set {number}: {} evaluations, {:.0} effective, efficiency {:.3}, {}; held {held:?} of {}",
+            posterior.evaluations,
+            posterior.effective_draws,
+            posterior.check_efficiency,
+            if posterior.converged { "converged" } else { "not converged" },
+            self.posteriors
+        )
+    }
+
+    fn table(&self) -> MarkdownTable {
+        let mut table = MarkdownTable::new(&[
+            "quantity",
+            "posteriors",
+            "not converged",
+            "evaluations each",
+            "95 % intervals that hold it (%)",
+            "50 % intervals that hold it (%)",
+            "truths in each tenth of the draws",
+            "largest deviation of a tenth (s.d.)",
+        ]);
+        let percent =
+            |count: u64| format!("{:.1}", 100.0 * count as f64 / self.posteriors.max(1) as f64);
+        for (k, counts) in self.quantities.iter().enumerate() {
+            table.push(vec![
+                name(k),
+                self.posteriors.to_string(),
+                self.unconverged.to_string(),
+                format!("{:.0}", self.evaluations as f64 / self.posteriors.max(1) as f64),
+                percent(counts.within_95),
+                percent(counts.within_50),
+                counts.ranks.to_string(),
+                format!("{:.1}", counts.ranks.largest_deviation()),
+            ]);
+        }
+        table
+    }
+}
+
+fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<Drawn, StudyError> {
+    let truth = mean_model(study.seed, number);
+    let Some(data) = simulated(study, &truth, number)? else {
+        return Ok(Drawn::Unusable);
+    };
+    let realizations = REALIZATIONS[usize::from(study.velocities >= MANY)];
+    let specification = specification(data, realizations, study.seed + number);
+    let found = identify(&specification, &mut RealizationCache::new(), study.isa)?;
+    let posterior = found.result.conclusions.posterior;
+    Ok(posterior.map_or(Drawn::Unusable, |found| Drawn::Posterior(Box::new(found), truth)))
 }
 
 fn name(quantity: usize) -> String {
@@ -106,40 +196,17 @@ fn quantity(point: &Point, k: usize) -> f64 {
     point.0.get(k).copied().unwrap_or_else(speed)
 }
 
-fn count(posterior: &Posterior, truth: &Point, counts: &mut [Calibration; 8]) {
-    for (k, counts) in counts.iter_mut().enumerate() {
-        let summary = posterior.parameters.get(k).unwrap_or(&posterior.bulk_velocity);
-        let truth = quantity(truth, k);
-        let PosteriorSummary { quantiles: [low, _, lower, _, upper, _, high], .. } = *summary;
-        counts.within_95 += u64::from((low..=high).contains(&truth));
-        counts.within_50 += u64::from((lower..=upper).contains(&truth));
-        let below = posterior.draws.iter().filter(|draw| quantity(&draw.point, k) < truth);
-        let rank = BINS * below.count() / (posterior.draws.len() + 1);
-        counts.ranks[rank.min(BINS - 1)] += 1;
-    }
-}
-
-/// Returns parameter set `number` with velocities; `None` if too many realizations fail.
-fn drawn(twins: &Twins, size: u64, number: u64) -> Result<Option<(Point, Vec<f64>)>, StudyError> {
-    let truth = mean_model(twins.seed, number);
-    let seed = twins.seed + 1 + number;
-    let drawn = MonteCarlo { realizations: size, seed, ..MonteCarlo::default() };
-    let data: Vec<f64> =
-        outcomes(&truth, &drawn, twins.isa)?.into_iter().filter_map(Outcome::ok).collect();
-    let enough = data.len() as f64 >= (1.0 - FAILED_MAX) * size as f64;
-    Ok(enough.then_some((truth, data)))
-}
-
-fn specification(velocities: Vec<f64>, seed: u64) -> JobSpecification {
+/// Returns a job that computes nothing but the posterior of these data, with all parameters free.
+fn specification(data: Data, realizations: u64, seed: u64) -> JobSpecification {
     let range =
         |(lower, upper): (f64, f64)| Range::Free { start: 0.5 * (lower + upper), lower, upper };
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
-        data: Some(Data::from_velocities(velocities)),
+        data: Some(data),
         parameters: BOUNDS.map(range),
         monte_carlo: MonteCarlo {
-            realizations: REALIZATIONS,
+            realizations,
             seed,
             sampling: Sampling::Sobol,
             control_variate: true,

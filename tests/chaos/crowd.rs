@@ -24,8 +24,9 @@ const MEASURED: u64 = 1200;
 /// Minimum ratio of the other client's share to that of the crowd: less than 1, since batches
 /// differ in size.
 const SHARE: f64 = 0.6;
-/// Realizations of an evaluation of the other client: so many that it rarely waits for the disk.
-const LARGE: u32 = 400;
+/// Realizations of an evaluation of the other client: so many that it does not end meanwhile. At the
+/// end of an evaluation a client waits for the disk, and others may use the slots.
+const LARGE: u32 = 20_000;
 const SEED: u64 = 11;
 const WATCHERS: usize = 20;
 

@@ -1,11 +1,15 @@
 //! Summaries of a population, and the result that they make up.
 
+use std::fmt;
+
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 
 use super::population::{Member, Population, moments as moments_of, normalised};
-use super::{EFFICIENCY_MIN, PosteriorSearch, pareto};
+use super::{
+    BATCH, Doubt, EFFICIENCY_MIN, ERROR_MAX_OF_FEW, PosteriorProblem, PosteriorSearch, pareto,
+};
 
 /// Sobol' points of the population that the result summarises, with up to two free parameters and
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
@@ -36,7 +40,7 @@ impl PosteriorSearch {
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
         let efficiency = self.check.efficiency();
         let effective = population.effective() * efficiency;
-        let reason = self.reason(efficiency, effective);
+        let reason = self.reason(problem, effective);
         let noise = problem.likelihood.errors();
         let share = |k: usize| errors[k] / noise[k] * (errors[k] / noise[k]);
         let settings = specification.posterior.unwrap_or_default();
@@ -71,15 +75,11 @@ impl PosteriorSearch {
     }
 
     /// Returns why the result is not accurate; `None` if it is.
-    fn reason(&self, efficiency: f64, effective: f64) -> Option<String> {
-        if efficiency < EFFICIENCY_MIN {
+    fn reason(&self, problem: &PosteriorProblem, effective: f64) -> Option<String> {
+        if let Some(doubt) = self.doubt(problem) {
+            let evaluations = self.evaluations;
             return Some(format!(
-                "after {} evaluations the interpolated model still differs from the model: \
-                 {:.0} % of the checked draws count, {:.0} % are needed; raise [posterior] \
-                 max_evaluations",
-                self.evaluations,
-                100.0 * efficiency,
-                100.0 * EFFICIENCY_MIN
+                "after {evaluations} evaluations {doubt}; raise [posterior] max_evaluations"
             ));
         }
         (effective < EFFECTIVE_MIN).then(|| {
@@ -88,6 +88,28 @@ impl PosteriorSearch {
                  needed: few points within the bounds match the data; widen the bounds or the priors"
             )
         })
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::FewDraws(drawn) => {
+                write!(f, "the interpolated model was checked at {drawn} draws, {BATCH} are needed")
+            }
+            Self::Efficiency(efficiency) => write!(
+                f,
+                "the interpolated model still differs from the model: {:.0} % of the checked draws \
+                 count, {:.0} % are needed",
+                100.0 * efficiency,
+                100.0 * EFFICIENCY_MIN
+            ),
+            Self::Error(error) => write!(
+                f,
+                "the interpolated model still differs from the model: by {error:.1e} in the log \
+                 density, {ERROR_MAX_OF_FEW:.0e} are allowed with up to two free parameters"
+            ),
+        }
     }
 }
 
@@ -171,11 +193,7 @@ fn entries(population: &Population, prior: &[Point]) -> Vec<(usize, usize, Poste
         .collect()
 }
 
-fn draws(
-    population: &Population,
-    problem: &super::PosteriorProblem,
-    count: usize,
-) -> Vec<PosteriorDraw> {
+fn draws(population: &Population, problem: &PosteriorProblem, count: usize) -> Vec<PosteriorDraw> {
     let draw = |member: &Member| {
         let log_prior = problem.priors.iter().map(|prior| {
             prior.log_density(member.point.get(prior.parameter)).unwrap_or(f64::NEG_INFINITY)

@@ -248,3 +248,17 @@ fn too_few_evaluations_are_said() {
     assert!(!found.converged && found.evaluations <= 20, "{}", found.evaluations);
     assert!(found.reason.unwrap().contains("max_evaluations"));
 }
+
+/// The last batch may be accurate by its efficiency and yet too small, or, with few parameters, not
+/// accurate enough.
+#[test]
+fn a_result_that_does_not_pass_is_not_called_converged() {
+    for (most, expected) in [(40, "checked at 8 draws"), (32, "1e-3 are allowed")] {
+        let settings = PosteriorSettings { max_evaluations: most, ..PosteriorSettings::default() };
+        let found = posterior(&specification(&[Parameter::Density], 100, settings));
+        assert!(found.check_efficiency > 0.95, "{}", found.check_efficiency);
+        assert!(!found.converged, "{most}");
+        let reason = found.reason.unwrap();
+        assert!(reason.contains(expected), "{reason}");
+    }
+}
