@@ -7,7 +7,7 @@ mod support;
 use std::fs;
 
 use serde_json::Value;
-use support::{Scratch, run};
+use support::{Coordinator, Scratch, eventually, run};
 
 const JOB: &str = r#"
 [data]
@@ -63,4 +63,35 @@ fn a_posterior_does_not_depend_on_the_number_of_workers() {
     within(&posterior["parameters"]["dispersion"], 0.1029);
     let shear = &posterior["parameters"]["longitudinal_shear_modulus"];
     assert!(shear["explained"].as_f64().unwrap() < 0.1, "{shear}");
+}
+
+/// Each coordinator is killed once more points of the posterior are known than before it.
+#[test]
+fn a_posterior_has_the_same_bytes_if_the_coordinator_is_killed_twice() {
+    let scratch = Scratch::new();
+    // So many realizations that the posterior takes seconds.
+    let job = JOB.replace("realizations = 16", "realizations = 400");
+    let file = scratch.write("job.toml", &job);
+    let store = scratch.path("store");
+    let mut coordinator = Coordinator::start(&store);
+    let id = coordinator.submit(&file);
+    for _ in 0..2 {
+        let _worker = coordinator.worker(1);
+        let evaluations = || coordinator.job(&id)["evaluations"].as_u64().unwrap();
+        let known = evaluations();
+        eventually("more points are known", || evaluations() > known + 3);
+        assert_eq!(coordinator.job(&id)["state"], "running", "the job ended too early");
+        coordinator.process.kill();
+        coordinator = Coordinator::start(&store);
+    }
+    let _worker = coordinator.worker(1);
+    coordinator.client(&["watch", &id]).succeeded();
+    let [fetched, undisturbed] = ["fetched", "undisturbed"].map(|name| scratch.path(name));
+    coordinator.client(&["fetch", &id, "--out", fetched.to_str().unwrap()]).succeeded();
+    let (file, to) = (file.to_str().unwrap(), undisturbed.to_str().unwrap());
+    run(&["identify", file, "--workers", "2", "--out", to]).succeeded();
+    for name in ["result.json", "posterior.csv", "history.csv"] {
+        let bytes = [&fetched, &undisturbed].map(|from| fs::read(from.join(name)).unwrap());
+        assert!(bytes[0] == bytes[1], "{name} differs");
+    }
 }

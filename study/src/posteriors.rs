@@ -108,7 +108,7 @@ pub fn table(
                 Drawn::Unusable => tally.unusable += 1,
                 Drawn::Posterior(posterior, truth) => {
                     tally.add(&posterior, &truth);
-                    progress(&tally.line(number, &posterior));
+                    progress(&tally.line(number, &posterior, &truth));
                 }
             }
         }
@@ -123,23 +123,31 @@ impl Tally {
         self.evaluations += posterior.evaluations;
         for (k, counts) in self.quantities.iter_mut().enumerate() {
             let summary = posterior.parameters.get(k).unwrap_or(&posterior.bulk_velocity);
-            let truth = quantity(truth, k);
+            let value = quantity(truth, k);
             let PosteriorSummary { quantiles: [low, _, lower, _, upper, _, high], .. } = *summary;
-            counts.within_95 += u64::from((low..=high).contains(&truth));
-            counts.within_50 += u64::from((lower..=upper).contains(&truth));
-            let below = posterior.draws.iter().filter(|draw| quantity(&draw.point, k) < truth);
-            counts.ranks.add(below.count(), posterior.draws.len());
+            counts.within_95 += u64::from((low..=high).contains(&value));
+            counts.within_50 += u64::from((lower..=upper).contains(&value));
+            counts.ranks.add(below(posterior, truth, k), posterior.draws.len());
         }
     }
 
-    fn line(&self, number: u64, posterior: &Posterior) -> String {
+    fn line(&self, number: u64, posterior: &Posterior, truth: &Point) -> String {
         let held: Vec<u64> = self.quantities.iter().map(|counts| counts.within_95).collect();
+        let places: Vec<String> = (0..QUANTITIES)
+            .map(|k| {
+                format!(
+                    "{:.1}",
+                    100.0 * below(posterior, truth, k) as f64 / posterior.draws.len() as f64
+                )
+            })
+            .collect();
         format!(
-            "set {number}: {} evaluations, {:.0} effective, efficiency {:.3}, {}; held {held:?} of {}",
+            "set {number}: {} evaluations, {:.0} effective, efficiency {:.3}, {}; truths above {} % of the draws; held {held:?} of {}",
             posterior.evaluations,
             posterior.effective_draws,
             posterior.check_efficiency,
             if posterior.converged { "converged" } else { "not converged" },
+            places.join(" "),
             self.posteriors
         )
     }
@@ -194,6 +202,12 @@ fn name(quantity: usize) -> String {
 fn quantity(point: &Point, k: usize) -> f64 {
     let speed = || bulk_velocity(point).map_or(f64::NAN, |found| libm::exp(found.logarithm));
     point.0.get(k).copied().unwrap_or_else(speed)
+}
+
+/// Returns the number of draws below the truth in quantity number `k`.
+fn below(posterior: &Posterior, truth: &Point, k: usize) -> usize {
+    let truth = quantity(truth, k);
+    posterior.draws.iter().filter(|draw| quantity(&draw.point, k) < truth).count()
 }
 
 /// Returns a job that computes nothing but the posterior of these data, with all parameters free.
