@@ -12,6 +12,7 @@
 //!
 //! All of this is a function of the specification and the evaluations, in their order.
 
+mod check;
 mod cholesky;
 mod features;
 mod moments_grid;
@@ -30,8 +31,9 @@ use osteon_common::parameters::Point;
 use osteon_common::posterior::Posterior;
 use osteon_common::results::{BestPoint, Evaluation, Moments};
 
+use self::check::{BatchCheck, Doubt};
 use self::features::features;
-use self::population::{Member, PosteriorProblem, closed_form, normalised};
+use self::population::{Member, PosteriorProblem, closed_form};
 use self::surrogate::Surrogate;
 use crate::newton::logarithms;
 
@@ -39,11 +41,6 @@ use crate::newton::logarithms;
 const SCOUTS: u64 = 2048;
 /// Draws of each batch.
 const BATCH: usize = 32;
-/// The interpolation is accepted if this share of a batch counts after weighting.
-const EFFICIENCY_MIN: f64 = 0.95;
-/// With up to two free parameters the error of the log density must also be at most this, nats.
-/// There, more accuracy costs next to nothing.
-const ERROR_MAX_OF_FEW: f64 = 1e-3;
 /// Lengths of the interpolation are chosen anew when the points have increased by this factor.
 const GROWTH: f64 = 1.5;
 
@@ -108,25 +105,6 @@ pub(crate) struct PosteriorSearch {
     check: BatchCheck,
 }
 
-/// Why a batch does not show that the interpolation is accurate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Doubt {
-    /// It has only this number of draws.
-    FewDraws(usize),
-    /// Only this share of it counts after weighting.
-    Efficiency(f64),
-    /// The log density has this error, nats.
-    Error(f64),
-}
-
-/// Evaluated draws.
-#[derive(Debug, Clone, Default)]
-struct BatchCheck {
-    /// Logarithm of the evaluated density minus that of the interpolated one; minus infinity where
-    /// the point is infeasible.
-    log_ratios: Vec<f64>,
-}
-
 impl PosteriorSearch {
     /// Creates the search for a set of data with this likelihood; `None` for the likelihood if the
     /// data have none. `known` are points of the model that have been evaluated already.
@@ -170,7 +148,7 @@ impl PosteriorSearch {
         self.evaluations += 1;
         let exact =
             moments.map_or(f64::NEG_INFINITY, |found| problem.likelihood.log(logarithms(found)));
-        self.check.log_ratios.push(exact - problem.likelihood.log(member.moments));
+        self.check.add(exact - problem.likelihood.log(member.moments));
         if let Some(moments) = moments {
             self.learn(&member.point, moments);
         }
@@ -215,39 +193,9 @@ impl PosteriorSearch {
         self.pending = draws.into_iter().rev().copied().collect();
     }
 
-    /// Returns why the last batch does not show that the interpolation is accurate; `None` if it
+    /// Returns why the last batch does not show that the result is that of the model; `None` if it
     /// does.
     fn doubt(&self, problem: &PosteriorProblem) -> Option<Doubt> {
-        let few = problem.priors.len() <= 2;
-        let (drawn, efficiency) = (self.check.log_ratios.len(), self.check.efficiency());
-        if drawn < BATCH {
-            return Some(Doubt::FewDraws(drawn));
-        }
-        if efficiency < EFFICIENCY_MIN {
-            return Some(Doubt::Efficiency(efficiency));
-        }
-        let error = self.check.error();
-        (few && error > ERROR_MAX_OF_FEW).then_some(Doubt::Error(error))
-    }
-}
-
-impl BatchCheck {
-    /// Returns the share of the draws that counts after weighting with the ratios, (Σ w)²/(n Σ w²).
-    fn efficiency(&self) -> f64 {
-        if !self.log_ratios.iter().any(|ratio| ratio.is_finite()) {
-            return 0.0;
-        }
-        let weights = normalised(&self.log_ratios);
-        let squares: f64 = weights.iter().map(|weight| weight * weight).sum();
-        1.0 / (squares * weights.len() as f64)
-    }
-
-    /// Returns the root mean square deviation of the log ratios from their mean.
-    fn error(&self) -> f64 {
-        let finite = self.log_ratios.iter().filter(|ratio| ratio.is_finite());
-        let count = finite.clone().count() as f64;
-        let mean = finite.clone().sum::<f64>() / count;
-        let squares: f64 = finite.map(|ratio| (ratio - mean) * (ratio - mean)).sum();
-        (squares / count).sqrt()
+        self.check.doubt(BATCH, problem.priors.len() <= 2)
     }
 }

@@ -15,13 +15,14 @@ use osteon_common::job::{
 };
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
+use osteon_common::statistics::PointStatistics;
 use osteon_solver::Isa;
 use rayon::prelude::*;
 
 pub use self::data::Scenario;
 use self::data::simulated;
 use self::ranks::Ranks;
-use crate::identify::{RealizationCache, identify};
+use crate::identify::{RealizationCache, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::MarkdownTable;
 use crate::{RowCallback, StudyError};
@@ -30,9 +31,12 @@ use crate::{RowCallback, StudyError};
 pub const REPETITIONS: u64 = 40;
 /// Default number of velocities of each data set.
 pub const VELOCITIES: u64 = 100;
-/// Numbers of realizations of the model with few and with many velocities. With Sobol' points and the control
-/// variate the model's sampling error is then a small part of the data's.
+/// Numbers of realizations of the model with few and with many velocities. With Sobol' points and
+/// the control variate the model's sampling error is then a small part of the data's.
 const REALIZATIONS: [u64; 2] = [32, 64];
+/// Maximum fraction of failed realizations of the model. With the default, a single one of so few
+/// would make a point infeasible.
+const FAILED_MAX: f64 = 0.1;
 /// Number of velocities from which on there are many.
 const MANY: u64 = 500;
 /// Quantities of a posterior: the seven parameters and √(c1111/ρ).
@@ -84,8 +88,8 @@ enum Drawn {
 /// velocities of each; counts how many posterior intervals contain the parameters, and in which
 /// tenth of the draws they lie (simulation-based calibration: S. Talts et al., arXiv 1804.06788).
 ///
-/// Parameter sets for which more than one realization in a hundred fails are left out. Posteriors
-/// that did not converge are counted like the others.
+/// Parameter sets at which the job's own model is infeasible are left out, as the posterior does.
+/// Posteriors that did not converge are counted like the others.
 ///
 /// # Errors
 /// If a point has no ensemble.
@@ -183,11 +187,16 @@ impl Tally {
 
 fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<Drawn, StudyError> {
     let truth = mean_model(study.seed, number);
+    let monte_carlo =
+        model_germs(REALIZATIONS[usize::from(study.velocities >= MANY)], study.seed + number);
+    let modelled = outcomes(&truth, &monte_carlo, study.isa)?;
+    if !PointStatistics::from_outcomes(&monte_carlo, &truth, &modelled).feasible {
+        return Ok(Drawn::Unusable);
+    }
     let Some(data) = simulated(study, &truth, number)? else {
         return Ok(Drawn::Unusable);
     };
-    let realizations = REALIZATIONS[usize::from(study.velocities >= MANY)];
-    let specification = specification(data, realizations, study.seed + number);
+    let specification = specification(data, monte_carlo);
     let found = identify(&specification, &mut RealizationCache::new(), study.isa)?;
     let posterior = found.result.conclusions.posterior;
     Ok(posterior.map_or(Drawn::Unusable, |found| Drawn::Posterior(Box::new(found), truth)))
@@ -211,7 +220,7 @@ fn below(posterior: &Posterior, truth: &Point, k: usize) -> usize {
 }
 
 /// Returns a job that computes nothing but the posterior of these data, with all parameters free.
-fn specification(data: Data, realizations: u64, seed: u64) -> JobSpecification {
+fn specification(data: Data, monte_carlo: MonteCarlo) -> JobSpecification {
     let range =
         |(lower, upper): (f64, f64)| Range::Free { start: 0.5 * (lower + upper), lower, upper };
     JobSpecification {
@@ -219,15 +228,21 @@ fn specification(data: Data, realizations: u64, seed: u64) -> JobSpecification {
         setup: Setup::default(),
         data: Some(data),
         parameters: BOUNDS.map(range),
-        monte_carlo: MonteCarlo {
-            realizations,
-            seed,
-            sampling: Sampling::Sobol,
-            control_variate: true,
-            ..MonteCarlo::default()
-        },
+        monte_carlo,
         objective: Objective::default(),
         search: Search::by(SearchMethod::Posterior),
         posterior: Some(PosteriorSettings::default()),
+    }
+}
+
+/// Returns the settings of a model by Sobol' points with this seed.
+fn model_germs(realizations: u64, seed: u64) -> MonteCarlo {
+    MonteCarlo {
+        realizations,
+        seed,
+        sampling: Sampling::Sobol,
+        control_variate: true,
+        max_failed_fraction: FAILED_MAX,
+        ..MonteCarlo::default()
     }
 }

@@ -1,15 +1,11 @@
 //! Summaries of a population, and the result that they make up.
 
-use std::fmt;
-
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 
-use super::population::{Member, Population, moments as moments_of, normalised};
-use super::{
-    BATCH, Doubt, EFFICIENCY_MIN, ERROR_MAX_OF_FEW, PosteriorProblem, PosteriorSearch, pareto,
-};
+use super::population::{Member, Population, moments as moments_of};
+use super::{PosteriorProblem, PosteriorSearch};
 
 /// Sobol' points of the population that the result summarises, with up to two free parameters and
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
@@ -50,10 +46,10 @@ impl PosteriorSearch {
             reason,
             evaluations: self.evaluations,
             effective_draws: effective,
-            checked_draws: self.check.log_ratios.len() as u64,
+            checked_draws: self.check.draws() as u64,
             model_error: self.check.error(),
             check_efficiency: efficiency,
-            pareto_k: pareto::shape(&normalised(&self.check.log_ratios)),
+            pareto_k: self.check.pareto_shape(),
             sampling_error: (share(0) + share(1)).sqrt(),
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
@@ -78,9 +74,7 @@ impl PosteriorSearch {
     fn reason(&self, problem: &PosteriorProblem, effective: f64) -> Option<String> {
         if let Some(doubt) = self.doubt(problem) {
             let evaluations = self.evaluations;
-            return Some(format!(
-                "after {evaluations} evaluations {doubt}; raise [posterior] max_evaluations"
-            ));
+            return Some(format!("after {evaluations} evaluations {doubt}"));
         }
         (effective < EFFECTIVE_MIN).then(|| {
             format!(
@@ -88,28 +82,6 @@ impl PosteriorSearch {
                  needed: few points within the bounds match the data; widen the bounds or the priors"
             )
         })
-    }
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::FewDraws(drawn) => {
-                write!(f, "the interpolated model was checked at {drawn} draws, {BATCH} are needed")
-            }
-            Self::Efficiency(efficiency) => write!(
-                f,
-                "the interpolated model still differs from the model: {:.0} % of the checked draws \
-                 count, {:.0} % are needed",
-                100.0 * efficiency,
-                100.0 * EFFICIENCY_MIN
-            ),
-            Self::Error(error) => write!(
-                f,
-                "the interpolated model still differs from the model: by {error:.1e} in the log \
-                 density, {ERROR_MAX_OF_FEW:.0e} are allowed with up to two free parameters"
-            ),
-        }
     }
 }
 

@@ -9,8 +9,8 @@ use super::PosteriorCalibration;
 use crate::generator::Generator;
 use crate::identify::outcomes;
 
-/// Maximum fraction of failed realizations of the data.
-const FAILED_MAX: f64 = 0.01;
+/// Realizations drawn for each velocity: some fail.
+const DRAWN_EACH: f64 = 1.5;
 /// Seeds of data, beyond those of models: their germs have to differ.
 const DATA_SEEDS: u64 = 500_000_000;
 /// Velocities of each subject.
@@ -71,12 +71,14 @@ pub(super) fn simulated(
         _ => study.velocities,
     };
     let seed = study.seed + DATA_SEEDS + number;
-    let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
-    let velocities: Vec<f64> =
+    let realizations = (DRAWN_EACH * count as f64).ceil() as u64;
+    let drawn = MonteCarlo { realizations, seed, ..MonteCarlo::default() };
+    let mut velocities: Vec<f64> =
         outcomes(truth, &drawn, study.isa)?.into_iter().filter_map(Outcome::ok).collect();
-    if (velocities.len() as f64) < (1.0 - FAILED_MAX) * count as f64 {
+    if (velocities.len() as u64) < count {
         return Ok(None);
     }
+    velocities.truncate(count as usize);
     let mut generator = Generator::for_index(!study.seed, number);
     Ok(Some(changed(study, velocities, subjects as usize, &mut generator)))
 }

@@ -14,7 +14,7 @@ use osteon_common::posterior::Posterior;
 use osteon_common::results::Estimate;
 use osteon_common::statistics::{PointStatistics, estimate};
 
-use super::{QUANTITIES, name, quantity, specification};
+use super::{QUANTITIES, model_germs, name, quantity, specification};
 use crate::draws::{Draws, OPTIMUM};
 use crate::identify::{RealizationCache, identify, outcomes};
 use crate::table::MarkdownTable;
@@ -91,7 +91,7 @@ fn posterior_of(
     study: &Draws,
     draws: Option<u64>,
 ) -> Result<Option<Posterior>, StudyError> {
-    let mut specification = specification(data, MODEL_REALIZATIONS, study.seed);
+    let mut specification = specification(data, model_germs(MODEL_REALIZATIONS, study.seed));
     if let (Some(settings), Some(draws)) = (&mut specification.posterior, draws) {
         settings.draws = draws;
     }
@@ -108,9 +108,7 @@ fn described(name: &str, posterior: &Posterior) -> String {
 
 /// Evaluates the model.
 fn evaluated(point: &Point, study: &Draws) -> Result<Option<Estimate>, StudyError> {
-    let monte_carlo =
-        specification(Data::from_velocities(Vec::new()), MODEL_REALIZATIONS, study.seed)
-            .monte_carlo;
+    let monte_carlo = model_germs(MODEL_REALIZATIONS, study.seed);
     let outcomes = outcomes(point, &monte_carlo, study.isa)?;
     let feasible = PointStatistics::from_outcomes(&monte_carlo, point, &outcomes).feasible;
     Ok(estimate(&monte_carlo, point, &outcomes).filter(|_| feasible))

@@ -1,0 +1,150 @@
+//! Comparison of evaluated draws with the interpolated model that made them.
+
+use std::fmt;
+
+use super::pareto;
+use super::population::normalised;
+
+/// The interpolation is accepted if this share of a batch counts after weighting.
+const EFFICIENCY_MIN: f64 = 0.95;
+/// With up to two free parameters the error of the log density must also be at most this, nats.
+/// There, more accuracy costs next to nothing.
+const ERROR_MAX_OF_FEW: f64 = 1e-3;
+
+/// The evaluated draws of a batch.
+#[derive(Debug, Clone, Default)]
+pub(super) struct BatchCheck {
+    /// Logarithm of the evaluated density minus that of the interpolated one; minus infinity where
+    /// the point is infeasible.
+    log_ratios: Vec<f64>,
+}
+
+/// Why a batch does not show that the result is that of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Doubt {
+    /// It has only so many draws, and not as many as needed.
+    FewDraws(usize, usize),
+    /// Only this share of the feasible draws counts after weighting.
+    Efficiency(f64),
+    /// The log density has this error, nats.
+    Error(f64),
+    /// So many of this number of draws are infeasible.
+    Infeasible(usize, usize),
+}
+
+impl BatchCheck {
+    /// Adds a draw.
+    pub(super) fn add(&mut self, log_ratio: f64) {
+        self.log_ratios.push(log_ratio);
+    }
+
+    /// Returns the number of draws.
+    pub(super) fn draws(&self) -> usize {
+        self.log_ratios.len()
+    }
+
+    /// Returns why this is not enough, if it is not: `needed` is the number of draws, `few` whether
+    /// there are at most two free parameters.
+    pub(super) fn doubt(&self, needed: usize, few: bool) -> Option<Doubt> {
+        let draws = self.draws();
+        if draws < needed {
+            return Some(Doubt::FewDraws(draws, needed));
+        }
+        let feasible = self.feasible();
+        let efficiency = efficiency(&feasible);
+        if efficiency < EFFICIENCY_MIN {
+            return Some(Doubt::Efficiency(efficiency));
+        }
+        let error = self.error();
+        if few && error > ERROR_MAX_OF_FEW {
+            return Some(Doubt::Error(error));
+        }
+        let infeasible = draws - feasible.len();
+        (self.efficiency() < EFFICIENCY_MIN).then_some(Doubt::Infeasible(infeasible, draws))
+    }
+
+    /// Returns the share of the draws that counts after weighting with the ratios, (Σ w)²/(n Σ w²).
+    pub(super) fn efficiency(&self) -> f64 {
+        efficiency(&self.log_ratios)
+    }
+
+    /// Returns the root mean square deviation of the log ratios of feasible draws from their mean.
+    pub(super) fn error(&self) -> f64 {
+        let feasible = self.feasible();
+        let count = feasible.len() as f64;
+        let mean = feasible.iter().sum::<f64>() / count;
+        let squares: f64 = feasible.iter().map(|ratio| (ratio - mean) * (ratio - mean)).sum();
+        (squares / count).sqrt()
+    }
+
+    /// Returns the Pareto shape of the largest weights.
+    pub(super) fn pareto_shape(&self) -> Option<f64> {
+        pareto::shape(&normalised(&self.log_ratios))
+    }
+
+    fn feasible(&self) -> Vec<f64> {
+        self.log_ratios.iter().copied().filter(|ratio| ratio.is_finite()).collect()
+    }
+}
+
+fn efficiency(log_ratios: &[f64]) -> f64 {
+    if !log_ratios.iter().any(|ratio| ratio.is_finite()) {
+        return 0.0;
+    }
+    let weights = normalised(log_ratios);
+    let squares: f64 = weights.iter().map(|weight| weight * weight).sum();
+    1.0 / (squares * weights.len() as f64)
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const MORE: &str = "raise [posterior] max_evaluations";
+        match *self {
+            Self::FewDraws(drawn, needed) => write!(
+                f,
+                "the interpolated model was checked at {drawn} draws, {needed} are needed; {MORE}"
+            ),
+            Self::Efficiency(efficiency) => write!(
+                f,
+                "the interpolated model still differs from the model: {:.0} % of the checked draws \
+                 count, {:.0} % are needed; {MORE}",
+                100.0 * efficiency,
+                100.0 * EFFICIENCY_MIN
+            ),
+            Self::Error(error) => write!(
+                f,
+                "the interpolated model still differs from the model: by {error:.1e} in the log \
+                 density, {ERROR_MAX_OF_FEW:.0e} are allowed with up to two free parameters; {MORE}"
+            ),
+            Self::Infeasible(infeasible, draws) => write!(
+                f,
+                "{infeasible} of the {draws} checked draws are infeasible, and draws like them are \
+                 part of the result: more than max_failed_fraction of their realizations fail; \
+                 raise [monte_carlo] max_failed_fraction, which keeps them, or narrow the bounds"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(ratios: &[f64], few: bool, expected: Option<Doubt>) {
+        let check = BatchCheck { log_ratios: ratios.to_vec() };
+        assert_eq!(check.doubt(4, few), expected, "{ratios:?}");
+    }
+
+    #[test]
+    fn a_batch_is_enough_or_says_why_not() {
+        const NEVER: f64 = f64::NEG_INFINITY;
+        check(&[0.0; 4], true, None);
+        check(&[0.0; 3], false, Some(Doubt::FewDraws(3, 4)));
+        check(&[0.1, -0.1, 0.1, -0.1], false, None);
+        check(&[0.1, -0.1, 0.1, -0.1], true, Some(Doubt::Error(0.1)));
+        check(&[0.0, 0.0, 0.0, NEVER], false, Some(Doubt::Infeasible(1, 4)));
+        check(&[NEVER; 4], false, Some(Doubt::Efficiency(0.0)));
+        let half = libm::log(3.0);
+        check(&[half, 0.0, half, 0.0], false, Some(Doubt::Efficiency(0.8)));
+    }
+}
