@@ -184,9 +184,12 @@ impl PosteriorSearch {
         if passed || left == 0 {
             return;
         }
-        let population = problem.population(&self.surrogate, SCOUTS, number);
+        let mut population = problem.population(&self.surrogate, SCOUTS, number);
         if population.members.is_empty() {
             return;
+        }
+        if problem.is_of_few() {
+            population = problem.widened(population);
         }
         self.check = BatchCheck::default();
         let draws = population.resampled(BATCH.min(left), 0.5);
@@ -196,6 +199,6 @@ impl PosteriorSearch {
     /// Returns why the last batch does not show that the result is that of the model; `None` if it
     /// does.
     fn doubt(&self, problem: &PosteriorProblem) -> Option<Doubt> {
-        self.check.doubt(BATCH, problem.priors.len() <= 2)
+        self.check.doubt(BATCH, problem.is_of_few())
     }
 }

@@ -4,6 +4,8 @@
 mod data;
 mod ranks;
 pub mod reference;
+#[cfg(test)]
+mod tests;
 
 use std::sync::mpsc;
 

@@ -144,7 +144,6 @@ mod tests {
         check(&[0.1, -0.1, 0.1, -0.1], true, Some(Doubt::Error(0.1)));
         check(&[0.0, 0.0, 0.0, NEVER], false, Some(Doubt::Infeasible(1, 4)));
         check(&[NEVER; 4], false, Some(Doubt::Efficiency(0.0)));
-        let half = libm::log(3.0);
-        check(&[half, 0.0, half, 0.0], false, Some(Doubt::Efficiency(0.8)));
+        check(&[0.0, -1e3, 0.0, -1e3], false, Some(Doubt::Efficiency(0.5)));
     }
 }

@@ -25,13 +25,16 @@ const REACH: [[f64; 2]; 2] = [[-0.1, 0.1], [-1.6, -1.0]];
 /// Maximum number of corrections of the pivots for one point.
 const CORRECTIONS_MAX: usize = 40;
 /// Corrections end when the deviations change by at most this.
-const CORRECTED: f64 = 1e-12;
+const CORRECTED: f64 = 1e-9;
 /// Points whose deviations still change by more than this have no solution.
 const UNSOLVED: f64 = 1e-8;
 /// Fraction of the bounds' distance by which a pivot may leave them while it is corrected.
 const OVERSHOOT: f64 = 0.1;
 /// Step of the derivatives by the pivots, relative to the bounds' distance.
 const STEP: f64 = 1e-5;
+
+/// Power of the likelihood of widened populations.
+const WIDENED: f64 = 0.5;
 
 /// Everything that a posterior depends on except for the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,6 +120,23 @@ impl PosteriorProblem {
             (0..branches).filter_map(move |branch| self.member(model, uniforms, branch))
         });
         Population::new(members.collect())
+    }
+
+    /// Returns whether there are at most two free parameters: the result is then exact to 1e-3 of a
+    /// standard deviation.
+    pub(super) fn is_of_few(&self) -> bool {
+        self.priors.len() <= 2
+    }
+
+    /// Returns the population of a likelihood that is wider by a half power: draws from it show the
+    /// errors in the tails, which the ends of intervals depend on.
+    pub(super) fn widened(&self, population: Population) -> Population {
+        let wider = |member: Member| {
+            let log_likelihood = self.likelihood.log(member.moments);
+            let log_weight = member.log_weight - (1.0 - WIDENED) * log_likelihood;
+            Member { log_weight, ..member }
+        };
+        Population::new(population.members.into_iter().map(wider).collect())
     }
 
     fn member(&self, model: &Surrogate, uniforms: &[f64; GERMS], branch: usize) -> Option<Member> {

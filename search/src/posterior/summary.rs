@@ -26,7 +26,7 @@ impl PosteriorSearch {
     ) -> Option<Posterior> {
         let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
         let problem = &problem.with_model_errors(errors);
-        let points = POINTS[usize::from(problem.priors.len() > 2)];
+        let points = POINTS[usize::from(!problem.is_of_few())];
         let population = problem.population(&self.surrogate, points, self.populations);
         if population.members.is_empty() {
             return None;
