@@ -46,6 +46,10 @@ pub enum Range {
     },
 }
 
+/// A value at most this far from a bound, as a fraction of the range, counts as lying on it: a
+/// simplex that a bound stops comes near it, but not onto it.
+pub const ON_BOUND: f64 = 1e-4;
+
 impl Range {
     /// Returns the distance of the bounds, in the parameter's unit; 0 if it is fixed.
     pub fn edge(&self) -> f64 {
@@ -62,6 +66,12 @@ impl Range {
             Self::Fixed(_) => None,
             Self::Free { lower, upper, .. } => Some((value - lower) / (upper - lower)),
         }
+    }
+
+    /// Returns whether a value lies on a bound; never if the parameter is fixed.
+    pub fn is_on_bound(&self, value: f64) -> bool {
+        let at = self.coordinate(value);
+        at.is_some_and(|at| !(ON_BOUND..=1.0 - ON_BOUND).contains(&at))
     }
 
     /// Returns the fixed value, or the start.

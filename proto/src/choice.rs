@@ -130,6 +130,7 @@ pub static JOB_STATUS: EnumMapping<Status, v1::JobStatus> = EnumMapping {
     all: &Status::ALL,
     message: |status| match status {
         Status::Converged => v1::JobStatus::Converged,
+        Status::NotMatched => v1::JobStatus::NotMatched,
         Status::MaxEvaluations => v1::JobStatus::MaxEvaluations,
         Status::Cancelled => v1::JobStatus::Cancelled,
         Status::Failed => v1::JobStatus::Failed,

@@ -53,6 +53,17 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
     Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
 }
 
+/// Returns the noise that the moments of set number `set` would have if its velocities were
+/// independent and had a normal law; `None` with subjects, or if their number is not known.
+pub(super) fn normal_law_noise(data: &Data, set: usize) -> Option<DataNoise> {
+    if let Measurements::Moments { .. } = data.measurements {
+        return data_noise(data, set);
+    }
+    let given = data.set(set).filter(|given| given.subjects.is_none())?;
+    let measured = statistics::moments(given.velocities)?;
+    of_normal_law(measured, data.moments(set), given.velocities.len() as u64)
+}
+
 /// Returns the noise of the moments of `count` independent velocities with a normal law, given
 /// their measured moments and those that are matched, without the instrument's own scatter.
 fn of_normal_law(measured: Moments, matched: Moments, count: u64) -> Option<DataNoise> {

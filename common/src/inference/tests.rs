@@ -2,11 +2,12 @@
 
 use super::noise::quantile;
 use super::*;
+use crate::bulk_velocity::bulk_velocity;
 use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
 use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
-use crate::parameters::Point;
+use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EvaluationRole, Moments};
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
@@ -305,4 +306,39 @@ fn solutions_are_the_best_of_each_start() {
     assert_eq!(entries.len(), 21);
     close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);
     assert_eq!(spread(&[]), None);
+}
+
+/// With noise as large as that of a few velocities, the ends of intervals stay where the law of the
+/// elasticity is defined, and the dispersion has the same interval in both places.
+#[test]
+fn intervals_stay_within_the_law() {
+    for parameter in Parameter::ALL {
+        if parameter == Parameter::LongitudinalShearModulus {
+            // The moments hardly depend on it.
+            continue;
+        }
+        let mut free = vec![parameter];
+        if parameter != Parameter::Dispersion {
+            free.push(Parameter::Dispersion);
+        }
+        let found = found(&specification(&free, None), [1.5, 1.5]);
+        for (parameter, quantity) in &found.parameters {
+            let [lower, upper] = quantity.known.unwrap().interval;
+            assert!(lower < quantity.value && quantity.value < upper, "{parameter:?}");
+            let mut ends = [OPTIMUM; 2];
+            for (point, end) in ends.iter_mut().zip([lower, upper]) {
+                let inside = end + 1e-9 * (quantity.value - end);
+                point.0[*parameter as usize] = inside;
+                // Moduli may be such that the others are not admissible with them.
+                if !parameter.unit().contains("Pa") {
+                    assert!(point.constants().elasticity().is_ok(), "{parameter:?}: {point:?}");
+                }
+                assert!(inside > 0.0 || parameter.unit().is_empty(), "{parameter:?}: {lower}");
+            }
+            if *parameter == Parameter::Dispersion {
+                assert!(lower > 0.0 && upper <= crate::ensemble::DISPERSION_MAX, "{upper}");
+                assert_eq!(*quantity, found.dispersion);
+            }
+        }
+    }
 }

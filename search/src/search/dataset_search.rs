@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use osteon_common::ensemble::Germs;
+use osteon_common::inference::agreement;
 use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
-use osteon_common::statistics::{PointStatistics, likelihood_cost};
+use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost};
 
 use super::method::MethodState;
 use super::reasons;
@@ -35,6 +36,8 @@ pub(super) struct DatasetSearch {
     evaluations: u64,
     first: Option<Evaluation>,
     best: Option<Best>,
+    /// The points after the best one of the same start.
+    trials: reasons::Trials,
     /// Why the search from the start of the best point stopped, or, while there is none, the latest
     /// search.
     stop: Option<StopReason>,
@@ -70,6 +73,7 @@ impl DatasetSearch {
             evaluations: 0,
             first: None,
             best: None,
+            trials: reasons::Trials::default(),
             stop: None,
             differences: Vec::new(),
             known: Vec::new(),
@@ -152,9 +156,21 @@ impl DatasetSearch {
             self.first.get_or_insert(row);
             self.keep_for_posterior(specification, &row);
             self.keep_if_better(specification, row, outcomes);
+            self.note_trial(&row, &statistics);
         }
         self.settle(specification);
         row
+    }
+
+    /// Counts the point among those after the best one.
+    fn note_trial(&mut self, row: &Evaluation, statistics: &PointStatistics) {
+        let Some(best) = self.best() else { return };
+        if best.number == row.number {
+            self.trials = reasons::Trials::default();
+        } else if best.role.start == self.start {
+            let refused = !statistics.feasible && row.failures.total() > 0;
+            self.trials.take(row, refused);
+        }
     }
 
     fn tell_posterior(
@@ -272,8 +288,14 @@ impl DatasetSearch {
     }
 
     fn end(&mut self, specification: &JobSpecification) {
+        let agreement = self.best.as_ref().and_then(|Best { row, outcomes }| {
+            let estimate = estimate(&specification.monte_carlo, &row.point, outcomes)?;
+            agreement(specification, self.set as usize, &row.point, &estimate)
+        });
         let evidence = reasons::Evidence {
             best: self.best(),
+            agreement,
+            trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,
         };

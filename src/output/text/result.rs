@@ -86,6 +86,7 @@ fn headline(found: &Identification, specification: &JobSpecification) -> String 
     let reason = found.reason.as_deref().filter(|reason| !reason.is_empty());
     let headline = match found.status {
         Status::Converged => "Converged",
+        Status::NotMatched => "Not matched",
         Status::MaxEvaluations => "Not converged",
         Status::Cancelled => "Cancelled",
         Status::Failed => "Failed",
