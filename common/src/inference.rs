@@ -28,6 +28,7 @@ mod quantities;
 mod solutions;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 use crate::job::JobSpecification;
 use crate::results::{BestPoint, Evaluation};
@@ -42,6 +43,7 @@ pub use self::jacobian::{Jacobian, jacobian};
 pub use self::noise::{DataNoise, Noise, data_noise, noise};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
+pub use self::weights::MomentWeights;
 pub use crate::conclusions::{
     Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
     Solution, Solutions, Spread, Spreads, Uncertainty,
@@ -90,10 +92,18 @@ pub fn inference(
 
 /// Returns the number of the first evaluation of a search from which on its lowest cost was below
 /// that of sampling noise alone: further improvement is noise, and another seed would lead
-/// elsewhere.
-pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
+/// elsewhere. The cost is χ² with `weights`, and the sum of relative squares without.
+pub fn first_below_noise(
+    set: usize,
+    best: &BestPoint,
+    weights: Option<&MomentWeights>,
+    history: &[Evaluation],
+) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
-    let cost = relative[0] * relative[0] + relative[1] * relative[1];
+    let cost = match weights {
+        Some(weights) => weights.of_errors(relative),
+        None => relative[0] * relative[0] + relative[1] * relative[1],
+    };
     let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)

@@ -80,6 +80,7 @@ pub static OBJECTIVE: EnumMapping<Objective, v1::ObjectiveKind> = EnumMapping {
     all: &Objective::ALL,
     message: |objective| match objective {
         Objective::Moments => v1::ObjectiveKind::Moments,
+        Objective::ChiSquare => v1::ObjectiveKind::ChiSquare,
         Objective::Likelihood => v1::ObjectiveKind::Likelihood,
     },
     name: v1::ObjectiveKind::as_str_name,

@@ -246,7 +246,7 @@ fn a_profile_is_the_lowest_cost() {
     // No bone within the bounds is light enough for this velocity.
     let data = Moments { mean: 1.2 * model(&OPTIMUM).mean, ..model(&OPTIMUM) };
     specification.data = None;
-    let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data);
+    let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data, None);
     assert_eq!(profiles.len(), 4);
     for profile in profiles {
         for (&value, &cost) in profile.values.iter().zip(&profile.costs).step_by(5) {

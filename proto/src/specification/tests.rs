@@ -183,7 +183,7 @@ prop_compose! {
             },
             posterior,
         };
-        specification.with_implied_posterior()
+        specification.with_implied(Omitted::default())
     }
 }
 
@@ -386,11 +386,29 @@ fn data_out_of_reach_are_refused() {
 }
 
 #[test]
+fn the_default_objective_is_that_of_the_data() {
+    let mut message = message();
+    message.objective = None;
+    message.search = Some(v1::Search::default());
+    let found = |message: &v1::JobSpecification| {
+        let specification = from_message(message).unwrap();
+        (specification.objective, specification.search.cost_tolerance)
+    };
+    assert_eq!(found(&message), (Objective::Moments, 1e-10));
+    message.data.as_mut().unwrap().count = Some(100);
+    assert_eq!(found(&message), (Objective::ChiSquare, 1e-4));
+    message.search.as_mut().unwrap().cost_tolerance = Some(1e-6);
+    assert_eq!(found(&message), (Objective::ChiSquare, 1e-6));
+    message.objective = Some(v1::Objective { kind: v1::ObjectiveKind::Moments.into() });
+    assert_eq!(found(&message), (Objective::Moments, 1e-6));
+}
+
+#[test]
 fn all_faults_are_reported_at_once() {
     let fields = faults(|m| {
         m.search.as_mut().unwrap().method = 17;
         m.monte_carlo.as_mut().unwrap().sampling = -1;
-        m.objective.as_mut().unwrap().kind = 3;
+        m.objective.as_mut().unwrap().kind = 17;
         m.data.as_mut().unwrap().mean = None;
     });
     for field in ["search.method", "monte_carlo.sampling", "objective.kind", "data.mean"] {

@@ -141,8 +141,12 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
     } else {
         ""
     };
+    let cost = match specification.objective {
+        Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
+        Objective::Moments | Objective::Likelihood => "best cost",
+    };
     format!(
-        "the best cost is {:.3e}, cost_tolerance is {:?}; the model's mean velocity is {}, its \
+        "the {cost} is {:.3e}, cost_tolerance is {:?}; the model's mean velocity is {}, its \
          coefficient of variation {}{held}",
         best.cost.unwrap_or(f64::NAN),
         specification.search.cost_tolerance,

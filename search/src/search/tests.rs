@@ -12,6 +12,7 @@ use osteon_common::results::Moments;
 use super::*;
 
 mod advice;
+mod chi_square;
 mod likelihood;
 mod reasons;
 mod sets;

@@ -33,7 +33,7 @@ pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> 
 /// Returns whether the search reached its target cost.
 fn is_reached(found: &Identification, specification: &JobSpecification) -> bool {
     let cost = found.cost.unwrap_or(f64::INFINITY);
-    found.objective != Objective::Likelihood && cost <= specification.search.cost_tolerance
+    found.objective.is_of_moments() && cost <= specification.search.cost_tolerance
 }
 
 /// Returns whether a moment of the model agrees with the data within the noise of both.
@@ -126,7 +126,7 @@ pub(super) fn uniqueness(
         };
     }
     let known = match specification.objective {
-        Objective::Moments => "Two moments",
+        Objective::Moments | Objective::ChiSquare => "Two moments",
         Objective::Likelihood => "The distribution of one velocity",
     };
     let nearest =

@@ -153,6 +153,7 @@ fn moments_and_cost(found: &Identification) -> String {
         let (name, shown) = match found.objective {
             Objective::Likelihood => ("cost (nats)", measured(cost, error)),
             Objective::Moments => ("cost", digits(cost, 3)),
+            Objective::ChiSquare => ("cost (χ²)", digits(cost, 3)),
         };
         rows.push([name.to_owned(), shown, String::new(), String::new()]);
     }
