@@ -35,11 +35,12 @@ use crate::results::{BestPoint, Evaluation};
 
 use self::jacobian::log_ratios;
 use self::linear::Linear;
-use self::quantities::Quantities;
+use self::quantities::{LogarithmicEnds, Quantities};
 
 pub use self::agreement::{Agreement, agreement};
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
+pub(crate) use self::noise::student_quantile;
 pub use self::noise::{DataNoise, Noise, data_noise, noise};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
@@ -74,6 +75,7 @@ pub fn inference(
         noise: &noise,
         quantile,
         residual,
+        ends: LogarithmicEnds::of_data(data, set),
         known: matched && !held && linear.undetermined.is_empty(),
     };
     Some(Inference {
