@@ -11,9 +11,7 @@ use crate::exit_status::ExitStatus;
 /// Returns the ending of a command, and thus the exit code, for this result.
 pub(crate) fn exit_status(specification: &JobSpecification, result: &ResultFile) -> ExitStatus {
     let done = match result {
-        ResultFile::Identification(found) => {
-            matches!(found.status, Status::Converged | Status::MaxEvaluations)
-        }
+        ResultFile::Identification(found) => found.status.is_complete(),
         ResultFile::Propagation(found) => propagation_failure(specification, found).is_none(),
     };
     if done { ExitStatus::Done } else { ExitStatus::RunFailed }
@@ -64,7 +62,9 @@ pub(crate) fn missing_result(fetched: &Fetched) -> Option<String> {
     }
     let how = match fetched.result.status {
         Status::Cancelled => "the job was cancelled before its end",
-        Status::Failed | Status::Converged | Status::MaxEvaluations => "the job failed",
+        Status::Failed | Status::Converged | Status::NotMatched | Status::MaxEvaluations => {
+            "the job failed"
+        }
     };
     let reason = fetched.result.reason.as_ref();
     let reason = reason.map(|reason| format!(": {reason}")).unwrap_or_default();

@@ -159,8 +159,13 @@ impl Data {
 
     /// Returns the number of sets that can be searched.
     pub fn searched(&self) -> usize {
-        let unsearched = self.groups().iter().filter(|group| group.no_variation().is_some());
-        self.sets() - unsearched.count()
+        self.searched_sets().count()
+    }
+
+    /// Returns the numbers of the sets that can be searched.
+    pub fn searched_sets(&self) -> impl Iterator<Item = usize> {
+        let unsearched = |set: &usize| self.groups().get(*set).and_then(Group::no_variation);
+        (0..self.sets()).filter(move |set| unsearched(set).is_none())
     }
 
     /// Returns the name of each group; none if the data are not grouped.

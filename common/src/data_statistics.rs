@@ -1,6 +1,7 @@
 //! Statistics of measured velocities: how precisely they determine their moments, and whether they
 //! can come from the model's law.
 
+mod few;
 mod intervals;
 
 use crate::job::{Data, Sampling};
@@ -8,7 +9,11 @@ use crate::moments::KolmogorovTest;
 use crate::outcome::Outcome;
 use crate::results::DataSummary;
 
-pub use self::intervals::{CONFIDENCE, moment_intervals};
+pub use self::few::{FewIntervals, intervals_of_data};
+pub use self::intervals::moment_intervals;
+
+/// Probability with which an interval contains the moment of the law.
+pub const CONFIDENCE: f64 = 0.95;
 
 /// Number of independent draws to which a Sobol' point is equivalent for a distribution function,
 /// on the safe side. Measured at the paper's optimum by the scatter of the fractions of velocities

@@ -18,28 +18,33 @@
 //! with a number of velocities it is that of a normal law. The model's part has the squares of the reported relative standard errors on its
 //! diagonal; the correlation of the two errors is neglected.
 
+mod agreement;
 mod conclusions;
 mod jacobian;
 mod linear;
 mod noise;
 mod profile;
+mod quantities;
 mod solutions;
 #[cfg(test)]
 mod tests;
+mod weights;
 
-use crate::bulk_velocity::bulk_velocity;
 use crate::job::JobSpecification;
-use crate::parameters::Parameter;
 use crate::results::{BestPoint, Evaluation};
 
 use self::jacobian::log_ratios;
-use self::linear::{Linear, NoiseResponse};
+use self::linear::Linear;
+use self::quantities::{LogarithmicEnds, Quantities};
 
+pub use self::agreement::{Agreement, agreement};
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
+pub(crate) use self::noise::student_quantile;
 pub use self::noise::{DataNoise, Noise, data_noise, noise};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
+pub use self::weights::MomentWeights;
 pub use crate::conclusions::{
     Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
     Solution, Solutions, Spread, Spreads, Uncertainty,
@@ -62,15 +67,16 @@ pub fn inference(
     let linear = Linear::from_jacobian(&jacobian);
     let quantile = noise.quantile();
     let residual = log_ratios(data.moments(set), estimate.moments);
-    let matched = is_matched(residual, &noise);
-    let context = Context {
+    let Agreement { matched, held, .. } = agreement(specification, set, &best.point, &estimate)?;
+    let context = Quantities {
         specification,
         best,
         linear: &linear,
         noise: &noise,
         quantile,
         residual,
-        matched,
+        ends: LogarithmicEnds::of_data(data, set),
+        known: matched && !held && linear.undetermined.is_empty(),
     };
     Some(Inference {
         matched,
@@ -86,108 +92,20 @@ pub fn inference(
     })
 }
 
-/// Relative difference below which moments always count as matched: no measurement is more
-/// accurate.
-const EXACT: f64 = 1e-4;
-
-/// Returns whether the moments differ by at most three standard errors (of data and sampling
-/// together), or by a negligible amount.
-fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
-    let covariance = noise.covariance();
-    let within = |axis: usize| {
-        let square = residual[axis] * residual[axis];
-        square <= (9.0 * covariance[axis][axis]).max(EXACT * EXACT)
-    };
-    within(0) && within(1)
-}
-
-struct Context<'a> {
-    specification: &'a JobSpecification,
-    best: &'a BestPoint,
-    linear: &'a Linear,
-    noise: &'a Noise,
-    quantile: f64,
-    /// Difference between data and model that the search has left.
-    residual: [f64; 2],
-    matched: bool,
-}
-
-impl Context<'_> {
-    /// √(c1111/ρ). Its logarithm is close to normally distributed.
-    fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
-        let bulk = bulk_velocity(&self.best.point).ok()?;
-        let slope = |&parameter: &Parameter| {
-            bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
-        };
-        let gradient: Vec<f64> = free.iter().map(slope).collect();
-        Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
-    }
-
-    fn dispersion(&self, free: &[Parameter]) -> DerivedQuantity {
-        let dispersion = self.best.point.dispersion();
-        let slope = |&parameter: &Parameter| match parameter {
-            Parameter::Dispersion => self.specification.range(parameter).edge() / dispersion,
-            _ => 0.0,
-        };
-        let gradient: Vec<f64> = free.iter().map(slope).collect();
-        self.of_logarithm(dispersion, &gradient)
-    }
-
-    fn parameters(&self, free: &[Parameter]) -> Vec<(Parameter, DerivedQuantity)> {
-        let quantity = |(place, &parameter): (usize, &Parameter)| {
-            let value = self.best.point.get(parameter);
-            let axis = (0..free.len()).map(|other| if other == place { 1.0 } else { 0.0 });
-            let gradient: Vec<f64> = axis.collect();
-            let known = self.response(&gradient).map(|response| {
-                let NoiseResponse { deviation, free_share, .. } = response;
-                let edge = self.specification.range(parameter).edge();
-                let standard_error = deviation * edge;
-                let reach = self.reach(&response) * edge;
-                Uncertainty { standard_error, interval: [value - reach, value + reach], free_share }
-            });
-            (parameter, DerivedQuantity { value, known })
-        };
-        free.iter().enumerate().map(quantity).collect()
-    }
-
-    /// Returns a quantity, given the gradient of its logarithm in units of the box.
-    fn of_logarithm(&self, value: f64, gradient: &[f64]) -> DerivedQuantity {
-        let known = self.response(gradient).map(|response| {
-            let NoiseResponse { deviation, free_share, .. } = response;
-            let factor = libm::exp(self.reach(&response));
-            let interval = [value / factor, value * factor];
-            Uncertainty { standard_error: value * deviation, interval, free_share }
-        });
-        DerivedQuantity { value, known }
-    }
-
-    /// Returns half the length of an interval: the effect of the noise, plus the distance by which
-    /// the solution would move if the residual were removed.
-    fn reach(&self, response: &NoiseResponse) -> f64 {
-        let [mean, variation] = response.transfer;
-        let left = mean * self.residual[0] + variation * self.residual[1];
-        self.quantile * response.deviation + left.abs()
-    }
-
-    /// Returns the effect of noise on a quantity with this gradient; `None` if the model does not
-    /// match, if the quantity does not depend on any free parameter, or if the data leave a
-    /// direction free: even a quantity whose gradient is nearly orthogonal to it then depends on how
-    /// far the parameters may move along it, which the posterior says.
-    fn response(&self, gradient: &[f64]) -> Option<NoiseResponse> {
-        let known = self.matched && self.linear.undetermined.is_empty();
-        if !known || gradient.iter().all(|slope| *slope == 0.0) {
-            return None;
-        }
-        self.linear.response(gradient, &self.noise.covariance())
-    }
-}
-
 /// Returns the number of the first evaluation of a search from which on its lowest cost was below
 /// that of sampling noise alone: further improvement is noise, and another seed would lead
-/// elsewhere.
-pub fn first_below_noise(set: usize, best: &BestPoint, history: &[Evaluation]) -> Option<u64> {
+/// elsewhere. The cost is χ² with `weights`, and the sum of relative squares without.
+pub fn first_below_noise(
+    set: usize,
+    best: &BestPoint,
+    weights: Option<&MomentWeights>,
+    history: &[Evaluation],
+) -> Option<u64> {
     let relative = best.velocity?.relative_errors();
-    let cost = relative[0] * relative[0] + relative[1] * relative[1];
+    let cost = match weights {
+        Some(weights) => weights.of_errors(relative),
+        None => relative[0] * relative[0] + relative[1] * relative[1],
+    };
     let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));
     below.next().map(|row| row.number)

@@ -2,6 +2,7 @@
 
 use crate::case::Setup;
 use crate::fields::{Key, Section};
+use crate::inference::data_noise;
 use crate::parameters::{Parameter, Point};
 
 pub use crate::data::{Data, Group, Measurements, NoVariation, VelocitySet};
@@ -46,6 +47,10 @@ pub enum Range {
     },
 }
 
+/// A value at most this far from a bound, as a fraction of the range, counts as lying on it: a
+/// simplex that a bound stops comes near it, but not onto it.
+pub const ON_BOUND: f64 = 1e-4;
+
 impl Range {
     /// Returns the distance of the bounds, in the parameter's unit; 0 if it is fixed.
     pub fn edge(&self) -> f64 {
@@ -62,6 +67,12 @@ impl Range {
             Self::Fixed(_) => None,
             Self::Free { lower, upper, .. } => Some((value - lower) / (upper - lower)),
         }
+    }
+
+    /// Returns whether a value lies on a bound; never if the parameter is fixed.
+    pub fn is_on_bound(&self, value: f64) -> bool {
+        let at = self.coordinate(value);
+        at.is_some_and(|at| !(ON_BOUND..=1.0 - ON_BOUND).contains(&at))
     }
 
     /// Returns the fixed value, or the start.
@@ -122,6 +133,22 @@ impl RunSettings {
     }
 }
 
+/// Keys that a file or message leaves out, and whose default depends on others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Omitted {
+    /// Whether the objective is left out.
+    pub objective: bool,
+    /// Whether the tolerance of the cost is left out.
+    pub cost_tolerance: bool,
+}
+
+/// Returns whether the noise of all data that are searched is known.
+fn has_known_noise(data: &Data) -> bool {
+    let is_known = |[[mean, _], [_, variation]]: [[f64; 2]; 2]| mean > 0.0 && variation > 0.0;
+    let found = |set| data_noise(data, set).is_some_and(|noise| is_known(noise.covariance));
+    data.searched_sets().all(found)
+}
+
 impl JobSpecification {
     /// Returns the settings of the run.
     pub fn run_settings(&self) -> RunSettings {
@@ -178,13 +205,23 @@ impl JobSpecification {
         self.search.method != SearchMethod::Posterior
     }
 
-    /// Returns the specification with the default posterior if its method needs one and none is
-    /// given, as files and messages are read.
+    /// Returns the specification with the defaults that depend on other keys, as files and messages
+    /// are read: the default posterior if the method needs one and none is given; of what is
+    /// `omitted`, the objective [`Objective::ChiSquare`] for a search whose data have a known noise,
+    /// and the tolerance of objective and method.
     #[must_use]
-    pub fn with_implied_posterior(self) -> Self {
+    pub fn with_implied(mut self, omitted: Omitted) -> Self {
         let implied = self.kind == JobKind::Identification && !self.is_searched();
-        let implied = implied.then(PosteriorSettings::default);
-        Self { posterior: self.posterior.or(implied), ..self }
+        self.posterior = self.posterior.or(implied.then(PosteriorSettings::default));
+        let known = self.kind == JobKind::Identification && self.is_searched();
+        if omitted.objective && known && self.data.as_ref().is_some_and(has_known_noise) {
+            self.objective = Objective::ChiSquare;
+        }
+        if omitted.cost_tolerance {
+            let Search { method, .. } = self.search;
+            self.search.cost_tolerance = Search::default_tolerance(method, self.objective);
+        }
+        self
     }
 
     /// Returns the point of fixed values and starts.

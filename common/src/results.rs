@@ -20,6 +20,8 @@ pub use crate::moments::{Estimate, EstimatedError, Moments};
 pub enum Status {
     /// The search met a tolerance, or the propagation is complete.
     Converged,
+    /// The search has ended, and its best point misses the data by more than their noise.
+    NotMatched,
     /// The search reached its maximum number of evaluations.
     MaxEvaluations,
     /// A user cancelled the job.
@@ -30,13 +32,19 @@ pub enum Status {
 
 impl Status {
     /// All statuses.
-    pub const ALL: [Self; 4] =
-        [Self::Converged, Self::MaxEvaluations, Self::Cancelled, Self::Failed];
+    pub const ALL: [Self; 5] =
+        [Self::Converged, Self::NotMatched, Self::MaxEvaluations, Self::Cancelled, Self::Failed];
+
+    /// Returns whether it is the ending of a search or propagation that was completed.
+    pub fn is_complete(self) -> bool {
+        matches!(self, Self::Converged | Self::NotMatched | Self::MaxEvaluations)
+    }
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
+            Self::NotMatched => "not_matched",
             Self::MaxEvaluations => "max_evaluations",
             Self::Cancelled => "cancelled",
             Self::Failed => "failed",

@@ -16,6 +16,9 @@ pub enum Objective {
     /// The paper's cost: relative squared errors of mean and coefficient of variation.
     #[default]
     Moments,
+    /// χ²: the squared differences of the logarithms of mean and coefficient of variation, weighted
+    /// by the inverse covariance of the data's noise.
+    ChiSquare,
     /// Minus the mean log likelihood of the measured velocities under the law of the model's
     /// velocities.
     Likelihood,
@@ -23,12 +26,21 @@ pub enum Objective {
 
 impl Objective {
     /// All objectives, in the order of a user's file.
-    pub const ALL: [Self; 2] = [Self::Moments, Self::Likelihood];
+    pub const ALL: [Self; 3] = [Self::Moments, Self::Likelihood, Self::ChiSquare];
+
+    /// Returns whether the cost depends on the two moments alone, and is 0 where both match.
+    pub fn is_of_moments(self) -> bool {
+        match self {
+            Self::Moments | Self::ChiSquare => true,
+            Self::Likelihood => false,
+        }
+    }
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Moments => "moments",
+            Self::ChiSquare => "chi_square",
             Self::Likelihood => "likelihood",
         }
     }
@@ -71,6 +83,10 @@ pub struct Prior {
     pub weight: f64,
 }
 
+/// Default of [`Search::cost_tolerance`] with [`Objective::ChiSquare`]: a hundredth of a standard
+/// error of the data.
+const CHI_SQUARE_TOLERANCE: f64 = 1e-4;
+
 /// Settings of the search loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
@@ -106,16 +122,22 @@ impl Search {
         Self {
             method,
             max_evaluations: 400,
-            cost_tolerance: match method {
-                SearchMethod::Simplex | SearchMethod::Posterior => 1e-10,
-                SearchMethod::Newton => 1e-12,
-            },
+            cost_tolerance: Self::default_tolerance(method, Objective::Moments),
             size_tolerance: 1e-5,
             initial_step: 0.15,
             starts: 1,
             first_start: 0,
             sensitivities: true,
             priors: [None; 7],
+        }
+    }
+
+    /// Returns the cost that ends a search by default.
+    pub fn default_tolerance(method: SearchMethod, objective: Objective) -> f64 {
+        match (objective, method) {
+            (Objective::ChiSquare, _) => CHI_SQUARE_TOLERANCE,
+            (_, SearchMethod::Simplex | SearchMethod::Posterior) => 1e-10,
+            (_, SearchMethod::Newton) => 1e-12,
         }
     }
 }
@@ -128,7 +150,10 @@ impl Default for Search {
 
 impl Section for Objective {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        let kind = "`\"moments\"`: the paper's cost; `\"likelihood\"`: minus the mean log likelihood \
+        let kind = "`\"moments\"`: the paper's cost; `\"chi_square\"`: the same differences weighted by \
+                    the noise of the data ([searches.md](searches.md#chi-square)), which is the \
+                    default of a search where velocities or `data.count` are given; \
+                    `\"likelihood\"`: minus the mean log likelihood \
                     of the measured velocities under the model's distribution \
                     ([searches.md](searches.md#likelihood)); it requires velocities, the search \
                     `\"simplex\"` and at least two realizations";
@@ -195,7 +220,7 @@ impl Search {
 
     fn declare_tolerances(&mut self, fields: &mut dyn Fields) {
         let cost_tolerance = "the search ends at a cost of at most this (default with `\"newton\"`: \
-                              1e-12); with `\"likelihood\"` it has no effect: the search ends when \
+                              1e-12, with the objective `\"chi_square\"`: 1e-4); with `\"likelihood\"` it has no effect: the search ends when \
                               `size_tolerance` is reached";
         fields.number(
             Key { name: "cost_tolerance", meaning: cost_tolerance },

@@ -100,9 +100,15 @@ impl PointStatistics {
 
     /// Returns the cost against the data's moments: infinite at an infeasible point, never NaN.
     pub fn cost(&self, data: Moments) -> f64 {
+        self.cost_by(|model| cost(data, model))
+    }
+
+    /// Returns the cost by a function of the model's moments: infinite at an infeasible point, never
+    /// NaN.
+    pub fn cost_by(&self, cost: impl Fn(Moments) -> f64) -> f64 {
         match self.moments {
             Some(model) if self.feasible => {
-                let cost = cost(data, model);
+                let cost = cost(model);
                 if cost.is_nan() { f64::INFINITY } else { cost }
             }
             _ => f64::INFINITY,

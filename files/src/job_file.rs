@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::job::{
-    JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Search,
+    JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
 use osteon_common::limits;
 use osteon_common::warnings::{self, Warning};
@@ -119,17 +119,22 @@ fn parse_with_warnings(
     let setup = setup(&mut reader, &table);
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let posterior = posterior::read(&mut reader, &table);
+    let (objective, objective_omitted) = objective(&mut reader, &table);
+    let (search, cost_tolerance_omitted) = search(&mut reader, &table);
     let specification = JobSpecification {
         kind,
         setup,
         data,
         parameters: parameters::read(&mut reader, &table),
         monte_carlo: monte_carlo(&mut reader, &table),
-        objective: objective(&mut reader, &table),
-        search: search(&mut reader, &table),
+        objective,
+        search,
         posterior: posterior.filter(|_| kind == JobKind::Identification),
     };
-    let specification = specification.with_implied_posterior();
+    let specification = specification.with_implied(Omitted {
+        objective: objective_omitted,
+        cost_tolerance: cost_tolerance_omitted,
+    });
     check::job_from(&specification, origin.as_ref(), &mut reader.violations);
     if let Some(unused) = posterior.filter(|_| kind == JobKind::Propagation) {
         check::posterior(&specification, &unused, &mut reader.violations);
@@ -162,15 +167,17 @@ fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {
     monte_carlo
 }
 
-fn objective(reader: &mut Reader, root: &Table<'_>) -> Objective {
+/// Reads the objective, and returns whether its kind is left out.
+fn objective(reader: &mut Reader, root: &Table<'_>) -> (Objective, bool) {
     let mut objective = Objective::default();
-    reader::section(reader, root, "objective", &mut objective);
-    objective
+    let table = reader::section(reader, root, "objective", &mut objective);
+    (objective, !table.has("kind"))
 }
 
-fn search(reader: &mut Reader, root: &Table<'_>) -> Search {
+/// Reads the search, and returns whether its cost tolerance is left out.
+fn search(reader: &mut Reader, root: &Table<'_>) -> (Search, bool) {
     let mut search = Search::default();
     let table = reader::section(reader, root, "search", &mut search);
     search.priors = priors::read(reader, &table);
-    search
+    (search, !table.has("cost_tolerance"))
 }

@@ -128,6 +128,31 @@ fn the_default_tolerance_is_that_of_the_method() {
     check("[search]\nmethod = \"simplex\"\n", Search::default());
 }
 
+#[test]
+fn the_default_objective_is_that_of_the_data() {
+    let check = |given: &JobSpecification, objective: Objective, cost_tolerance: f64| {
+        assert_eq!((given.objective, given.search.cost_tolerance), (objective, cost_tolerance));
+        let text = job_file::to_toml(given);
+        assert!(
+            text.contains(&format!("[objective]\nkind = \"{}\"\n", objective.name())),
+            "{text}"
+        );
+        assert_eq!(job(&text, Format::Toml, given.kind), *given);
+    };
+    let identification = |text: &str| job(text, Format::Toml, JobKind::Identification);
+    check(&identification(MINIMAL), Objective::Moments, 1e-10);
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.027\n";
+    assert!(MINIMAL.contains(moments), "{MINIMAL}");
+    let of = |data: &str| MINIMAL.replace(moments, data);
+    check(&counted(""), Objective::ChiSquare, 1e-4);
+    check(&counted("[search]\nmethod = \"newton\"\n"), Objective::ChiSquare, 1e-4);
+    check(&counted("[search]\ncost_tolerance = 1e-10\n"), Objective::ChiSquare, 1e-10);
+    check(&counted("[objective]\nkind = \"moments\"\n"), Objective::Moments, 1e-10);
+    check(&counted("[search]\nmethod = \"posterior\"\n"), Objective::Moments, 1e-10);
+    let two = "velocities = [3900.0, 4000.0]\n";
+    check(&identification(&of(two)), Objective::ChiSquare, 1e-4);
+}
+
 /// A minimal job whose data have a noise, as a posterior needs.
 fn counted(text: &str) -> JobSpecification {
     let minimal = MINIMAL.replace("mean = 3906.0", "mean = 3906.0\ncount = 2747");

@@ -12,6 +12,8 @@ use osteon_files::job_file;
 
 use support::pin;
 
+#[path = "rejected_jobs/objective.rs"]
+mod objective;
 #[path = "rejected_jobs/posterior.rs"]
 mod posterior;
 

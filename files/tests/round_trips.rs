@@ -8,8 +8,9 @@ use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::data::numbered;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, PosteriorPrior,
-    PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search, SearchMethod,
+    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted,
+    PosteriorPrior, PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search,
+    SearchMethod,
 };
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::moments::Moments;
@@ -257,7 +258,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 search,
                 posterior,
             };
-            job.with_implied_posterior()
+            job.with_implied(Omitted::default())
         },
     )
 }
@@ -354,7 +355,7 @@ properties! {
         for (edit, value) in edits {
             edit(&mut job, value);
         }
-        let job = job.with_implied_posterior();
+        let job = job.with_implied(Omitted::default());
         let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();
         let text = job_file::to_toml(&job);
         let found = match job_file::parse(&text, Format::Toml, Path::new(""), job.kind) {

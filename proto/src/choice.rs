@@ -80,6 +80,7 @@ pub static OBJECTIVE: EnumMapping<Objective, v1::ObjectiveKind> = EnumMapping {
     all: &Objective::ALL,
     message: |objective| match objective {
         Objective::Moments => v1::ObjectiveKind::Moments,
+        Objective::ChiSquare => v1::ObjectiveKind::ChiSquare,
         Objective::Likelihood => v1::ObjectiveKind::Likelihood,
     },
     name: v1::ObjectiveKind::as_str_name,
@@ -130,6 +131,7 @@ pub static JOB_STATUS: EnumMapping<Status, v1::JobStatus> = EnumMapping {
     all: &Status::ALL,
     message: |status| match status {
         Status::Converged => v1::JobStatus::Converged,
+        Status::NotMatched => v1::JobStatus::NotMatched,
         Status::MaxEvaluations => v1::JobStatus::MaxEvaluations,
         Status::Cancelled => v1::JobStatus::Cancelled,
         Status::Failed => v1::JobStatus::Failed,

@@ -3,8 +3,8 @@
 use osteon_common::check;
 use osteon_common::data::numbered;
 use osteon_common::job::{
-    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Prior, Range,
-    Search,
+    Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted, Prior,
+    Range, Search,
 };
 use osteon_common::parameters::Parameter;
 use osteon_common::violations::Violations;
@@ -91,7 +91,13 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
             .as_ref()
             .map(|message| posterior_settings::from_message(message, violations)),
     };
-    specification.with_implied_posterior()
+    let unspecified = v1::ObjectiveKind::Unspecified as i32;
+    let kind = message.objective.as_ref().map_or(unspecified, |objective| objective.kind);
+    let tolerance = message.search.as_ref().and_then(|search| search.cost_tolerance);
+    specification.with_implied(Omitted {
+        objective: kind == unspecified,
+        cost_tolerance: tolerance.is_none(),
+    })
 }
 
 fn data_to_message(data: &Data) -> v1::Data {

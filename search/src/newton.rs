@@ -39,6 +39,7 @@
 mod model;
 mod nearest;
 
+use osteon_common::inference::MomentWeights;
 use osteon_common::results::Moments;
 
 use crate::proposal::{Proposal, StopReason};
@@ -118,6 +119,8 @@ pub struct Newton {
     /// Whether `centre` is near the solution.
     near: bool,
     model: Model,
+    /// Weights of the moments, if the cost is χ².
+    weights: Option<MomentWeights>,
     /// The step of lowest cost so far, if one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
@@ -145,6 +148,7 @@ impl Newton {
             settings,
             target: logarithms(data),
             model: Model::new(space, start.clone(), rule),
+            weights: None,
             base: None,
             pending: start.clone(),
             centre: start,
@@ -161,6 +165,15 @@ impl Newton {
         };
         newton.stop_when_used_up();
         newton
+    }
+
+    /// Makes χ² with these weights the cost: it decides where no point of the box matches both
+    /// moments.
+    #[must_use]
+    pub fn weighted_by(mut self, weights: MomentWeights) -> Self {
+        self.model.weigh(weights.normalized());
+        self.weights = Some(weights);
+        self
     }
 
     /// Returns the next point, or the reason why there is none. Does not change the state.
@@ -250,7 +263,7 @@ impl Newton {
         }
         if lowest.is_none_or(|lowest| trial.cost < lowest) {
             self.model.make_exact_at(&trial.at, trial.found);
-            if self.full_step && trial.cost < NEAR {
+            if self.full_step && self.is_near(&trial) {
                 self.centre.clone_from(&trial.at);
                 self.near = true;
             }
@@ -260,6 +273,18 @@ impl Newton {
             self.radius = 0.5 * length;
         }
         self.next_step(!halved && length <= self.settings.size_tolerance);
+    }
+
+    /// Returns whether both moments nearly match.
+    fn is_near(&self, trial: &Evaluated) -> bool {
+        let square = |axis: usize| {
+            let difference = trial.found[axis] - self.target[axis];
+            difference * difference
+        };
+        match self.weights {
+            Some(_) => square(0) + square(1) < NEAR,
+            None => trial.cost < NEAR,
+        }
     }
 
     /// Makes the next step pending, or refreshes the slopes if no step leads further. Ends, because

@@ -2,7 +2,7 @@
 //! bound to 1 at the upper.
 
 use osteon_common::ensemble::DISPERSION_MAX;
-use osteon_common::job::Range;
+use osteon_common::job::{ON_BOUND, Range};
 use osteon_common::parameters::{Parameter, Point};
 
 /// The ranges within which a search moves.
@@ -19,9 +19,6 @@ pub enum Side {
     /// The upper bound.
     Upper,
 }
-
-/// A point at most this far from a bound, in units of the box, counts as lying on it.
-const ON_BOUND: f64 = 1e-9;
 
 impl SearchBox {
     /// Creates the box of these ranges, which are in the order of [`Parameter::ALL`] and have been

@@ -160,7 +160,7 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
 
 fn exit_status(snapshot: &JobSnapshot) -> ExitStatus {
     match client::job_status(snapshot) {
-        Some(Status::Converged | Status::MaxEvaluations) => ExitStatus::Done,
+        Some(status) if status.is_complete() => ExitStatus::Done,
         _ => ExitStatus::RunFailed,
     }
 }

@@ -190,6 +190,9 @@ fn what_is_said_about_a_search_depends_on_how_it_ended() {
     check(&[status("\"status\": \"max_evaluations\"")], &[used_up], &[]);
     let early = status("\"status\": \"max_evaluations\", \"reason\": \"it collapsed\"");
     check(&[early], &["Not converged: it collapsed\n"], &["reached"]);
+    let missed = status("\"status\": \"not_matched\", \"reason\": \"it is far off\"");
+    let expected = ["Not matched: it is far off\n", "The model does not fit the data"];
+    check(&[missed], &expected, &["cannot determine", "fit equally", "On their bounds"]);
 }
 
 #[test]
@@ -307,9 +310,11 @@ fn a_model_that_misses_the_data_says_by_how_much_and_where() {
 fn every_text_fits_a_terminal_of_80_columns() {
     let long = RESULT.replace(
         "\"status\": \"converged\"",
-        "\"status\": \"converged\", \"reason\": \"converged at a cost of 7.644e-1, above cost_tolerance \
-         1e-12: no nearby point fits better (density on its lower bound, dispersion on its upper \
-         bound); widen the bounds, or free more parameters\"",
+        "\"status\": \"not_matched\", \"reason\": \"no nearby point fits better: the best cost is \
+         7.644e-1, cost_tolerance is 1e-12; the model's mean velocity is 2.1 % above the data's (41 \
+         standard errors), its coefficient of variation 12 % below the data's (1.3 standard errors); \
+         density is on its lower bound, dispersion is on its upper bound; widen the bounds, or free \
+         more parameters\"",
     );
     let all = Parameter::ALL.map(Parameter::name);
     for json in [RESULT, &long, &identified(true), &identified(false), &detailed()] {

@@ -32,6 +32,7 @@ fn an_identification_ends_as_its_status_says() {
         assert_eq!(exit_status(&specification(0.01), &result), expected, "{status}");
     };
     check("converged", ExitStatus::Done);
+    check("not_matched", ExitStatus::Done);
     check("max_evaluations", ExitStatus::Done);
     check("cancelled", ExitStatus::RunFailed);
     check("failed", ExitStatus::RunFailed);

@@ -2,6 +2,7 @@
 
 use crate::accepted::{Interval, written};
 use crate::attainable_moments;
+use crate::inference::MomentWeights;
 use crate::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
@@ -57,6 +58,7 @@ pub fn job_from(
     enough_for_the_method(specification, violations);
     evaluations(specification, violations);
     likelihood(specification, violations);
+    chi_square(specification, violations);
     posterior_of_job(specification, violations);
     within_reach(specification, violations);
 }
@@ -229,6 +231,37 @@ fn enough_for_the_method(specification: &JobSpecification, violations: &mut Viol
             "is 1; the search \"newton\" needs a coefficient of variation, so at least 2",
         );
     }
+}
+
+/// Checks that the noise of the data is known if it weights the cost.
+fn chi_square(specification: &JobSpecification, violations: &mut Violations) {
+    const FIELD: &str = "objective.kind";
+    let asked = specification.kind == JobKind::Identification
+        && specification.objective == Objective::ChiSquare;
+    if !asked || known_wrong(FIELD, violations) || violations.has_at_or_below("data") {
+        return;
+    }
+    let Some(data) = specification.data.as_ref() else { return };
+    let unknown = |set: &usize| MomentWeights::of_data(data, *set).is_none();
+    let Some(set) = data.searched_sets().find(unknown) else { return };
+    if data.has_only_moments() {
+        violations.add(
+            FIELD,
+            "is \"chi_square\", which weights both moments by the noise of the data: give the number of \
+             velocities behind data.mean and data.coefficient_of_variation as data.count, or the \
+             velocities themselves as data.velocities; otherwise it must be \"moments\"",
+        );
+        return;
+    }
+    let name = data.names().nth(set).map_or_else(String::new, |name| format!(" of group {name:?}"));
+    violations.add(
+        FIELD,
+        format!(
+            "is \"chi_square\", which weights both moments by the noise of the data, and the \
+             velocities{name} say nothing of it: they need a scatter beyond data.repeatability, over \
+             at least two subjects if these are given; otherwise it must be \"moments\""
+        ),
+    );
 }
 
 /// Checks the requirements of a likelihood on the rest of an identification.

@@ -3,33 +3,33 @@
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::CONFIDENCE;
+use super::few::{FewIntervals, intervals_of_velocities};
 use crate::job::VelocitySet;
 use crate::moments::{ConfidenceInterval, MomentIntervals, Moments};
 use crate::quantile::quantile;
 use crate::special::{normal_probability, standard_normal_quantile};
 use crate::statistics::{Sum, moments, without_repeatability};
 
-/// Probability with which an interval contains the moment of the law.
-pub const CONFIDENCE: f64 = 0.95;
 /// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
-/// Smallest number of velocities, or of subjects, that are resampled: fewer do not show the tails of
-/// their law, and have no interval.
-const RESAMPLED_MIN: usize = 5;
-/// Largest number of velocities, or of subjects, that are resampled, which takes a fraction of a
+/// Smallest number of velocities, or of subjects, with intervals: fewer say next to nothing of the
+/// scatter of their law.
+const PARTS_MIN: usize = 5;
+/// Largest number of subjects that are resampled, which takes a fraction of a
 /// second; for more, the normal approximation of their moments gives the same result.
 const RESAMPLED_MAX: usize = 5_000;
 
-/// Returns confidence intervals by the bootstrap, bias-corrected and accelerated (B. Efron, J. Am.
-/// Stat. Assoc. 82 (1987)): skewed laws and small samples get intervals that are not symmetric.
-/// Velocities of one subject are drawn together.
+/// Returns confidence intervals: of independent velocities by the χ² law of their variance and
+/// Student's law of their mean (`few.rs`); of subjects by the bootstrap, bias-corrected and accelerated
+/// (B. Efron, J. Am. Stat. Assoc. 82 (1987)), which draws the velocities of one subject together.
 ///
 /// `None` for fewer than five velocities, or subjects, and without scatter beyond the instrument's.
-/// The resamples are the same for the same number of velocities, or of subjects, and do not depend
-/// on the seed of a job.
+/// The resamples are the same for the same number of subjects, and do not depend on the seed of a
+/// job.
 pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
     let parts = set.parts();
-    if parts < RESAMPLED_MIN {
+    if parts < PARTS_MIN {
         return None;
     }
     let measured = moments(set.velocities)?;
@@ -37,16 +37,16 @@ pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
     if found.coefficient_of_variation.is_nan() || found.coefficient_of_variation <= 0.0 {
         return None;
     }
+    let Some(subjects) = set.subjects else {
+        let FewIntervals { mean, coefficient_of_variation } = intervals_of_velocities(set)?;
+        return Some(MomentIntervals { mean, coefficient_of_variation, level: CONFIDENCE });
+    };
     let influences = Influences::new(set, measured, found);
     if parts > RESAMPLED_MAX {
         return Some(influences.normal(found, set.velocities.len()));
     }
-    let [means, variations] = match set.subjects {
-        Some(subjects) => {
-            resampled_subjects(&subject_sums(set.velocities, subjects, measured.mean), measured)
-        }
-        None => resampled(set.velocities)?,
-    };
+    let [means, variations] =
+        resampled_subjects(&subject_sums(set.velocities, subjects, measured.mean), measured);
     let variations = matched(&means, variations, set.repeatability);
     Some(MomentIntervals {
         mean: accelerated(means, found.mean, &influences.mean)?,
@@ -175,22 +175,6 @@ fn matched(means: &[f64], variations: Vec<f64>, repeatability: f64) -> Vec<f64> 
 fn draw(rng: &mut ChaCha20Rng, count: usize) -> usize {
     // The high half of a product of 64 bits with n: uniform to one part in 2⁶⁴/n.
     ((u128::from(rng.next_u64()) * count as u128) >> 64) as usize
-}
-
-/// Returns the means and coefficients of variation of the resamples.
-fn resampled(velocities: &[f64]) -> Option<[Vec<f64>; 2]> {
-    let mut rng = ChaCha20Rng::from_seed([0; 32]);
-    let mut found = [Vec::with_capacity(RESAMPLES), Vec::with_capacity(RESAMPLES)];
-    let mut resample = vec![0.0; velocities.len()];
-    for _ in 0..RESAMPLES {
-        for velocity in &mut resample {
-            *velocity = velocities[draw(&mut rng, velocities.len())];
-        }
-        let Moments { mean, coefficient_of_variation } = moments(&resample)?;
-        found[0].push(mean);
-        found[1].push(coefficient_of_variation);
-    }
-    Some(found)
 }
 
 /// Returns the interval of resampled values around the value `found` for the sample.

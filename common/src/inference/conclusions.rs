@@ -1,6 +1,6 @@
 //! All conclusions from one set of data, as they are contained in results.
 
-use super::{first_below_noise, inference, profiles, solutions, spread};
+use super::{MomentWeights, first_below_noise, inference, profiles, solutions, spread};
 use crate::conclusions::{Conclusions, Profile, Solutions};
 use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
 use crate::parameters::Point;
@@ -34,7 +34,9 @@ impl Conclusions {
 fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
     match (best.velocity, &specification.data) {
         (Some(velocity), Some(data)) if is_of_moments(specification) => {
-            profiles(specification, &best.point, velocity.moments, data.moments(set))
+            let weights = weights(specification, set);
+            let (model, measured) = (velocity.moments, data.moments(set));
+            profiles(specification, &best.point, model, measured, weights.as_ref())
         }
         _ => Vec::new(),
     }
@@ -73,15 +75,24 @@ pub fn below_noise_from(
     best: &BestPoint,
     history: &[Evaluation],
 ) -> Option<u64> {
-    is_of_moments(specification).then(|| first_below_noise(set, best, history)).flatten()
+    let weights = weights(specification, set);
+    let of_moments = is_of_moments(specification);
+    of_moments.then(|| first_below_noise(set, best, weights.as_ref(), history)).flatten()
+}
+
+/// Returns the weights of a set of data, if the cost is χ².
+fn weights(specification: &JobSpecification, set: usize) -> Option<MomentWeights> {
+    let data = specification.data.as_ref();
+    let data = data.filter(|_| specification.objective == Objective::ChiSquare)?;
+    MomentWeights::of_data(data, set)
 }
 
 fn is_of_moments(specification: &JobSpecification) -> bool {
-    specification.objective == Objective::Moments && !specification.has_priors()
+    specification.objective.is_of_moments() && !specification.has_priors()
 }
 
 /// Returns the cost that is low enough to stop; `None` for a likelihood.
 fn tolerance(specification: &JobSpecification) -> Option<f64> {
-    let by_moments = specification.objective == Objective::Moments;
+    let by_moments = specification.objective.is_of_moments();
     by_moments.then_some(specification.search.cost_tolerance)
 }

@@ -1,14 +1,12 @@
 //! Errors of the logarithms of both moments, for the data and for the model.
 
 use crate::conclusions::NoiseErrors;
-#[cfg(doc)]
-use crate::data_statistics::CONFIDENCE;
 use crate::job::{Data, Measurements};
 use crate::results::{Estimate, Moments};
 use crate::statistics;
 
-/// Quantile of the standard normal law at (1 + [`CONFIDENCE`]) / 2.
-const NORMAL: f64 = 1.959_963_984_540_054;
+/// Quantile of the standard normal law at 0.975.
+pub(super) const NORMAL: f64 = 1.959_963_984_540_054;
 /// Quantiles of Student's law with 1 to 5 degrees of freedom, where its expansion is too short.
 const FEW: [f64; 5] = [
     12.706_204_736_174_7,
@@ -53,6 +51,17 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
     Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
 }
 
+/// Returns the noise that the moments of set number `set` would have if its velocities were
+/// independent and had a normal law; `None` with subjects, or if their number is not known.
+pub(super) fn normal_law_noise(data: &Data, set: usize) -> Option<DataNoise> {
+    if let Measurements::Moments { .. } = data.measurements {
+        return data_noise(data, set);
+    }
+    let given = data.set(set).filter(|given| given.subjects.is_none())?;
+    let measured = statistics::moments(given.velocities)?;
+    of_normal_law(measured, data.moments(set), given.velocities.len() as u64)
+}
+
 /// Returns the noise of the moments of `count` independent velocities with a normal law, given
 /// their measured moments and those that are matched, without the instrument's own scatter.
 fn of_normal_law(measured: Moments, matched: Moments, count: u64) -> Option<DataNoise> {
@@ -92,15 +101,15 @@ impl Noise {
 
     /// Returns how many standard errors an interval extends to each side.
     pub fn quantile(&self) -> f64 {
-        self.data.map_or(NORMAL, |data| quantile(data.freedom))
+        self.data.map_or(NORMAL, |data| student_quantile(data.freedom))
     }
 }
 
-/// Returns the quantile of Student's law at (1 + [`CONFIDENCE`]) / 2 with `freedom` degrees of
+/// Returns the quantile of Student's law at 0.975 with `freedom` degrees of
 /// freedom, of which there is at least one: from a table for the first few, and then the first
 /// terms of its expansion about the normal law's (Abramowitz and Stegun 1964, 26.7.5), accurate to
 /// 1e-3.
-pub(super) fn quantile(freedom: u64) -> f64 {
+pub(crate) fn student_quantile(freedom: u64) -> f64 {
     if let Some(&known) = FEW.get(freedom.max(1) as usize - 1) {
         return known;
     }

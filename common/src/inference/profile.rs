@@ -5,6 +5,7 @@
 //! about one per cent, so a profile shows where the data can be matched, but not small differences
 //! from them.
 
+use super::weights::MomentWeights;
 use crate::conclusions::Profile;
 use crate::job::{JobSpecification, Range};
 use crate::parameters::{Parameter, Point};
@@ -13,12 +14,14 @@ use crate::results::Moments;
 /// Number of points of a profile, from bound to bound.
 pub const PROFILE_POINTS: usize = 11;
 
-/// Returns the profile of each free parameter, given the best point and its moments.
+/// Returns the profile of each free parameter, given the best point and its moments: of χ² with
+/// `weights`, and of the sum of relative squares without.
 pub fn profiles(
     specification: &JobSpecification,
     best: &Point,
     model: Moments,
     data: Moments,
+    weights: Option<&MomentWeights>,
 ) -> Vec<Profile> {
     let free =
         |parameter: &Parameter| matches!(specification.range(*parameter), Range::Free { .. });
@@ -32,7 +35,7 @@ pub fn profiles(
         let cost = |&value: &f64| {
             let mut ranges = specification.parameters;
             ranges[parameter as usize] = Range::Fixed(value);
-            lowest_cost(&ranges, best, model, data)
+            lowest_cost(&ranges, best, [model, data], weights)
         };
         let costs = values.iter().map(cost).collect();
         Profile { parameter, values, costs }
@@ -40,24 +43,32 @@ pub fn profiles(
     Parameter::ALL.into_iter().filter(free).map(profile).collect()
 }
 
-/// Returns the lowest cost over the box of these ranges.
-fn lowest_cost(ranges: &[Range; 7], best: &Point, model: Moments, data: Moments) -> f64 {
+/// Returns the lowest cost over the box of these ranges, given the moments of model and data.
+fn lowest_cost(
+    ranges: &[Range; 7],
+    best: &Point,
+    [model, data]: [Moments; 2],
+    weights: Option<&MomentWeights>,
+) -> f64 {
     let Some(here) = squared_velocities(&best.0.map(Range::Fixed)).map(|[only, _]| only) else {
         return f64::INFINITY;
     };
     let Some(reach) = squared_velocities(ranges) else { return f64::INFINITY };
-    let of_mean = {
-        let wanted = data.mean / model.mean;
-        let [slowest, fastest] = reach.map(|square| (square / here).sqrt());
-        relative_square(wanted.clamp(slowest, fastest) / wanted)
-    };
-    let of_variation = {
-        let wanted = data.coefficient_of_variation / model.coefficient_of_variation;
-        let [lower, upper] = ends(ranges[Parameter::Dispersion as usize]);
-        let [lower, upper] = [lower, upper].map(|dispersion| dispersion / best.dispersion());
+    // Ratios of the moments to those of the best point: those within reach, and those of the data.
+    let means = reach.map(|square| (square / here).sqrt());
+    let variations = ends(ranges[Parameter::Dispersion as usize])
+        .map(|dispersion| dispersion / best.dispersion());
+    let wanted =
+        [data.mean / model.mean, data.coefficient_of_variation / model.coefficient_of_variation];
+    if let Some(weights) = weights {
+        let ends = [0, 1].map(|end| [means[end] / wanted[0], variations[end] / wanted[1]]);
+        let [lower, upper] = ends.map(|ratios| ratios.map(libm::log));
+        return weights.smallest(lower, upper);
+    }
+    let off = |[lower, upper]: [f64; 2], wanted: f64| {
         relative_square(wanted.clamp(lower, upper) / wanted)
     };
-    of_mean + of_variation
+    off(means, wanted[0]) + off(variations, wanted[1])
 }
 
 fn relative_square(ratio: f64) -> f64 {

@@ -1,13 +1,15 @@
 //! Tests of the inference with models whose solution is known.
 
-use super::noise::quantile;
 use super::*;
+use crate::bulk_velocity::bulk_velocity;
 use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
+use crate::ensemble::Germs;
 use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
-use crate::parameters::Point;
+use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EvaluationRole, Moments};
+use crate::special::standard_normal_quantile;
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
 fn model(point: &Point) -> Moments {
@@ -227,9 +229,9 @@ fn quantiles_are_students() {
         (30, 2.0423),
         (100, 1.9840),
     ] {
-        close(quantile(freedom), expected, 1e-3);
+        close(student_quantile(freedom), expected, 1e-3);
     }
-    close(quantile(1_000_000), 1.95996, 1e-5);
+    close(student_quantile(1_000_000), 1.95996, 1e-5);
 }
 
 /// Compares with a fine grid over the box.
@@ -245,7 +247,7 @@ fn a_profile_is_the_lowest_cost() {
     // No bone within the bounds is light enough for this velocity.
     let data = Moments { mean: 1.2 * model(&OPTIMUM).mean, ..model(&OPTIMUM) };
     specification.data = None;
-    let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data);
+    let profiles = profiles(&specification, &OPTIMUM, model(&OPTIMUM), data, None);
     assert_eq!(profiles.len(), 4);
     for profile in profiles {
         for (&value, &cost) in profile.values.iter().zip(&profile.costs).step_by(5) {
@@ -305,4 +307,84 @@ fn solutions_are_the_best_of_each_start() {
     assert_eq!(entries.len(), 21);
     close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);
     assert_eq!(spread(&[]), None);
+}
+
+/// With noise as large as that of a few velocities, the ends of intervals stay where the law of the
+/// elasticity is defined, and the dispersion has the same interval in both places.
+#[test]
+fn intervals_stay_within_the_law() {
+    for parameter in Parameter::ALL {
+        if parameter == Parameter::LongitudinalShearModulus {
+            // The moments hardly depend on it.
+            continue;
+        }
+        let mut free = vec![parameter];
+        if parameter != Parameter::Dispersion {
+            free.push(Parameter::Dispersion);
+        }
+        let found = found(&specification(&free, None), [1.5, 1.5]);
+        for (parameter, quantity) in &found.parameters {
+            let [lower, upper] = quantity.known.unwrap().interval;
+            assert!(lower < quantity.value && quantity.value < upper, "{parameter:?}");
+            let mut ends = [OPTIMUM; 2];
+            for (point, end) in ends.iter_mut().zip([lower, upper]) {
+                let inside = end + 1e-9 * (quantity.value - end);
+                point.0[*parameter as usize] = inside;
+                // Moduli may be such that the others are not admissible with them.
+                if !parameter.unit().contains("Pa") {
+                    assert!(point.constants().elasticity().is_ok(), "{parameter:?}: {point:?}");
+                }
+                assert!(inside > 0.0 || parameter.unit().is_empty(), "{parameter:?}: {lower}");
+            }
+            if *parameter == Parameter::Dispersion {
+                assert!(lower > 0.0 && upper <= crate::ensemble::DISPERSION_MAX, "{upper}");
+                assert_eq!(*quantity, found.dispersion);
+            }
+        }
+    }
+}
+
+/// Returns the inference from velocities by a model that matches their moments exactly.
+fn matching(velocities: Vec<f64>) -> Inference {
+    let free = [Parameter::Density, Parameter::Dispersion];
+    let specification = specification(&free, Some(velocities));
+    let data = specification.data.as_ref().unwrap().moments(0);
+    let mut point = OPTIMUM;
+    let ratio = model(&OPTIMUM).mean / data.mean;
+    point.0[0] *= ratio * ratio;
+    point.0[6] = data.coefficient_of_variation / 0.27;
+    let standard_error = Moments { mean: 0.0, coefficient_of_variation: 0.0 };
+    let velocity = Estimate { moments: model(&point), standard_error, controlled: false };
+    let best = BestPoint { point, velocity: Some(velocity), ..best(0.0, standard_error) };
+    let beside = |parameter: Parameter| {
+        let mut beside = point;
+        beside.0[parameter as usize] += 1e-5 * specification.range(parameter).edge();
+        row(beside, Some(parameter))
+    };
+    inference(&specification, 0, &best, &free.map(beside)).unwrap()
+}
+
+/// The share of 2000 sets of velocities of a normal law whose intervals hold the truth has a standard
+/// deviation of 0.005.
+#[test]
+fn intervals_of_few_velocities_hold_the_truth_as_often_as_they_say() {
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    let speed = libm::exp(bulk_velocity(&OPTIMUM).unwrap().logarithm);
+    let holds = |quantity: DerivedQuantity, truth: f64| {
+        let [lower, upper] = quantity.known.unwrap().interval;
+        u32::from(lower <= truth && truth <= upper)
+    };
+    for count in [5, 10, 20, 50] {
+        let mut held = [0; 2];
+        for seed in 0..2000 {
+            let germs = (0..).flat_map(|index| *Germs::draw(60_000 + seed, index).values());
+            let velocity =
+                |u| mean * (1.0 + coefficient_of_variation * standard_normal_quantile(u));
+            let found = matching(germs.take(count).map(velocity).collect());
+            held[0] += holds(found.bulk_velocity, speed);
+            held[1] += holds(found.dispersion, OPTIMUM.dispersion());
+        }
+        let shares = held.map(|held| f64::from(held) / 2000.0);
+        assert!(shares.iter().all(|share| (0.93..=0.97).contains(share)), "{count}: {shares:?}");
+    }
 }

@@ -312,7 +312,7 @@ pub struct SearchSettings {
 impl From<&JobResult> for SearchSettings {
     fn from(result: &JobResult) -> Self {
         let (search, best) = (&result.search, result.best.as_ref());
-        let by_moments = result.objective == Objective::Moments;
+        let by_moments = result.objective.is_of_moments();
         let priors = Parameter::ALL.into_iter().zip(search.priors);
         let priors: BTreeMap<_, _> =
             priors.filter_map(|(parameter, prior)| Some((parameter, prior?))).collect();

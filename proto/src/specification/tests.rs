@@ -13,6 +13,7 @@ use proptest::prelude::*;
 
 use super::*;
 
+mod objective;
 mod posterior;
 
 /// The paper's search box, with all parameters free.
@@ -183,7 +184,7 @@ prop_compose! {
             },
             posterior,
         };
-        specification.with_implied_posterior()
+        specification.with_implied(Omitted::default())
     }
 }
 
@@ -390,7 +391,7 @@ fn all_faults_are_reported_at_once() {
     let fields = faults(|m| {
         m.search.as_mut().unwrap().method = 17;
         m.monte_carlo.as_mut().unwrap().sampling = -1;
-        m.objective.as_mut().unwrap().kind = 3;
+        m.objective.as_mut().unwrap().kind = 17;
         m.data.as_mut().unwrap().mean = None;
     });
     for field in ["search.method", "monte_carlo.sampling", "objective.kind", "data.mean"] {

@@ -13,6 +13,7 @@
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
+use osteon_common::inference::MomentWeights;
 
 use crate::search_box::{SearchBox, admissible};
 
@@ -67,6 +68,8 @@ pub(super) struct Model {
     offset: Logarithms,
     /// E.
     slopes: Rows,
+    /// Weights of the cost where it has no zero; of relative squares without.
+    weights: Option<MomentWeights>,
 }
 
 /// The quantity that a descent minimises.
@@ -93,7 +96,12 @@ impl Model {
     /// Creates the model that consists of the closed form and this offset only.
     pub(super) fn new(space: SearchBox, at: Vec<f64>, offset: Logarithms) -> Self {
         let slopes = [vec![0.0; at.len()], vec![0.0; at.len()]];
-        Self { space, at, offset, slopes }
+        Self { space, at, offset, slopes, weights: None }
+    }
+
+    /// Makes the sum of squares with these weights the cost where it has no zero.
+    pub(super) fn weigh(&mut self, weights: MomentWeights) {
+        self.weights = Some(weights);
     }
 
     /// Makes the model exact at `at`, where `found` was evaluated.
@@ -230,7 +238,12 @@ impl Model {
     fn linear(&self, goal: Goal, at: &[f64], target: Logarithms) -> Option<(Rows, [f64; 2])> {
         let (predicted, mut rows) = self.predict(at)?;
         let mut residual = difference(predicted, target);
-        if goal == Goal::Cost {
+        if let (Goal::Cost, Some(weights)) = (goal, &self.weights) {
+            residual = weights.whiten(residual);
+            let columns = (0..at.len()).map(|axis| weights.whiten([rows[0][axis], rows[1][axis]]));
+            let columns: Vec<[f64; 2]> = columns.collect();
+            rows = [0, 1].map(|i| columns.iter().map(|column| column[i]).collect());
+        } else if goal == Goal::Cost {
             for (row, residual) in rows.iter_mut().zip(&mut residual) {
                 let ratio = libm::exp(*residual);
                 row.iter_mut().for_each(|slope| *slope *= ratio);

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use osteon_common::ensemble::Germs;
+use osteon_common::inference::{MomentWeights, agreement};
 use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
-use osteon_common::statistics::{PointStatistics, likelihood_cost};
+use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost};
 
 use super::method::MethodState;
 use super::reasons;
@@ -27,6 +28,8 @@ pub(super) struct DatasetSearch {
     /// Number of the set.
     set: u32,
     data: Moments,
+    /// Weights of the moments, if the cost is χ².
+    weights: Option<MomentWeights>,
     /// Number of the current start.
     start: u32,
     space: SearchBox,
@@ -35,6 +38,8 @@ pub(super) struct DatasetSearch {
     evaluations: u64,
     first: Option<Evaluation>,
     best: Option<Best>,
+    /// The points after the best one of the same start.
+    trials: reasons::Trials,
     /// Why the search from the start of the best point stopped, or, while there is none, the latest
     /// search.
     stop: Option<StopReason>,
@@ -60,16 +65,21 @@ impl DatasetSearch {
         let given = specification.data.as_ref();
         let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
         let space = space_of_start(specification, 0);
+        let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
+        let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
+        let measured = measured(specification, set);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
             data,
+            weights,
             start: 0,
             space,
-            method: MethodState::new(specification, data, measured(specification, set), space),
+            method: MethodState::new(specification, data, measured, weights, space),
             evaluations: 0,
             first: None,
             best: None,
+            trials: reasons::Trials::default(),
             stop: None,
             differences: Vec::new(),
             known: Vec::new(),
@@ -120,10 +130,11 @@ impl DatasetSearch {
         outcomes: &[Outcome],
     ) -> f64 {
         let measured = measured(specification, self.set as usize);
-        let cost = match (specification.objective, measured) {
-            (Objective::Likelihood, Some(measured)) => {
+        let cost = match (specification.objective, measured, self.weights) {
+            (Objective::Likelihood, Some(measured), _) => {
                 likelihood_cost(statistics, &specification.monte_carlo, point, outcomes, measured)
             }
+            (_, _, Some(weights)) => statistics.cost_by(|model| weights.cost(self.data, model)),
             _ => statistics.cost(self.data),
         };
         cost + specification.penalty(point)
@@ -152,9 +163,21 @@ impl DatasetSearch {
             self.first.get_or_insert(row);
             self.keep_for_posterior(specification, &row);
             self.keep_if_better(specification, row, outcomes);
+            self.note_trial(&row, &statistics);
         }
         self.settle(specification);
         row
+    }
+
+    /// Counts the point among those after the best one.
+    fn note_trial(&mut self, row: &Evaluation, statistics: &PointStatistics) {
+        let Some(best) = self.best() else { return };
+        if best.number == row.number {
+            self.trials = reasons::Trials::default();
+        } else if best.role.start == self.start {
+            let refused = !statistics.feasible && row.failures.total() > 0;
+            self.trials.take(row, refused);
+        }
     }
 
     fn tell_posterior(
@@ -210,7 +233,7 @@ impl DatasetSearch {
     ) {
         let Some(cost) = row.cost else { return };
         let tolerance = match specification.objective {
-            Objective::Moments => specification.search.cost_tolerance,
+            Objective::Moments | Objective::ChiSquare => specification.search.cost_tolerance,
             // A likelihood has no value that is high enough to stop.
             Objective::Likelihood => f64::NEG_INFINITY,
         };
@@ -249,7 +272,8 @@ impl DatasetSearch {
         if u64::from(self.start) < specification.search.starts {
             self.space = space_of_start(specification, self.start);
             let measured = measured(specification, self.set as usize);
-            self.method = MethodState::new(specification, self.data, measured, self.space);
+            self.method =
+                MethodState::new(specification, self.data, measured, self.weights, self.space);
             return;
         }
         if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {
@@ -272,8 +296,14 @@ impl DatasetSearch {
     }
 
     fn end(&mut self, specification: &JobSpecification) {
+        let agreement = self.best.as_ref().and_then(|Best { row, outcomes }| {
+            let estimate = estimate(&specification.monte_carlo, &row.point, outcomes)?;
+            agreement(specification, self.set as usize, &row.point, &estimate)
+        });
         let evidence = reasons::Evidence {
             best: self.best(),
+            agreement,
+            trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,
         };

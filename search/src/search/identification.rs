@@ -130,8 +130,11 @@ fn combined_ending(
     groups: &[(&Group, &GroupEnding)],
     unsearched: &[(&Group, &GroupEnding)],
 ) -> Ending {
-    for (status, what) in [(Status::Failed, "failed"), (Status::MaxEvaluations, "did not converge")]
-    {
+    for (status, what) in [
+        (Status::Failed, "failed"),
+        (Status::MaxEvaluations, "did not converge"),
+        (Status::NotMatched, "did not match the data"),
+    ] {
         let of_status: Vec<_> =
             groups.iter().filter(|(_, ending)| ending.status == status).collect();
         if let Some((Group { name, .. }, first)) = of_status.first() {

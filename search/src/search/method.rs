@@ -1,5 +1,6 @@
 //! The search methods behind a common interface.
 
+use osteon_common::inference::MomentWeights;
 use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
 use osteon_common::results::Moments;
 
@@ -23,11 +24,13 @@ pub(super) enum MethodState {
 
 impl MethodState {
     /// Creates the method that the specification names, starting at the start of the box, for a set
-    /// of data with these moments and, where they are known, these velocities.
+    /// of data with these moments and, where they are known, these velocities; the weights are those
+    /// of χ², if that is the cost.
     pub(super) fn new(
         specification: &JobSpecification,
         data: Moments,
         measured: Option<&[f64]>,
+        weights: Option<MomentWeights>,
         space: SearchBox,
     ) -> Self {
         let search = specification.search;
@@ -44,7 +47,11 @@ impl MethodState {
             }
             SearchMethod::Newton => {
                 let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
-                Self::Newton(Box::new(Newton::new(space, data, settings)))
+                let newton = Newton::new(space, data, settings);
+                Self::Newton(Box::new(match weights {
+                    Some(weights) => newton.weighted_by(weights),
+                    None => newton,
+                }))
             }
             SearchMethod::Posterior => Self::Posterior,
         }

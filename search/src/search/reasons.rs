@@ -1,6 +1,7 @@
 //! Explanations of how a search ended.
 
-use osteon_common::job::{JobSpecification, Objective, SearchMethod};
+use osteon_common::inference::Agreement;
+use osteon_common::job::{JobSpecification, Objective, Search};
 use osteon_common::results::{Evaluation, Status};
 
 use super::{Ending, advice};
@@ -12,11 +13,38 @@ use crate::simplex::RESTARTS_MAX;
 pub(super) struct Evidence<'a> {
     /// The best feasible evaluation.
     pub(super) best: Option<&'a Evaluation>,
+    /// Its comparison with the data.
+    pub(super) agreement: Option<Agreement>,
+    /// The points after it.
+    pub(super) trials: Trials,
     /// The first evaluation.
     pub(super) first: Option<&'a Evaluation>,
     /// Number of evaluations.
     pub(super) evaluations: u64,
 }
+
+/// Points that a search evaluated after its best one, which lowered the cost no further.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Trials {
+    points: u64,
+    refused: u64,
+    last_refused: Option<Evaluation>,
+}
+
+impl Trials {
+    /// Takes the next point, and whether too many of its realizations failed.
+    pub(super) fn take(&mut self, row: &Evaluation, refused: bool) {
+        self.points += 1;
+        if refused {
+            self.refused += 1;
+            self.last_refused = Some(*row);
+        }
+    }
+}
+
+/// A search was stopped by failed realizations if at least one point in this many had too many of
+/// them. Points that measure slopes lie beside the best one and are rarely refused.
+const REFUSED_IN: u64 = 4;
 
 /// Returns status and explanation of a search that stopped for this reason.
 pub(super) fn ending(
@@ -26,11 +54,11 @@ pub(super) fn ending(
 ) -> Ending {
     let (status, reason) = match stop {
         StopReason::CostReached => (Status::Converged, None),
-        StopReason::Converged => (Status::Converged, out_of_reach(evidence.best, specification)),
+        StopReason::Converged => settled(evidence, specification),
         StopReason::EvaluationsUsedUp if evidence.best.is_none() => {
             (Status::Failed, Some(no_feasible_point(evidence, specification)))
         }
-        StopReason::EvaluationsUsedUp => (Status::MaxEvaluations, None),
+        StopReason::EvaluationsUsedUp => (Status::MaxEvaluations, used_up(evidence, specification)),
         StopReason::RestartsUsedUp => {
             let reason = format!(
                 "the simplex collapsed, was restarted {RESTARTS_MAX} times and was still \
@@ -45,6 +73,121 @@ pub(super) fn ending(
     Ending::from_search(status, reason)
 }
 
+/// Returns status and explanation of a search that found nothing better, which is no match of the
+/// data by itself.
+fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status, Option<String>) {
+    let found = evidence.best.zip(evidence.agreement.as_ref());
+    let Some((best, agreement)) = found.filter(|_| specification.is_searched()) else {
+        return (Status::Converged, None);
+    };
+    let misfit = misfit(best, agreement, specification);
+    let on_bounds = on_bounds(best, specification);
+    // The lowest cost of a likelihood, or with priors, need not match both moments.
+    if specification.objective == Objective::Likelihood || specification.has_priors() {
+        let held = !agreement.matched && !on_bounds.is_empty();
+        let reason = format!("{misfit}; {on_bounds}; widen the bounds, or free more parameters");
+        return (Status::Converged, held.then_some(reason));
+    }
+    let status = if agreement.matched { Status::Converged } else { Status::NotMatched };
+    let reason = match stopped_by_failures(&evidence.trials, specification) {
+        Some(failures) => format!(
+            "{failures}; {misfit}; raise [monte_carlo] max_failed_fraction, or change what fails \
+             (bounds, [solver] refinement)"
+        ),
+        None if on_bounds.is_empty() => {
+            format!("no nearby point fits better: {misfit}; free more parameters")
+        }
+        None => format!(
+            "no nearby point fits better: {misfit}; {on_bounds}; widen the bounds, or free more \
+             parameters"
+        ),
+    };
+    (status, Some(reason))
+}
+
+/// Explains how far off the best point is after the last evaluation, unless it matches.
+fn used_up(evidence: &Evidence<'_>, specification: &JobSpecification) -> Option<String> {
+    let (best, agreement) = evidence.best.zip(evidence.agreement.as_ref())?;
+    let compromise = specification.objective == Objective::Likelihood || specification.has_priors();
+    if agreement.matched || compromise {
+        return None;
+    }
+    let Search { max_evaluations, starts, .. } = specification.search;
+    let each = if starts > 1 { " from each start" } else { "" };
+    let misfit = misfit(best, agreement, specification);
+    let reached = format!("reached the limit of {max_evaluations} evaluations{each}");
+    let failures = stopped_by_failures(&evidence.trials, specification);
+    let failures = failures.map_or_else(String::new, |failures| format!("; {failures}"));
+    Some(format!("{reached}: {misfit}{failures}; raise [search] max_evaluations"))
+}
+
+/// Describes how far the moments of the best point are from the data's.
+fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecification) -> String {
+    let off = |axis: usize| {
+        let ratio = libm::exp(agreement.differences[axis]);
+        let errors = agreement.errors.map_or_else(String::new, |errors| {
+            let count = agreement.differences[axis].abs() / errors[axis];
+            format!(" ({} standard errors)", rounded(count))
+        });
+        // A large difference may be due to data in other units than the model's.
+        if !(0.5..=2.0).contains(&ratio) {
+            return format!("{} times the data's{errors}", rounded(ratio));
+        }
+        let side = if ratio < 1.0 { "below" } else { "above" };
+        format!("{} % {side} the data's{errors}", rounded(100.0 * (ratio - 1.0).abs()))
+    };
+    let held = if agreement.matched && agreement.held {
+        ", and no interval is stated because a bound holds the point back"
+    } else {
+        ""
+    };
+    let cost = match specification.objective {
+        Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
+        Objective::Moments | Objective::Likelihood => "best cost",
+    };
+    format!(
+        "the {cost} is {:.3e}, cost_tolerance is {:?}; the model's mean velocity is {}, its \
+         coefficient of variation {}{held}",
+        best.cost.unwrap_or(f64::NAN),
+        specification.search.cost_tolerance,
+        off(0),
+        off(1)
+    )
+}
+
+/// Formats a positive number for reading.
+fn rounded(value: f64) -> String {
+    match value {
+        _ if value >= 10.0 => format!("{value:.0}"),
+        _ if value >= 1.0 => format!("{value:.1}"),
+        _ if value >= 0.1 => format!("{value:.2}"),
+        _ if value >= 0.01 => format!("{value:.3}"),
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// Names the parameters that are on a bound; empty if there are none.
+fn on_bounds(best: &Evaluation, specification: &JobSpecification) -> String {
+    let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
+    let named = on_bounds.iter().map(|(parameter, side)| match side {
+        Side::Lower => format!("{} is on its lower bound", parameter.name()),
+        Side::Upper => format!("{} is on its upper bound", parameter.name()),
+    });
+    named.collect::<Vec<String>>().join(", ")
+}
+
+/// Says that failed realizations stopped the search, if so many points were refused for them.
+fn stopped_by_failures(trials: &Trials, specification: &JobSpecification) -> Option<String> {
+    let last = trials.last_refused.filter(|_| REFUSED_IN * trials.refused >= trials.points)?;
+    Some(format!(
+        "stopped by failed realizations: {} of the last {} points had too many, and could not be \
+         used (at the last of them {})",
+        trials.refused,
+        trials.points,
+        failed(&last, specification)
+    ))
+}
+
 /// Describes the failed realizations of an evaluation.
 pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> String {
     let kinds: Vec<String> =
@@ -56,32 +199,6 @@ pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> Stri
         kinds.join(", "),
         specification.monte_carlo.max_failed_fraction
     )
-}
-
-/// Explains why a search that converged has no lower cost, if its method can tell.
-fn out_of_reach(best: Option<&Evaluation>, specification: &JobSpecification) -> Option<String> {
-    let best = best.filter(|_| specification.search.method == SearchMethod::Newton)?;
-    let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
-    let on_bounds: Vec<String> = on_bounds
-        .iter()
-        .map(|(parameter, side)| match side {
-            Side::Lower => format!("{} on its lower bound", parameter.name()),
-            Side::Upper => format!("{} on its upper bound", parameter.name()),
-        })
-        .collect();
-    let (where_it_is, cure) = if on_bounds.is_empty() {
-        (String::new(), "free more parameters")
-    } else {
-        (format!(" ({})", on_bounds.join(", ")), "widen the bounds, or free more parameters")
-    };
-    Some(format!(
-        "converged at a cost of {:.3e}, above cost_tolerance {:?}: no nearby point fits better{}; \
-         {}",
-        best.cost.unwrap_or(f64::NAN),
-        specification.search.cost_tolerance,
-        where_it_is,
-        cure
-    ))
 }
 
 fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) -> String {

@@ -2,6 +2,7 @@
 
 use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::results::Status;
 use osteon_files::report::{Data, Identification, Moment};
 use osteon_search::search_box::{SearchBox, Side};
 
@@ -19,6 +20,9 @@ const EXACT: f64 = 1e-4;
 /// Returns whether the model at the best point fits the data: according to the inference from the
 /// derivatives, or, without it, to cost and moments.
 pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> bool {
+    if found.status == Status::NotMatched {
+        return false;
+    }
     if let Some(identified) = found.identified() {
         return identified.matched;
     }
@@ -29,7 +33,7 @@ pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> 
 /// Returns whether the search reached its target cost.
 fn is_reached(found: &Identification, specification: &JobSpecification) -> bool {
     let cost = found.cost.unwrap_or(f64::INFINITY);
-    found.objective != Objective::Likelihood && cost <= specification.search.cost_tolerance
+    found.objective.is_of_moments() && cost <= specification.search.cost_tolerance
 }
 
 /// Returns whether a moment of the model agrees with the data within the noise of both.
@@ -77,6 +81,10 @@ pub(super) fn misfit(
         None => "so no intervals can be given",
     };
     let mut text = format!("The model does not fit the data, {intervals}.");
+    // The reason in the headline has said the rest.
+    if found.status == Status::NotMatched && found.reason.is_some() {
+        return format!("\n{}", wrapped(&text));
+    }
     if let [Some(mean), Some(variation)] = Moment::ALL.map(off) {
         text.push_str(&format!(
             " Its mean velocity is {mean}, its coefficient of variation {variation}."
@@ -118,7 +126,7 @@ pub(super) fn uniqueness(
         };
     }
     let known = match specification.objective {
-        Objective::Moments => "Two moments",
+        Objective::Moments | Objective::ChiSquare => "Two moments",
         Objective::Likelihood => "The distribution of one velocity",
     };
     let nearest =

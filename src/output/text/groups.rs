@@ -209,7 +209,11 @@ fn notes(groups: &[Group]) -> String {
 /// Returns a caveat if several parameters of the mean model are searched, which so few data cannot
 /// determine.
 fn caveat(groups: &[Group]) -> String {
-    let searched = groups.iter().find_map(|group| group.sensitivities.as_ref());
+    let fits = |group: &&Group| {
+        let missed = group.identified.as_ref().is_some_and(|known| !known.matched);
+        group.status != Status::NotMatched && !missed
+    };
+    let searched = groups.iter().filter(fits).find_map(|group| group.sensitivities.as_ref());
     let Some(searched) = searched else { return String::new() };
     let dispersion = searched.contains_key(&Parameter::Dispersion);
     if searched.len() < 2 + usize::from(dispersion) {
@@ -220,7 +224,7 @@ fn caveat(groups: &[Group]) -> String {
     let known = if dispersion { " and the dispersion are" } else { " is" };
     format!(
         "\n{data} cannot determine {} parameters. Only √(c1111/ρ){known} constrained in each\n\
-         group; many other parameter sets fit equally well. Fix what is known from elsewhere\n\
+         group that the model fits; many other parameter sets fit equally well. Fix what is known from elsewhere\n\
          (`fixed = …`) to compare single parameters.\n",
         NUMBERS.get(searched.len()).unwrap_or(&"so many")
     )

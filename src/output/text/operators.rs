@@ -219,6 +219,7 @@ left 2026-09-21T14:14:20Z: node-8 (process 5), worker 3: its connection ended;
             (job(search, Running, JobStatus::Unspecified, 0), "waiting"),
             (job(search, Ended, JobStatus::Converged, 0), "converged"),
             (job(propagation, Ended, JobStatus::Converged, 0), "done"),
+            (job(search, Ended, JobStatus::NotMatched, 0), "not_matched"),
             (job(propagation, Ended, JobStatus::Failed, 0), "failed"),
         ] {
             assert_eq!(state(&job), expected);

@@ -86,6 +86,7 @@ fn headline(found: &Identification, specification: &JobSpecification) -> String 
     let reason = found.reason.as_deref().filter(|reason| !reason.is_empty());
     let headline = match found.status {
         Status::Converged => "Converged",
+        Status::NotMatched => "Not matched",
         Status::MaxEvaluations => "Not converged",
         Status::Cancelled => "Cancelled",
         Status::Failed => "Failed",
@@ -152,6 +153,7 @@ fn moments_and_cost(found: &Identification) -> String {
         let (name, shown) = match found.objective {
             Objective::Likelihood => ("cost (nats)", measured(cost, error)),
             Objective::Moments => ("cost", digits(cost, 3)),
+            Objective::ChiSquare => ("cost (χ²)", digits(cost, 3)),
         };
         rows.push([name.to_owned(), shown, String::new(), String::new()]);
     }

@@ -59,7 +59,8 @@ fn known(name: &str, modulus: f64) -> Value {
 #[test]
 fn a_table_of_groups_shows_intervals_and_reasons() {
     let mut outlier = known("P02", 2.5e10);
-    outlier["reason"] = json!("converged at a cost of 7.644e-1, above cost_tolerance 1e-12");
+    outlier["status"] = json!("not_matched");
+    outlier["reason"] = json!("no nearby point fits better: the best cost is 7.644e-1");
     let unknown = |value: f64| json!({ "value": value, "interval": null });
     let nothing = json!({
         "matched": false,
@@ -112,6 +113,10 @@ fn what_the_data_cannot_say_is_told_once() {
     let text = with(&seven);
     assert_eq!(text.matches("Two moments cannot determine seven parameters.").count(), 1, "{text}");
     assert!(text.contains("Only √(c1111/ρ) and the dispersion are constrained"), "{text}");
+    let mut missed = known("P02", 2e10);
+    missed["status"] = json!("not_matched");
+    missed["sensitivities"] = json!({ "density": {}, "longitudinal_young_modulus": {} });
+    assert!(!table(&[missed]).contains("constrained"));
     assert!(with(&seven[..3]).contains("three parameters. Only √(c1111/ρ) is"));
     assert!(!with(&["longitudinal_young_modulus", "dispersion"]).contains("cannot determine"));
     assert!(!with(&["longitudinal_young_modulus"]).contains("cannot determine"));

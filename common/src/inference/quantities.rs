@@ -1,0 +1,196 @@
+//! Quantities with their intervals, which stay within what the law of the elasticity allows.
+
+use super::linear::{Linear, NoiseResponse};
+use super::noise::{NORMAL, Noise};
+use crate::bulk_velocity::bulk_velocity;
+use crate::conclusions::{DerivedQuantity, Uncertainty};
+use crate::data_statistics::{FewIntervals, intervals_of_data};
+use crate::ensemble::DISPERSION_MAX;
+use crate::job::{Data, JobSpecification};
+use crate::moments::ConfidenceInterval;
+use crate::parameters::{Parameter, Point};
+use crate::results::BestPoint;
+
+/// Distances of the ends of the intervals of ln v and ln Δ, below and above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LogarithmicEnds {
+    mean: [f64; 2],
+    variation: [f64; 2],
+}
+
+impl LogarithmicEnds {
+    /// Returns them for a set of independent velocities whose number is known.
+    pub(super) fn of_data(data: &Data, set: usize) -> Option<Self> {
+        let FewIntervals { mean, coefficient_of_variation } = intervals_of_data(data, set)?;
+        let found = data.moments(set);
+        let distances = |interval: ConfidenceInterval, value: f64| {
+            [libm::log(value / interval.low), libm::log(interval.high / value)]
+        };
+        // The mean's interval is symmetric, and is meant for the logarithm as well.
+        let half = 0.5 * (mean.high - mean.low) / found.mean;
+        Some(Self {
+            mean: [half; 2],
+            variation: distances(coefficient_of_variation, found.coefficient_of_variation),
+        })
+    }
+}
+
+/// The quantities at a best point.
+pub(super) struct Quantities<'a> {
+    pub(super) specification: &'a JobSpecification,
+    pub(super) best: &'a BestPoint,
+    pub(super) linear: &'a Linear,
+    pub(super) noise: &'a Noise,
+    pub(super) quantile: f64,
+    /// Difference between data and model that the search has left.
+    pub(super) residual: [f64; 2],
+    /// Ends of the intervals of the data's moments, if they are not symmetric.
+    pub(super) ends: Option<LogarithmicEnds>,
+    /// Whether intervals can be stated.
+    pub(super) known: bool,
+}
+
+impl Quantities<'_> {
+    /// √(c1111/ρ). Its logarithm is close to normally distributed.
+    pub(super) fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
+        let bulk = bulk_velocity(&self.best.point).ok()?;
+        let slope = |&parameter: &Parameter| {
+            bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
+        };
+        let gradient: Vec<f64> = free.iter().map(slope).collect();
+        Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
+    }
+
+    /// The dispersion, whose interval ends where the law does.
+    pub(super) fn dispersion(&self, free: &[Parameter]) -> DerivedQuantity {
+        let dispersion = self.best.point.dispersion();
+        let gradient = self.along(Parameter::Dispersion, free, 1.0 / dispersion);
+        let DerivedQuantity { value, known } = self.of_logarithm(dispersion, &gradient);
+        let within = |known: Uncertainty| Uncertainty {
+            interval: known.interval.map(|end| end.min(DISPERSION_MAX)),
+            ..known
+        };
+        DerivedQuantity { value, known: known.map(within) }
+    }
+
+    /// The free parameters. Those that are positive have intervals of their logarithm.
+    pub(super) fn parameters(&self, free: &[Parameter]) -> Vec<(Parameter, DerivedQuantity)> {
+        let quantity = |&parameter: &Parameter| {
+            let value = self.best.point.get(parameter);
+            let quantity = match parameter {
+                Parameter::Dispersion => self.dispersion(free),
+                Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
+                    self.poisson_ratio(parameter, free)
+                }
+                Parameter::Density
+                | Parameter::LongitudinalYoungModulus
+                | Parameter::LongitudinalShearModulus
+                | Parameter::TransverseYoungModulus => {
+                    self.of_logarithm(value, &self.along(parameter, free, 1.0 / value))
+                }
+            };
+            (parameter, quantity)
+        };
+        free.iter().map(quantity).collect()
+    }
+
+    fn poisson_ratio(&self, parameter: Parameter, free: &[Parameter]) -> DerivedQuantity {
+        let value = self.best.point.get(parameter);
+        let known = self.response(&self.along(parameter, free, 1.0)).map(|response| {
+            let [lowest, highest] = admissible_ratios(parameter, &self.best.point);
+            let [below, above] = self.reaches(&response);
+            let interval = [(value - below).max(lowest), (value + above).min(highest)];
+            let NoiseResponse { deviation, free_share, .. } = response;
+            Uncertainty { standard_error: deviation, interval, free_share }
+        });
+        DerivedQuantity { value, known }
+    }
+
+    /// Returns the gradient, in units of the box, of a quantity that depends on one parameter alone,
+    /// with this derivative.
+    fn along(&self, parameter: Parameter, free: &[Parameter], derivative: f64) -> Vec<f64> {
+        let slope = |other: &Parameter| match *other == parameter {
+            true => derivative * self.specification.range(parameter).edge(),
+            false => 0.0,
+        };
+        free.iter().map(slope).collect()
+    }
+
+    /// Returns a quantity, given the gradient of its logarithm in units of the box.
+    fn of_logarithm(&self, value: f64, gradient: &[f64]) -> DerivedQuantity {
+        let known = self.response(gradient).map(|response| {
+            let NoiseResponse { deviation, free_share, .. } = response;
+            let [below, above] = self.reaches(&response).map(libm::exp);
+            let interval = [value / below, value * above];
+            Uncertainty { standard_error: value * deviation, interval, free_share }
+        });
+        DerivedQuantity { value, known }
+    }
+
+    /// Returns how far an interval reaches below and above the value: the effect of the noise, plus
+    /// the distance by which the solution would move if the residual were removed.
+    fn reaches(&self, response: &NoiseResponse) -> [f64; 2] {
+        let [mean, variation] = response.transfer;
+        let left = mean * self.residual[0] + variation * self.residual[1];
+        let of_noise = match (&self.ends, &self.noise.data) {
+            (Some(ends), Some(data)) => self.combined(response.transfer, ends, &data.covariance),
+            _ => [self.quantile * response.deviation; 2],
+        };
+        of_noise.map(|reach| reach + left.abs())
+    }
+
+    /// Combines the intervals of both moments, which are not symmetric, by the squares of the
+    /// distances of their ends (MOVER: G. Y. Zou, "Toward using confidence intervals to compare
+    /// correlations", Psychol. Methods 12 (2007)), with the sampling's noise.
+    fn combined(
+        &self,
+        [mean, variation]: [f64; 2],
+        ends: &LogarithmicEnds,
+        covariance: &[[f64; 2]; 2],
+    ) -> [f64; 2] {
+        let [[of_mean, both], [_, of_variation]] = *covariance;
+        let correlation = both / (of_mean * of_variation).sqrt();
+        let correlation = if correlation.is_finite() { correlation } else { 0.0 };
+        let sampling =
+            mean * mean * self.noise.model[0] + variation * variation * self.noise.model[1];
+        [0, 1].map(|side| {
+            // An end of the quantity comes from the same end of a moment that raises it.
+            let part = |transfer: f64, ends: [f64; 2]| match transfer {
+                _ if transfer == 0.0 => 0.0,
+                _ if transfer > 0.0 => transfer * ends[side],
+                _ => transfer * ends[1 - side],
+            };
+            let (one, other) = (part(mean, ends.mean), part(variation, ends.variation));
+            if !(one.is_finite() && other.is_finite()) {
+                return f64::INFINITY;
+            }
+            let data = one * one + other * other + 2.0 * correlation * one * other;
+            (data.max(0.0) + NORMAL * NORMAL * sampling).sqrt()
+        })
+    }
+
+    /// Returns the effect of noise on a quantity with this gradient; `None` if the model does not
+    /// match, or is held by a bound, if the quantity does not depend on any free parameter, or if the
+    /// data leave a direction free: even a quantity whose gradient is nearly orthogonal to it then
+    /// depends on how far the parameters may move along it, which the posterior says.
+    fn response(&self, gradient: &[f64]) -> Option<NoiseResponse> {
+        if !self.known || gradient.iter().all(|slope| *slope == 0.0) {
+            return None;
+        }
+        self.linear.response(gradient, &self.noise.covariance())
+    }
+}
+
+/// Returns the ends of the values of a Poisson ratio with which the mean model is admissible, with
+/// the other parameters as in `point`: e_L (1 - ν_T) - 2 e_T ν_L² is positive between them.
+fn admissible_ratios(parameter: Parameter, point: &Point) -> [f64; 2] {
+    let young = point.get(Parameter::LongitudinalYoungModulus);
+    let transverse = point.get(Parameter::TransverseYoungModulus);
+    if parameter == Parameter::TransversePoissonRatio {
+        let ratio = point.get(Parameter::LongitudinalPoissonRatio);
+        return [-1.0, 1.0 - 2.0 * transverse * ratio * ratio / young];
+    }
+    let ratio = point.get(Parameter::TransversePoissonRatio);
+    let most = (young * (1.0 - ratio) / (2.0 * transverse)).sqrt();
+    [-most, most]
+}

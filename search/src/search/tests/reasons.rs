@@ -1,0 +1,150 @@
+//! Explanations of searches that end without a match.
+
+use osteon_common::job::Measurements;
+use osteon_common::outcome::FailureKind;
+
+use super::*;
+
+/// Returns the jobs of both methods.
+fn both(change: impl Fn(&mut JobSpecification)) -> [JobSpecification; 2] {
+    [specification(400), by_newton(400)].map(|mut job| {
+        change(&mut job);
+        job
+    })
+}
+
+/// Runs a job whose realizations are those of `outcomes`, and returns how it ended.
+fn ended(
+    job: &JobSpecification,
+    outcomes: impl Fn(&Point) -> Arc<[Outcome]>,
+) -> (Status, String, JobResult) {
+    let mut search = Search::new(Arc::new(job.clone()));
+    while let Step::Evaluate(point) = search.ask() {
+        search.tell(outcomes(&point), ERRORS);
+    }
+    let ending = ending(&search);
+    let result = search.result(&ending, &Program::current(None));
+    (ending.status, ending.reason.unwrap_or_default(), result)
+}
+
+fn check(reason: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(reason.contains(part), "{part}: {reason}");
+    }
+}
+
+#[test]
+fn data_out_of_reach_are_not_matched_and_both_methods_say_how_far_off() {
+    for job in both(|job| job.data = Some(Data::from_moments(2000.0, 0.03))) {
+        let (status, reason, _) = ended(&job, outcomes);
+        assert_eq!(status, Status::NotMatched);
+        check(
+            &reason,
+            &[
+                "no nearby point fits better",
+                "the best cost is 1.037e-1",
+                "mean velocity is 32 % above the data's,",
+                "coefficient of variation ",
+                "longitudinal_young_modulus is on its lower bound; widen the bounds",
+            ],
+        );
+    }
+}
+
+/// With a known number of velocities the reason says how many standard errors the data are missed
+/// by, and a point within the noise has converged.
+#[test]
+fn distances_are_in_standard_errors_where_these_are_known() {
+    let counted = |mean: f64, count: u64| Data {
+        measurements: Measurements::Moments {
+            mean,
+            coefficient_of_variation: 0.03,
+            count: Some(count),
+        },
+        repeatability: 0.0,
+    };
+    // The smallest mean within the bounds is 2644 m/s; one standard error is 0.3 %.
+    for (mean, expected) in [(2640.0, Status::Converged), (2600.0, Status::NotMatched)] {
+        for mut job in both(|job| job.data = Some(counted(mean, 100))) {
+            // Sampling errors would add to those of the data.
+            job.monte_carlo.realizations = 400;
+            let (status, reason, result) = ended(&job, |point| {
+                let few = outcomes(point);
+                (0..400).map(|k| few[k % 4]).collect()
+            });
+            assert_eq!(status, expected, "{mean}: {reason}");
+            check(&reason, &[" standard errors)", "is on its lower bound"]);
+            let held = "no interval is stated because a bound holds the point back";
+            assert_eq!(reason.contains(held), status == Status::Converged, "{reason}");
+            let found = result.conclusions.inference.unwrap();
+            assert_eq!(found.matched, status == Status::Converged);
+            assert_eq!(found.bulk_velocity.known, None);
+        }
+    }
+}
+
+#[test]
+fn failed_realizations_that_stop_a_search_are_named() {
+    let failing = |point: &Point| -> Arc<[Outcome]> {
+        let mut found = outcomes(point).to_vec();
+        if point.0[1] > 16e9 {
+            found[0] = Err(FailureKind::NoArrival);
+        }
+        found.into()
+    };
+    for job in both(|_| {}) {
+        let (status, reason, _) = ended(&job, failing);
+        assert_eq!(status, Status::NotMatched, "{reason}");
+        check(
+            &reason,
+            &[
+                "stopped by failed realizations: ",
+                "points had too many",
+                "(at the last of them 1 of 4 realizations failed (1 no_arrival); \
+                 max_failed_fraction is 0.01)",
+                "% below the data's",
+                "raise [monte_carlo] max_failed_fraction",
+            ],
+        );
+    }
+}
+
+#[test]
+fn used_up_evaluations_say_how_far_off_the_best_point_is() {
+    for mut job in both(|_| {}) {
+        job.search.max_evaluations = 1;
+        let (status, reason, _) = ended(&job, outcomes);
+        assert_eq!(status, Status::MaxEvaluations);
+        check(&reason, &["reached the limit of 1 evaluations: ", "% below the data's"]);
+    }
+}
+
+/// One of a hundred velocities is doubled. It makes the coefficient of variation larger than any
+/// within the bounds, and its standard error by the influences of the velocities so large that the
+/// difference would be within the noise.
+#[test]
+fn an_outlier_does_not_excuse_the_misfit_that_it_causes() {
+    let mut velocities: Vec<f64> =
+        (0..100).map(|k| 3900.0 * (1.0 + 0.03 * (f64::from(k) / 49.5 - 1.0))).collect();
+    velocities[50] *= 2.0;
+    for job in both(|job| job.data = Some(Data::from_velocities(velocities.clone()))) {
+        let (status, reason, result) = ended(&job, outcomes);
+        assert_eq!(status, Status::NotMatched, "{reason}");
+        check(&reason, &["dispersion is on its upper bound"]);
+        let found = result.conclusions.inference.unwrap();
+        assert!(!found.matched && found.dispersion.known.is_none());
+    }
+}
+
+#[test]
+fn a_compromise_with_priors_has_converged() {
+    let mut job = specification(400);
+    job.search.priors[6] = Some(Prior { value: 0.2, weight: 1.0 });
+    let (status, reason, _) = ended(&job, outcomes);
+    assert_eq!((status, reason.as_str()), (Status::Converged, ""));
+    // On a bound the reason says what is missed.
+    job.data = Some(Data::from_moments(2000.0, 0.03));
+    let (status, reason, _) = ended(&job, outcomes);
+    assert_eq!(status, Status::Converged);
+    check(&reason, &["longitudinal_young_modulus is on its lower bound"]);
+}
