@@ -4,9 +4,11 @@
 mod intervals;
 
 use crate::job::{Data, Sampling};
+use crate::limits;
 use crate::moments::KolmogorovTest;
 use crate::outcome::Outcome;
 use crate::results::DataSummary;
+use crate::robust::outliers;
 
 pub use self::intervals::{CONFIDENCE, moment_intervals};
 
@@ -23,10 +25,13 @@ impl DataSummary {
     /// of a second.
     pub fn from_data(data: &Data, set: usize) -> Self {
         let given = data.set(set);
+        let outliers = given.map(|given| outliers(given.velocities)).unwrap_or_default();
         Self {
             moments: data.moments(set),
             count: given.map(|given| given.velocities.len() as u64),
             intervals: given.as_ref().and_then(moment_intervals),
+            outlier_count: outliers.len() as u64,
+            outliers: outliers.into_iter().take(limits::OUTLIERS_LISTED_MAX).collect(),
         }
     }
 }

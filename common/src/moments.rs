@@ -68,6 +68,17 @@ pub struct MomentIntervals {
     pub level: f64,
 }
 
+/// A measured velocity far from the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Outlier {
+    /// Its number among the velocities of its set, from 0.
+    pub index: u64,
+    /// The velocity, m/s.
+    pub velocity: f64,
+    /// Number of robust standard deviations by which it lies above the median; negative below.
+    pub deviations: f64,
+}
+
 /// Result of the two-sample Kolmogorov-Smirnov test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KolmogorovTest {
