@@ -52,6 +52,10 @@ pub struct Posterior {
     /// Probability of a Kolmogorov distance between data and posterior-predictive law at least as
     /// large as that of the data; `None` without velocities.
     pub predictive_p_value: Option<f64>,
+    /// Probability that a measured velocity is not from the model's law: its posterior mean, given
+    /// the posterior means of the two moments. `None` where all velocities are near the median, or
+    /// only moments are known.
+    pub outlier_share: Option<f64>,
     /// Draws of equal weight.
     pub draws: Vec<PosteriorDraw>,
 }

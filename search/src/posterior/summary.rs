@@ -39,6 +39,9 @@ impl PosteriorSearch {
         let reason = self.reason(efficiency, effective);
         let noise = problem.likelihood.errors();
         let share = |k: usize| errors[k] / noise[k] * (errors[k] / noise[k]);
+        let (mean, variation) =
+            (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
+        let at = [mean.mean, variation.mean].map(libm::log);
         let settings = specification.posterior.unwrap_or_default();
         let count = usize::try_from(settings.draws).unwrap_or(usize::MAX);
         Some(Posterior {
@@ -54,13 +57,14 @@ impl PosteriorSearch {
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
-            mean: of(&|point| self.moment(point, 0)),
-            coefficient_of_variation: of(&|point| self.moment(point, 1)),
+            mean,
+            coefficient_of_variation: variation,
             bulk_velocity: of(&|point| {
                 super::closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
             entries: entries(&population, &prior),
             predictive_p_value: None,
+            outlier_share: problem.likelihood.outlier_share(at).map(|share| share.mean),
             draws: draws(&population, problem, count),
         })
     }

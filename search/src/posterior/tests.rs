@@ -248,3 +248,17 @@ fn too_few_evaluations_are_said() {
     assert!(!found.converged && found.evaluations <= 20, "{}", found.evaluations);
     assert!(found.reason.unwrap().contains("max_evaluations"));
 }
+
+/// One of a hundred velocities is doubled, which raises their coefficient of variation from 0.027 to
+/// 0.1.
+#[test]
+fn a_wrong_velocity_hardly_moves_the_posterior() {
+    let clean = specification(&[Parameter::Dispersion], 100, PosteriorSettings::default());
+    let mut velocities = velocities(&OPTIMUM, 100);
+    velocities[50] *= 2.0;
+    let data = Some(Data::from_velocities(velocities));
+    let found = posterior(&JobSpecification { data, ..clean });
+    let off = found.parameters[0].mean - OPTIMUM.dispersion();
+    assert!(off.abs() < 0.3 * found.parameters[0].standard_deviation, "{:?}", found.parameters);
+    assert!((0.008..0.03).contains(&found.outlier_share.unwrap()), "{:?}", found.outlier_share);
+}
