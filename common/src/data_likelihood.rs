@@ -17,6 +17,7 @@ mod contamination;
 mod tests;
 
 use self::contamination::Contamination;
+use crate::data_statistics::rounding;
 use crate::moments::Moments;
 use crate::robust::RobustScale;
 
@@ -34,6 +35,8 @@ const NORMAL_NODES: [(f64, f64); 5] = [
     (1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (2.856_970_013_872_806, 0.011_257_411_327_720_7),
 ];
+/// Rounding that adds less than this share of the variance is negligible.
+const ROUNDING: f64 = 1e-3;
 /// Errors of the model's moments below this fraction of the data's are negligible.
 const NEGLIGIBLE: f64 = 0.02;
 
@@ -110,6 +113,7 @@ impl DataLikelihood {
         let centre = first + mean;
         let squares: f64 = right.iter().map(|v| (v - centre) * (v - centre)).sum();
         let deviation = (squares / count).sqrt();
+        let repeatability = with_rounding(repeatability, velocities, deviation);
         let Some(scale) = scale else {
             let classes = classes(velocities.iter().copied().zip(subjects.iter().copied()), centre);
             return Self::from_classes(centre, deviation, repeatability, classes);
@@ -219,6 +223,17 @@ impl DataLikelihood {
         };
         -0.5 * self.classes.iter().map(of).sum::<f64>()
     }
+}
+
+/// Returns the instrument's standard deviation together with that of a rounding error, for velocities
+/// of which `deviation` is the standard deviation: a rounding error within a step h has the variance
+/// h²/12 (W. F. Sheppard, Proc. London Math. Soc. 29 (1898)).
+fn with_rounding(repeatability: f64, velocities: &[f64], deviation: f64) -> f64 {
+    let variance = rounding(velocities).map_or(0.0, |step| step * step / 12.0);
+    if variance < ROUNDING * deviation * deviation {
+        return repeatability;
+    }
+    repeatability.mul_add(repeatability, variance).sqrt()
 }
 
 /// Returns the logarithm of the sum of the exponentials.

@@ -28,9 +28,9 @@ mod solutions;
 mod tests;
 
 use crate::bulk_velocity::bulk_velocity;
-use crate::job::JobSpecification;
+use crate::job::{Data, JobSpecification};
 use crate::parameters::Parameter;
-use crate::results::{BestPoint, Evaluation};
+use crate::results::{BestPoint, Estimate, Evaluation};
 
 use self::jacobian::log_ratios;
 use self::linear::{Linear, NoiseResponse};
@@ -99,6 +99,13 @@ fn is_matched(residual: [f64; 2], noise: &Noise) -> bool {
         square <= (9.0 * covariance[axis][axis]).max(EXACT * EXACT)
     };
     within(0) && within(1)
+}
+
+/// Returns whether the model's moments match those of set number `set` of the data, as
+/// [`Inference::matched`] states.
+pub fn matches_data(data: &Data, set: usize, estimate: &Estimate) -> bool {
+    let residual = log_ratios(data.moments(set), estimate.moments);
+    is_matched(residual, &noise(data, set, estimate))
 }
 
 struct Context<'a> {

@@ -164,6 +164,8 @@ pub struct DataSummary {
     /// The velocities far from the others, in their order; at most
     /// [`crate::limits::OUTLIERS_LISTED_MAX`].
     pub outliers: Vec<Outlier>,
+    /// Step to which the velocities are rounded, m/s; `None` if none is seen.
+    pub rounding: Option<f64>,
     /// Number of all velocities far from the others.
     pub outlier_count: u64,
 }

@@ -24,6 +24,7 @@ pub(crate) fn data_to_message(data: &DataSummary) -> v1::DataSummary {
         }),
         outliers: data.outliers.iter().map(outlier_to_message).collect(),
         outlier_count: data.outlier_count,
+        rounding: data.rounding,
     }
 }
 
@@ -46,6 +47,7 @@ pub(crate) fn data_from_message(message: &v1::DataSummary) -> Result<DataSummary
         intervals: message.intervals.as_ref().map(intervals).transpose()?,
         outliers: message.outliers.iter().map(outlier_from_message).collect(),
         outlier_count: message.outlier_count,
+        rounding: message.rounding,
     })
 }
 

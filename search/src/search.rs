@@ -6,9 +6,9 @@
 
 use std::sync::Arc;
 
-use osteon_common::data_statistics::kolmogorov_test;
+use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
 use osteon_common::digest::PathDigest;
-use osteon_common::inference::{Conclusions, below_noise_from, meaning};
+use osteon_common::inference::{Conclusions, below_noise_from, matches_data, meaning};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
@@ -350,6 +350,15 @@ impl Summary {
         // The test holds for independent velocities with no scatter but the model's.
         let tested = given.filter(|set| set.subjects.is_none() && set.repeatability == 0.0);
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
+        let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
+        let matched = data
+            .zip(velocity.as_ref())
+            .is_some_and(|(data, velocity)| matches_data(data, row.role.group as usize, velocity));
+        // Moments that the search could not match are not fitted.
+        let fitted = match objective {
+            Objective::Moments if !matched => FittedMoments::Neither,
+            _ => FittedMoments::of(specification),
+        };
         let mut best = BestPoint {
             point: row.point,
             meaning: row.cost.map(|cost| meaning(specification, cost)),
@@ -358,10 +367,11 @@ impl Summary {
             below_noise_from: None,
             cost_error: by_likelihood
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
-            velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
+            velocity,
             failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
-            kolmogorov: tested
-                .and_then(|set| kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling)),
+            kolmogorov: tested.and_then(|set| {
+                kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling, fitted)
+            }),
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),

@@ -216,3 +216,19 @@ fn a_wrong_velocity_of_a_subject_counts_little_too() {
         assert!((wrong[0] - clean[0]).abs() < 0.3 * clean[1], "{wrong:?} {clean:?}");
     }
 }
+
+/// Rounding to 50 m/s adds 208 m²/s² to the variance, 2 % of it.
+#[test]
+fn rounding_is_scatter_of_the_instrument() {
+    let rounded: Vec<f64> = normal(4, 2000).iter().map(|v| 50.0 * (v / 50.0).round()).collect();
+    let found = DataLikelihood::independent(&rounded, 0.0).unwrap();
+    let mut finer = rounded.clone();
+    finer[7] += 1e-3;
+    let [_, with] = found.moments();
+    let [_, without] = DataLikelihood::independent(&finer, 0.0).unwrap().moments();
+    let expected = 0.5 * 2500.0 / 12.0 / 1e4;
+    assert!((without - with - expected).abs() < 0.1 * expected, "{with} {without}");
+    // A step of 1 m/s makes no difference.
+    let fine: Vec<f64> = normal(4, 2000).iter().map(|v| v.round()).collect();
+    assert_eq!(DataLikelihood::independent(&fine, 0.0).unwrap().instrument, 0.0);
+}

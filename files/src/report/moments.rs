@@ -112,6 +112,9 @@ pub struct Data {
     /// Number of all such velocities; not there where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outlier_count: Option<u64>,
+    /// Step to which the velocities are rounded, m/s; not there where none is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<f64>,
     /// Number of the velocities; only of groups.
     #[serde(
         default,
@@ -130,6 +133,7 @@ impl Data {
             interval: measured.then(|| data.intervals.map(MomentIntervals::from)),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
             outliers: data.outliers.clone(),
+            rounding: data.rounding,
             outlier_count: Some(data.outlier_count).filter(|count| *count > 0),
             count: None,
         }

@@ -67,6 +67,7 @@ fn result() -> JobResult {
             count: None,
             intervals: None,
             outliers: Vec::new(),
+            rounding: None,
             outlier_count: 0,
         }),
         conclusions: Conclusions::default(),

@@ -106,11 +106,12 @@ prop_compose! {
         intervals in proptest::option::of((interval(), interval(), 0.0..1.0)),
         outliers in proptest::collection::vec(outlier(), 0..3),
         outlier_count: u64,
+        rounding in proptest::option::of(number()),
     ) -> DataSummary {
         let intervals = intervals.map(|(mean, coefficient_of_variation, level)| {
             MomentIntervals { mean, coefficient_of_variation, level }
         });
-        DataSummary { moments, count, intervals, outliers, outlier_count }
+        DataSummary { moments, count, intervals, outliers, outlier_count, rounding }
     }
 }
 

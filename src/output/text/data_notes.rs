@@ -7,10 +7,12 @@ use super::number::{VELOCITY_DIGITS, digits, significant};
 
 /// Maximum number of outlying velocities that are named.
 const LISTED_MAX: usize = 5;
+/// Step of rounding, in standard deviations of the velocities, from which it is stated.
+const COARSE: f64 = 0.1;
 
 /// Returns all remarks, each on lines of its own.
 pub(super) fn text(data: &Data) -> String {
-    let remarks = [outliers(data), kolmogorov(data)];
+    let remarks = [outliers(data), rounding(data), kolmogorov(data)];
     remarks.into_iter().flatten().map(|remark| wrapped(&remark)).collect()
 }
 
@@ -33,14 +35,24 @@ pub(super) fn outliers(data: &Data) -> Option<String> {
     ))
 }
 
+/// Names the step to which the velocities are rounded, if it is large enough to matter.
+fn rounding(data: &Data) -> Option<String> {
+    let deviation = data.moments.mean? * data.moments.coefficient_of_variation?;
+    let step = data.rounding.filter(|step| *step >= COARSE * deviation)?;
+    Some(format!(
+        "The velocities are rounded to {} m/s; test and posterior allow for that.",
+        significant(step, VELOCITY_DIGITS)
+    ))
+}
+
 /// Returns whether the data agree with the model's law, if that was tested.
 fn kolmogorov(data: &Data) -> Option<String> {
     let test = data.kolmogorov.flatten()?;
     let (distance, p) = (digits(test.distance, 2), digits(test.p_value, 2));
     let numbers = glued(&format!("D = {distance}, p = {p}"));
     Some(format!(
-        "Kolmogorov–Smirnov test, data vs model: {numbers} (optimistic: the model was fitted to \
-         these data)"
+        "Kolmogorov–Smirnov test, data vs model: {numbers} (allows for the model being \
+         fitted to these data)"
     ))
 }
 
@@ -68,5 +80,17 @@ mod tests {
         let many = of(200).unwrap();
         assert!(many.starts_with("200 velocities are far"), "{many}");
         assert!(many.ends_with("(by 37) and 195 more."), "{many}");
+    }
+
+    #[test]
+    fn coarse_rounding_is_told() {
+        let of = |step: f64| {
+            let data = format!(
+                r#"{{"mean": 3900.0, "coefficient_of_variation": 0.03, "rounding": {step:?}}}"#
+            );
+            rounding(&serde_json::from_str(&data).unwrap())
+        };
+        assert_eq!(of(1.0), None);
+        assert!(of(25.0).unwrap().starts_with("The velocities are rounded to 25 m/s;"));
     }
 }
