@@ -16,7 +16,7 @@ mod contamination;
 #[cfg(test)]
 mod tests;
 
-use self::contamination::Contamination;
+use self::contamination::{Contamination, log_of_sum};
 use crate::data_statistics::rounding;
 use crate::moments::Moments;
 use crate::robust::RobustScale;
@@ -234,19 +234,6 @@ fn with_rounding(repeatability: f64, velocities: &[f64], deviation: f64) -> f64 
         return repeatability;
     }
     repeatability.mul_add(repeatability, variance).sqrt()
-}
-
-/// Returns the logarithm of the sum of the exponentials.
-fn log_of_sum(logs: impl ExactSizeIterator<Item = f64>) -> f64 {
-    if logs.len() == 1 {
-        return logs.sum();
-    }
-    let logs: Vec<f64> = logs.collect();
-    let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
-    if !largest.is_finite() {
-        return f64::NEG_INFINITY;
-    }
-    largest + libm::log(logs.iter().map(|log| libm::exp(log - largest)).sum())
 }
 
 /// Sums the velocities by subject, and the subjects by the number of their velocities.

@@ -96,7 +96,7 @@ impl Contamination {
     /// each of the core, averaged over ε, for a normal law with this mean, as distance from the
     /// centre (m/s), and this variance (m²/s²). Up to a constant.
     pub(super) fn log(&self, mean: f64, variance: f64) -> f64 {
-        super::log_of_sum(self.logs(mean, variance).into_iter())
+        log_of_sum(self.logs(mean, variance).into_iter())
     }
 
     /// Returns the posterior of ε for such a law.
@@ -143,6 +143,19 @@ impl Contamination {
         };
         self.rates.iter().map(of).collect()
     }
+}
+
+/// Returns the logarithm of the sum of the exponentials.
+pub(super) fn log_of_sum(logs: impl ExactSizeIterator<Item = f64>) -> f64 {
+    if logs.len() == 1 {
+        return logs.sum();
+    }
+    let logs: Vec<f64> = logs.collect();
+    let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
+    if !largest.is_finite() {
+        return f64::NEG_INFINITY;
+    }
+    largest + libm::log(logs.iter().map(|log| libm::exp(log - largest)).sum())
 }
 
 /// Density of a normal law over that of the broad law.

@@ -8,6 +8,7 @@ use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
 use crate::parameters::Point;
 use crate::results::{Estimate, EvaluationRole, Moments};
+use crate::special::standard_normal_quantile;
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
 fn model(point: &Point) -> Moments {
@@ -305,4 +306,46 @@ fn solutions_are_the_best_of_each_start() {
     assert_eq!(entries.len(), 21);
     close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);
     assert_eq!(spread(&[]), None);
+}
+
+/// The model's law has the moments of the model, and the data are of the same law. One of a hundred
+/// velocities is doubled: the interval by the moments is then much longer, while the likelihood has its maximum where
+/// it was.
+#[test]
+fn a_likelihood_has_intervals_in_spite_of_a_wrong_velocity() {
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    let quantiles = |count: u32| -> Vec<f64> {
+        let score = |k| standard_normal_quantile((f64::from(k) + 0.5) / f64::from(count));
+        (0..count).map(|k| mean * (1.0 + coefficient_of_variation * score(k))).collect()
+    };
+    let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
+    let of = |velocities: Vec<f64>, objective: Objective| {
+        let mut specification = specification(&free, Some(velocities));
+        specification.objective = objective;
+        let mut best = best(0.0, Moments { mean: 1e-6, coefficient_of_variation: 1e-9 });
+        best.outcomes = quantiles(2747).into_iter().map(Ok).collect();
+        let mut rows = vec![row(OPTIMUM, None)];
+        for parameter in free {
+            let mut point = OPTIMUM;
+            point.0[parameter as usize] += 1e-5 * specification.range(parameter).edge();
+            rows.push(row(point, Some(parameter)));
+        }
+        inference(&specification, 0, &best, &rows).unwrap()
+    };
+    for (count, most) in [(100, 0.25), (2747, 0.05)] {
+        let clean = quantiles(count);
+        let mut wrong = clean.clone();
+        wrong[count as usize / 2] *= 2.0;
+        let by_moments = of(wrong.clone(), Objective::Moments);
+        let [clean, wrong] = [clean, wrong].map(|data| {
+            let found = of(data, Objective::Likelihood);
+            assert!(found.matched);
+            let [low, high] = found.dispersion.known.unwrap().interval;
+            high - low
+        });
+        assert!((wrong / clean - 1.0).abs() < most, "{wrong} {clean}");
+        let of_moments =
+            by_moments.dispersion.known.map(|known| known.interval[1] - known.interval[0]);
+        assert!(of_moments.is_none_or(|length| length > 2.0 * wrong), "{of_moments:?} {wrong}");
+    }
 }
