@@ -52,6 +52,7 @@ pub(crate) fn drawn_posterior() -> Posterior {
         bulk_velocity: summary(3975.3, 12.4, 310.0),
         entries: vec![(0, 0, summary(25.3e9, 0.2e9, 4.0e9)), (3, 3, summary(6.8e9, 0.0, 0.0))],
         predictive_p_value: Some(0.43),
+        outlier_share: Some(0.0123),
         draws: vec![draw(17.7e9, -3.25), draw(17.9e9, -4.5)],
     }
 }

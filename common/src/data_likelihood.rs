@@ -8,8 +8,20 @@
 //! integrated out under a uniform prior (S. R. Searle, G. Casella and C. E. McCulloch, Variance
 //! Components (1992), Sec. 3.7). The scatter of the instrument adds a known variance to each
 //! velocity.
+//!
+//! A few wrong velocities would move the moments of such a sample without limit. So each velocity
+//! has a small unknown probability of coming from a broad law instead (`contamination.rs`).
 
+mod contamination;
+#[cfg(test)]
+mod tests;
+
+use self::contamination::{Contamination, log_of_sum};
+use crate::data_statistics::rounding;
 use crate::moments::Moments;
+use crate::robust::RobustScale;
+
+pub use self::contamination::OutlierShare;
 
 /// Number of values of ρ, the midpoints of equal intervals from 0 to 1, over which the likelihood
 /// is averaged.
@@ -23,6 +35,8 @@ const NORMAL_NODES: [(f64, f64); 5] = [
     (1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (2.856_970_013_872_806, 0.011_257_411_327_720_7),
 ];
+/// Rounding that adds less than this share of the variance is negligible.
+const ROUNDING: f64 = 1e-3;
 /// Errors of the model's moments below this fraction of the data's are negligible.
 const NEGLIGIBLE: f64 = 0.02;
 
@@ -37,6 +51,8 @@ pub struct DataLikelihood {
     instrument: f64,
     /// Subjects with equal numbers of velocities.
     classes: Vec<SubjectClass>,
+    /// Velocities that may be wrong, which are not in the classes; `None` if there are none.
+    contamination: Option<Contamination>,
     /// Values of ρ.
     shares: Vec<f64>,
     /// Errors of the model's moments, over which the likelihood is averaged: differences of both
@@ -65,13 +81,13 @@ impl DataLikelihood {
     /// (m/s). `None` if they have no scatter beyond the instrument's.
     pub fn independent(velocities: &[f64], repeatability: f64) -> Option<Self> {
         let subjects: Vec<u32> = (0..).take(velocities.len()).collect();
-        Self::new(velocities, &subjects, repeatability)
+        Self::new(velocities, &subjects, (repeatability, false))
     }
 
     /// Likelihood of velocities of which several belong to one subject: `subjects` has the index of
     /// the subject of each, the indices from 0 without gaps.
     pub fn of_subjects(velocities: &[f64], subjects: &[u32], repeatability: f64) -> Option<Self> {
-        Self::new(velocities, subjects, repeatability)
+        Self::new(velocities, subjects, (repeatability, true))
     }
 
     /// Likelihood of `count` independent velocities of which only the moments are known.
@@ -83,14 +99,34 @@ impl DataLikelihood {
         Self::from_classes(moments.mean, deviation, repeatability, vec![class])
     }
 
-    fn new(velocities: &[f64], subjects: &[u32], repeatability: f64) -> Option<Self> {
-        let centre = velocities.first().copied()?;
-        let count = velocities.len() as f64;
-        let mean = velocities.iter().map(|v| v - centre).sum::<f64>() / count;
-        let centre = centre + mean;
-        let squares: f64 = velocities.iter().map(|v| (v - centre) * (v - centre)).sum();
-        let classes = classes(velocities, subjects, centre);
-        Self::from_classes(centre, (squares / count).sqrt(), repeatability, classes)
+    fn new(
+        velocities: &[f64],
+        subjects: &[u32],
+        (repeatability, has_subjects): (f64, bool),
+    ) -> Option<Self> {
+        let scale = RobustScale::of(velocities);
+        let is_right = |velocity: &f64| scale.is_none_or(|scale| !scale.is_far(*velocity));
+        let right: Vec<f64> = velocities.iter().copied().filter(is_right).collect();
+        let first = right.first().copied()?;
+        let count = right.len() as f64;
+        let mean = right.iter().map(|v| v - first).sum::<f64>() / count;
+        let centre = first + mean;
+        let squares: f64 = right.iter().map(|v| (v - centre) * (v - centre)).sum();
+        let deviation = (squares / count).sqrt();
+        let repeatability = with_rounding(repeatability, velocities, deviation);
+        let Some(scale) = scale else {
+            let classes = classes(velocities.iter().copied().zip(subjects.iter().copied()), centre);
+            return Self::from_classes(centre, deviation, repeatability, classes);
+        };
+        let all = || velocities.iter().copied().zip(subjects.iter().copied());
+        let is_far =
+            |(velocity, _): &(f64, u32)| Contamination::is_far(&scale, *velocity, has_subjects);
+        let far: Vec<f64> = all().filter(is_far).map(|(velocity, _)| velocity).collect();
+        let classes = classes(all().filter(|one| !is_far(one)), centre);
+        let core = velocities.len() - far.len();
+        let contamination = Contamination::new(&scale, core, &far, centre);
+        let found = Self::from_classes(centre, deviation, repeatability, classes)?;
+        Some(Self { contamination, ..found })
     }
 
     fn from_classes(
@@ -110,6 +146,7 @@ impl DataLikelihood {
             deviation: variance.sqrt(),
             instrument,
             classes,
+            contamination: None,
             shares,
             model_errors: vec![([0.0; 2], 0.0)],
         })
@@ -140,12 +177,27 @@ impl DataLikelihood {
             let deviation = mean * libm::exp(variation + step[1]);
             let variance = deviation * deviation;
             let of_share = |share: &f64| self.log_with(mean - self.centre, variance, *share);
-            weight + log_of_sum(self.shares.iter().map(of_share))
+            let far = self.contamination.as_ref().map_or(0.0, |contamination| {
+                contamination.log(mean - self.centre, variance + self.instrument)
+            });
+            weight + far + log_of_sum(self.shares.iter().map(of_share))
         };
         log_of_sum(self.model_errors.iter().map(of))
     }
 
-    /// Returns the logarithms of the data's mean and coefficient of variation.
+    /// Returns what the data say about wrong velocities among them, given the logarithms of the
+    /// model's mean (m/s) and coefficient of variation; `None` if all are near the median, or only
+    /// their moments are known.
+    pub fn outlier_share(&self, [mean, variation]: [f64; 2]) -> Option<OutlierShare> {
+        let mean = libm::exp(mean);
+        let deviation = mean * libm::exp(variation);
+        let variance = deviation * deviation + self.instrument;
+        let contamination = self.contamination.as_ref()?;
+        Some(contamination.share(mean - self.centre, variance, self.centre))
+    }
+
+    /// Returns the logarithms of the mean and the coefficient of variation of the data without those
+    /// far from the others.
     pub fn moments(&self) -> [f64; 2] {
         [libm::log(self.centre), libm::log(self.deviation / self.centre)]
     }
@@ -173,25 +225,23 @@ impl DataLikelihood {
     }
 }
 
-/// Returns the logarithm of the sum of the exponentials.
-fn log_of_sum(logs: impl ExactSizeIterator<Item = f64>) -> f64 {
-    if logs.len() == 1 {
-        return logs.sum();
+/// Returns the instrument's standard deviation together with that of a rounding error, for velocities
+/// of which `deviation` is the standard deviation: a rounding error within a step h has the variance
+/// h²/12 (W. F. Sheppard, Proc. London Math. Soc. 29 (1898)).
+fn with_rounding(repeatability: f64, velocities: &[f64], deviation: f64) -> f64 {
+    let variance = rounding(velocities).map_or(0.0, |step| step * step / 12.0);
+    if variance < ROUNDING * deviation * deviation {
+        return repeatability;
     }
-    let logs: Vec<f64> = logs.collect();
-    let largest = logs.iter().fold(f64::NEG_INFINITY, |largest, log| largest.max(*log));
-    if !largest.is_finite() {
-        return f64::NEG_INFINITY;
-    }
-    largest + libm::log(logs.iter().map(|log| libm::exp(log - largest)).sum())
+    repeatability.mul_add(repeatability, variance).sqrt()
 }
 
 /// Sums the velocities by subject, and the subjects by the number of their velocities.
-fn classes(velocities: &[f64], subjects: &[u32], centre: f64) -> Vec<SubjectClass> {
-    let count = subjects.iter().max().map_or(0, |last| *last as usize + 1);
-    let mut sums = vec![[0.0; 3]; count];
-    for (velocity, &subject) in velocities.iter().zip(subjects) {
+fn classes(velocities: impl Iterator<Item = (f64, u32)>, centre: f64) -> Vec<SubjectClass> {
+    let mut sums: Vec<[f64; 3]> = Vec::new();
+    for (velocity, subject) in velocities {
         let off = velocity - centre;
+        sums.resize(sums.len().max(subject as usize + 1), [0.0; 3]);
         let [size, sum, square] = &mut sums[subject as usize];
         *size += 1.0;
         *sum += off;
@@ -216,97 +266,4 @@ fn classes(velocities: &[f64], subjects: &[u32], centre: f64) -> Vec<SubjectClas
         }
     }
     classes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const VELOCITIES: [f64; 6] = [3900.0, 4010.0, 3805.0, 3950.0, 4100.0, 3870.0];
-
-    fn log(likelihood: &DataLikelihood, mean: f64, variation: f64) -> f64 {
-        likelihood.log([libm::log(mean), libm::log(variation)])
-    }
-
-    /// Logarithm of the density of a normal law with this covariance matrix of two values.
-    fn pair(x: [f64; 2], mean: f64, variance: f64, covariance: f64) -> f64 {
-        let determinant = variance * variance - covariance * covariance;
-        let [a, b] = x.map(|x| x - mean);
-        let square = (variance * (a * a + b * b) - 2.0 * covariance * a * b) / determinant;
-        -0.5 * (libm::log(determinant) + square)
-    }
-
-    #[test]
-    fn independent_velocities_have_the_likelihood_of_a_normal_sample() {
-        let likelihood = DataLikelihood::independent(&VELOCITIES, 0.0).unwrap();
-        let direct = |mean: f64, variation: f64| -> f64 {
-            let sigma = mean * variation;
-            let square = |v: &f64| (v - mean) / sigma * ((v - mean) / sigma);
-            let of = |v: &f64| -0.5 * square(v) - libm::log(sigma);
-            VELOCITIES.iter().map(of).sum()
-        };
-        let found = log(&likelihood, 3950.0, 0.03) - log(&likelihood, 3800.0, 0.02);
-        let expected = direct(3950.0, 0.03) - direct(3800.0, 0.02);
-        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-    }
-
-    #[test]
-    fn the_instrument_adds_its_variance() {
-        let with = DataLikelihood::independent(&VELOCITIES, 30.0).unwrap();
-        let without = DataLikelihood::independent(&VELOCITIES, 0.0).unwrap();
-        let (mean, sigma) = (3940.0, 80.0);
-        let total = (sigma * sigma + 900.0_f64).sqrt();
-        let found = log(&with, mean, sigma / mean);
-        assert!((found - log(&without, mean, total / mean)).abs() < 1e-9);
-        assert_eq!(DataLikelihood::independent(&VELOCITIES, 300.0), None);
-    }
-
-    #[test]
-    fn velocities_of_one_subject_are_correlated() {
-        let velocities = [3900.0, 3930.0, 4050.0, 4010.0];
-        let found = DataLikelihood::of_subjects(&velocities, &[0, 0, 1, 1], 10.0).unwrap();
-        let direct = |mean: f64, variation: f64| {
-            let variance = (mean * variation) * (mean * variation);
-            let of = |k: usize| {
-                let share = (k as f64 + 0.5) / SHARES as f64;
-                let (total, both) = (variance + 100.0, share * variance);
-                let [a, b, c, d] = velocities;
-                libm::exp(pair([a, b], mean, total, both) + pair([c, d], mean, total, both))
-            };
-            libm::log((0..SHARES).map(of).sum::<f64>() / SHARES as f64)
-        };
-        let difference = log(&found, 3980.0, 0.02) - log(&found, 3900.0, 0.03);
-        let expected = direct(3980.0, 0.02) - direct(3900.0, 0.03);
-        assert!((difference - expected).abs() < 1e-9, "{difference} {expected}");
-    }
-
-    /// Compares with the average over many errors of the model's mean, of the size of the data's.
-    #[test]
-    fn errors_of_the_model_are_averaged_over() {
-        let exact = DataLikelihood::independent(&VELOCITIES, 0.0).unwrap();
-        let error = exact.errors()[0];
-        let blurred = exact.clone().with_model_errors([error, 0.0]);
-        let average = |mean: f64| {
-            let of = |k: i32| {
-                let z = f64::from(k) / 20.0;
-                let log = exact.log([libm::log(mean) + z * error, libm::log(0.025)]);
-                libm::exp(log - 0.5 * z * z)
-            };
-            libm::log((-120..=120).map(of).sum::<f64>())
-        };
-        let found = log(&blurred, 3900.0, 0.025) - log(&blurred, 4000.0, 0.025);
-        let expected = average(3900.0) - average(4000.0);
-        assert!((found - expected).abs() < 0.01, "{found} {expected}");
-        let same = exact.clone().with_model_errors([0.01 * error, 0.0]);
-        assert_eq!(log(&same, 3900.0, 0.02), log(&exact, 3900.0, 0.02));
-    }
-
-    #[test]
-    fn moments_with_a_count_stand_for_a_sample() {
-        let sample = DataLikelihood::independent(&VELOCITIES, 0.0).unwrap();
-        let moments = crate::statistics::moments(&VELOCITIES).unwrap();
-        let found = DataLikelihood::from_moments(moments, 6, 0.0).unwrap();
-        let difference = log(&found, 3800.0, 0.05) - log(&sample, 3800.0, 0.05);
-        assert!(difference.abs() < 1e-9, "{difference}");
-    }
 }

@@ -14,7 +14,8 @@
 //!
 //! C is the sum of two parts. The data's part, known if the velocities are, is the covariance of
 //! the influences of each velocity on both logarithms (the delta method, without the assumption of
-//! a normal law), or of the sums of influences over each subject, if subjects are named. Of moments
+//! a normal law), or of the sums of influences over each subject, if subjects are named. Where a
+//! likelihood was maximised, residual and covariance are those of its maximum. Of moments
 //! with a number of velocities it is that of a normal law. The model's part has the squares of the reported relative standard errors on its
 //! diagonal; the correlation of the two errors is neglected.
 
@@ -30,13 +31,15 @@ mod solutions;
 mod tests;
 mod weights;
 
-use crate::job::JobSpecification;
+use crate::job::{JobSpecification, Objective};
 use crate::results::{BestPoint, Evaluation};
+use crate::statistics::{LikelihoodFit, likelihood_fit};
 
 use self::jacobian::log_ratios;
 use self::linear::Linear;
 use self::quantities::{LogarithmicEnds, Quantities};
 
+use self::agreement::compared;
 pub use self::agreement::{Agreement, agreement};
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
@@ -63,11 +66,21 @@ pub fn inference(
     let estimate = best.velocity?;
     let data = specification.data.as_ref()?;
     let jacobian = jacobian(specification, set, best, history)?;
-    let noise = noise(data, set, &estimate);
     let linear = Linear::from_jacobian(&jacobian);
+    let likely = by_likelihood(specification, set, best);
+    let ends = if likely.is_none() { LogarithmicEnds::of_data(data, set) } else { None };
+    let (noise, residual) = match likely {
+        Some((of_data, residual)) => {
+            (Noise { data: Some(of_data), ..noise(data, set, &estimate) }, residual)
+        }
+        None => {
+            let residual = log_ratios(data.moments(set), estimate.moments);
+            (noise(data, set, &estimate), residual)
+        }
+    };
     let quantile = noise.quantile();
-    let residual = log_ratios(data.moments(set), estimate.moments);
-    let Agreement { matched, held, .. } = agreement(specification, set, &best.point, &estimate)?;
+    let Agreement { matched, held, .. } =
+        compared(specification, set, &best.point, residual, &noise);
     let context = Quantities {
         specification,
         best,
@@ -75,7 +88,7 @@ pub fn inference(
         noise: &noise,
         quantile,
         residual,
-        ends: LogarithmicEnds::of_data(data, set),
+        ends,
         known: matched && !held && linear.undetermined.is_empty(),
     };
     Some(Inference {
@@ -90,6 +103,23 @@ pub fn inference(
         parameters: context.parameters(&jacobian.free),
         noise: noise.errors(),
     })
+}
+
+/// Returns noise and residual of the moments by which the velocities are most likely, if a likelihood
+/// was maximised; `None` if it was not, or has no maximum.
+fn by_likelihood(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+) -> Option<(DataNoise, [f64; 2])> {
+    if specification.objective != Objective::Likelihood {
+        return None;
+    }
+    let velocities = specification.data.as_ref()?.set(set)?;
+    let monte_carlo = &specification.monte_carlo;
+    let LikelihoodFit { residual, covariance } =
+        likelihood_fit(monte_carlo, &best.point, &best.outcomes, &velocities)?;
+    Some((DataNoise { covariance, freedom: velocities.parts() as u64 - 1 }, residual))
 }
 
 /// Returns the number of the first evaluation of a search from which on its lowest cost was below

@@ -41,6 +41,7 @@ pub mod probe;
 pub mod quantile;
 pub mod realization;
 pub mod results;
+pub mod robust;
 pub mod sampling;
 mod search_settings;
 pub mod settings;

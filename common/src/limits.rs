@@ -21,6 +21,8 @@ pub const DATA_VELOCITIES_MAX: usize = 1_000_000;
 pub const DATA_SUBJECTS_MAX: usize = DATA_VELOCITIES_MAX / 2;
 /// Maximum number of velocities behind given moments.
 pub const DATA_COUNT_MAX: u64 = 1_000_000_000;
+/// Maximum number of outlying velocities of a set that a result lists.
+pub const OUTLIERS_LISTED_MAX: usize = 100;
 /// Maximum number of groups of measured velocities of one job.
 pub const GROUPS_MAX: usize = 1000;
 /// Maximum number of searches of one set of data, each from a different start.

@@ -68,12 +68,24 @@ pub struct MomentIntervals {
     pub level: f64,
 }
 
+/// A measured velocity far from the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Outlier {
+    /// Its number among the velocities of its set, from 0.
+    pub index: u64,
+    /// The velocity, m/s.
+    pub velocity: f64,
+    /// Number of robust standard deviations by which it lies above the median; negative below.
+    pub deviations: f64,
+}
+
 /// Result of the two-sample Kolmogorov-Smirnov test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KolmogorovTest {
-    /// Largest difference of the empirical distribution functions, 0 to 1.
+    /// Largest difference of the empirical distribution functions, 0 to 1; of rounded velocities, at
+    /// the limits between rounded values.
     pub distance: f64,
-    /// Probability of at least this distance if both samples come from one law. If the model was
-    /// fitted to the data it is too large: a small value is conclusive, a large one is not.
+    /// Probability of at least this distance if the data come from the model's law. Where the model
+    /// was fitted to the data, so are the samples that it is computed from; at least 0.001.
     pub p_value: f64,
 }

@@ -3,6 +3,8 @@
 //! The posterior is the probability of the free parameters given the data, the priors and the
 //! bounds, in Bayes' sense. It is given by weighted draws; how they are made is in `osteon-search`.
 
+#[cfg(doc)]
+use crate::moments::KolmogorovTest;
 use crate::parameters::{Parameter, Point};
 
 /// Probabilities of the quantiles in a [`PosteriorSummary`]: the median and both ends of the
@@ -49,9 +51,14 @@ pub struct Posterior {
     /// The entries of the mean elasticity matrix on and above the diagonal, row by row, with row
     /// and column from 0 (Pa, Kelvin-Mandel).
     pub entries: Vec<(usize, usize, PosteriorSummary)>,
-    /// Probability of a Kolmogorov distance between data and posterior-predictive law at least as
-    /// large as that of the data; `None` without velocities.
+    /// Probability of a Kolmogorov distance at least as large as that of the data from the law of the
+    /// best point, moved to the posterior means of the moments, as for [`KolmogorovTest`]; `None`
+    /// without velocities, and where they have subjects or scatter of the instrument.
     pub predictive_p_value: Option<f64>,
+    /// Probability that a measured velocity is not from the model's law: its posterior mean, given
+    /// the posterior means of the two moments. `None` where all velocities are near the median, or
+    /// only moments are known.
+    pub outlier_share: Option<f64>,
     /// Draws of equal weight.
     pub draws: Vec<PosteriorDraw>,
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conclusions::Conclusions;
 use crate::job::{Objective, Sampling, Search};
-use crate::moments::{KolmogorovTest, MomentIntervals};
+use crate::moments::{KolmogorovTest, MomentIntervals, Outlier};
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::sampling::NominalSampling;
@@ -160,7 +160,7 @@ impl PointMeaning {
 }
 
 /// Summary of the data of one search.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DataSummary {
     /// Moments of the data.
     pub moments: Moments,
@@ -169,6 +169,13 @@ pub struct DataSummary {
     /// Confidence intervals of the moments of their law; `None` if only the moments are known, or
     /// if the velocities give no interval.
     pub intervals: Option<MomentIntervals>,
+    /// The velocities far from the others, in their order; at most
+    /// [`crate::limits::OUTLIERS_LISTED_MAX`].
+    pub outliers: Vec<Outlier>,
+    /// Step to which the velocities are rounded, m/s; `None` if none is seen.
+    pub rounding: Option<f64>,
+    /// Number of all velocities far from the others.
+    pub outlier_count: u64,
 }
 
 /// Ending of the search for one group.

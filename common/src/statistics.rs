@@ -23,7 +23,7 @@ use self::central::{Central, central};
 use self::controlled::Controlled;
 
 pub use self::failure_bias::failure_bias;
-pub use self::likelihood::{likelihood_cost, likelihood_error};
+pub use self::likelihood::{LikelihoodFit, likelihood_cost, likelihood_error, likelihood_fit};
 pub use self::measured::{covariance_of_logarithms, without_repeatability};
 pub(crate) use self::sum::Sum;
 

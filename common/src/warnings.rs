@@ -6,14 +6,16 @@ use crate::case::{Case, Setup};
 use crate::field_path::entry_path;
 use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
 use crate::job::{Data, JobSpecification, Measurements, Range};
+use crate::moments::Outlier;
 use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
+use crate::robust::outliers;
 
 use crate::plausible::{self, PlausibleRange, short};
 
-/// A velocity that differs from the median by more than this factor is an outlier.
-const OUTLIER: f64 = 3.0;
+/// A velocity that differs from the median by more than this factor is probably in another unit.
+const FACTOR: f64 = 3.0;
 /// Maximum number of outliers that are listed for one set.
 const OUTLIERS_LISTED_MAX: usize = 5;
 /// Number of equal velocities in a row that are not expected by chance, and smallest number of
@@ -196,38 +198,74 @@ impl Warnings {
             self.add(field, format!("their median {doubt}"));
         }
         self.copies(field, velocities, (origin, set));
-        let outside = |velocity: f64| velocity > OUTLIER * median || velocity < median / OUTLIER;
-        let outliers: Vec<(usize, f64)> = velocities
-            .iter()
-            .copied()
-            .enumerate()
-            .filter(|&(_, velocity)| outside(velocity))
+        let place = |index| place_of((origin, set), index);
+        let file = origin.map(|origin| format!("{}: ", origin.path().display()));
+        let file = file.unwrap_or_default();
+        let outside = |velocity: f64| velocity > FACTOR * median || velocity < median / FACTOR;
+        self.outside(field, &file, median, (velocities, &outside), &place);
+        let mut far = outliers(velocities);
+        far.retain(|outlier| !outside(outlier.velocity));
+        if let Some(listed) = far_apart(&far, &place) {
+            let (median, more) = (short(median), and_more(far.len()));
+            self.add(
+                field,
+                format!(
+                    "{file}{listed} robust standard deviations from the median {median} m/s{more}; check \
+                     this: it changes both moments, but hardly a likelihood or a posterior"
+                ),
+            );
+        }
+    }
+
+    /// Lists the velocities that differ from the median by a factor.
+    fn outside(
+        &mut self,
+        field: &str,
+        file: &str,
+        median: f64,
+        (velocities, outside): (&[f64], &dyn Fn(f64) -> bool),
+        place: &dyn Fn(usize) -> String,
+    ) {
+        let all = velocities.iter().enumerate().filter(|(_, velocity)| outside(**velocity));
+        let all: Vec<String> = all
+            .map(|(index, &velocity)| format!("{} ({})", short(velocity), place(index)))
             .collect();
-        if outliers.is_empty() {
+        if all.is_empty() {
             return;
         }
-        let listed: Vec<String> = outliers
-            .iter()
-            .take(OUTLIERS_LISTED_MAX)
-            .map(|&(index, velocity)| {
-                format!("{} ({})", short(velocity), place_of((origin, set), index))
-            })
-            .collect();
-        let more = match outliers.len() - listed.len() {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let file = origin.map(|origin| format!("{}: ", origin.path().display()));
         self.add(
             field,
             format!(
-                "{}{}{more} m/s: more than a factor {OUTLIER} from the median {} m/s; in other units, \
-                 or a slip of the decimal point?",
-                file.unwrap_or_default(),
-                listed.join(", "),
+                "{file}{}{} m/s: more than a factor {FACTOR} from the median {} m/s; in other units, or a \
+                 slip of the decimal point?",
+                all[..all.len().min(OUTLIERS_LISTED_MAX)].join(", "),
+                and_more(all.len()),
                 short(median)
             ),
         );
+    }
+}
+
+/// Says by how many robust standard deviations velocities are away; `None` for no velocity.
+fn far_apart(far: &[Outlier], place: &dyn Fn(usize) -> String) -> Option<String> {
+    let listed: Vec<String> = far
+        .iter()
+        .take(OUTLIERS_LISTED_MAX)
+        .map(|outlier| {
+            let Outlier { index, velocity, deviations } = *outlier;
+            let index = usize::try_from(index).unwrap_or(usize::MAX);
+            let (velocity, place) = (short(velocity), place(index));
+            format!("{velocity} m/s ({place}) is {:.0}", deviations.abs())
+        })
+        .collect();
+    (!listed.is_empty()).then(|| listed.join(", "))
+}
+
+/// Returns how many of this number of velocities are not listed, as the end of a list.
+fn and_more(count: usize) -> String {
+    match count.saturating_sub(OUTLIERS_LISTED_MAX) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
     }
 }
 
@@ -306,5 +344,37 @@ mod tests {
                  are these copies?",
             ]
         );
+    }
+
+    #[test]
+    fn velocities_far_from_the_median_are_named_with_their_lines() {
+        let mut velocities: Vec<f64> = (0..40).map(|k| 3900.0 + f64::from(k % 7)).collect();
+        let warnings = |velocities: &[f64], origin: Option<&Origin>| {
+            let mut warnings = Warnings::default();
+            warnings.data(&Data::from_velocities(velocities.to_vec()), origin);
+            warnings.0.iter().map(ToString::to_string).collect::<Vec<String>>()
+        };
+        assert_eq!(warnings(&velocities, None), [""; 0]);
+        velocities[17] = 7800.0;
+        let origin =
+            Origin { path: "v.csv".into(), lines: vec![(2..42).collect()], unused_subjects: None };
+        assert_eq!(
+            warnings(&velocities, Some(&origin)),
+            [
+                "data.velocities: v.csv: 7800 m/s (line 19) is 1314 robust standard deviations from the \
+                 median 3903 m/s; check this: it changes both moments, but hardly a likelihood or a \
+                 posterior"
+            ]
+        );
+        // One of another unit is listed by itself.
+        velocities[30] = 390.0;
+        for (k, velocity) in velocities[20..27].iter_mut().enumerate() {
+            *velocity = 3800.0 - k as f64;
+        }
+        let found = warnings(&velocities, None);
+        assert!(found[0].contains("390 (number 31) m/s: more than a factor 3"), "{found:?}");
+        let listed = "7800 m/s (number 18) is 1315, 3800 m/s (number 21) is ";
+        assert!(found[1].contains(listed), "{found:?}");
+        assert!(found[1].contains(" from the median 3902 m/s and 3 more; check"), "{found:?}");
     }
 }

@@ -154,7 +154,7 @@ fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
 /// Returns the moments of a group's data with their intervals, and the test against the model's
 /// law.
 fn measured(group: &GroupResult) -> [String; 8] {
-    let DataSummary { moments, intervals, .. } = group.data;
+    let DataSummary { moments, intervals, .. } = &group.data;
     let both =
         |interval: Option<ConfidenceInterval>| ends(interval.map(|found| [found.low, found.high]));
     let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));

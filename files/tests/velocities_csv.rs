@@ -147,6 +147,19 @@ fn a_column_that_seems_to_name_subjects_is_pointed_out() {
 }
 
 #[test]
+fn velocities_far_from_the_others_are_named_with_their_lines() {
+    let rows: String = (0..60).map(|k| format!("{}\n", 3850 + 5 * (k * 8 % 21))).collect();
+    assert_eq!(warnings(&format!("velocity\n{rows}"), ""), [""; 0]);
+    assert_eq!(
+        warnings(&format!("velocity\n{rows}7800\n"), ""),
+        [
+            "data.velocities: DIR/v.csv: 7800 m/s (line 62) is 105 robust standard deviations from the \
+             median 3900 m/s; check this: it changes both moments, but hardly a likelihood or a posterior"
+        ]
+    );
+}
+
+#[test]
 fn copies_are_doubted() {
     let rows = "3900\n3911\n3922\n3933\n3944\n";
     assert_eq!(

@@ -11,6 +11,7 @@ pub mod choice;
 mod conclusions;
 pub mod credential_file;
 pub mod credentials;
+mod data_summary;
 pub mod endpoint;
 pub mod evaluation;
 mod fields;

@@ -40,6 +40,7 @@ pub(crate) fn to_message(posterior: &Posterior) -> v1::Posterior {
         coefficient_of_variation: Some(summary_to_message(&posterior.coefficient_of_variation)),
         mandel: entries.collect(),
         predictive_p_value: posterior.predictive_p_value,
+        outlier_share: posterior.outlier_share,
         draws: posterior.draws.len() as u64,
     }
 }
@@ -89,6 +90,7 @@ pub(crate) fn from_message(
         bulk_velocity: summary(message.bulk_velocity.as_ref(), "bulk_velocity")?,
         entries: message.mandel.iter().map(entry).collect::<Result<_, Malformed>>()?,
         predictive_p_value: message.predictive_p_value,
+        outlier_share: message.outlier_share,
         draws,
     })
 }

@@ -3,12 +3,12 @@
 use osteon_common::inference::Conclusions;
 use osteon_common::job::{Objective, Search};
 use osteon_common::limits::{REALIZATIONS_MAX, SCRAMBLES_MAX};
-use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, MomentIntervals};
+use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
-    GroupResult, JobResult, Moments,
+    BestPoint, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
+    JobResult, Moments,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
@@ -18,7 +18,8 @@ use osteon_common::violations::Violations;
 use crate::choice::{
     FAILURE_KIND, JOB_FAILURE, JOB_STATUS, OBJECTIVE, PARAMETER, POINT_MEANING, SAMPLING,
 };
-use crate::conclusions::{self, FieldsOf, interval_from_message};
+use crate::conclusions::{self, FieldsOf};
+use crate::data_summary::{data_from_message, data_to_message};
 use crate::malformed::Malformed;
 use crate::parameter_values::{point_from_message, point_to_message};
 use crate::setup;
@@ -323,41 +324,6 @@ fn nominal_to_message(nominal: NominalSampling) -> v1::NominalSampling {
 fn nominal_from_message(message: v1::NominalSampling) -> NominalSampling {
     let v1::NominalSampling { band, period, pairs } = message;
     NominalSampling { band, period, pairs }
-}
-
-fn data_to_message(data: &DataSummary) -> v1::DataSummary {
-    let interval = |ConfidenceInterval { low, high }: ConfidenceInterval| v1::Interval {
-        lower: Some(low),
-        upper: Some(high),
-    };
-    v1::DataSummary {
-        moments: Some(moments_to_message(&data.moments)),
-        count: data.count,
-        intervals: data.intervals.map(|found| v1::MomentIntervals {
-            mean: Some(interval(found.mean)),
-            coefficient_of_variation: Some(interval(found.coefficient_of_variation)),
-            level: found.level,
-        }),
-    }
-}
-
-fn data_from_message(message: &v1::DataSummary) -> Result<DataSummary, Malformed> {
-    let moments = message.moments.as_ref().ok_or(Malformed::Missing { field: "moments" })?;
-    let interval = |message: Option<&v1::Interval>| {
-        interval_from_message(message).map(|[low, high]| ConfidenceInterval { low, high })
-    };
-    let intervals = |found: &v1::MomentIntervals| {
-        Ok(MomentIntervals {
-            mean: interval(found.mean.as_ref())?,
-            coefficient_of_variation: interval(found.coefficient_of_variation.as_ref())?,
-            level: found.level,
-        })
-    };
-    Ok(DataSummary {
-        moments: moments_from_message(moments),
-        count: message.count,
-        intervals: message.intervals.as_ref().map(intervals).transpose()?,
-    })
 }
 
 pub(crate) fn moments_to_message(moments: &Moments) -> v1::Moments {

@@ -80,7 +80,10 @@ pub(crate) fn posterior(
         search.tell(feasible_moments(row));
     }
     let errors = best.and_then(|best| best.velocity).map(|velocity| velocity.relative_errors());
-    search.result(specification, errors?)
+    let found = search.result(specification, errors?)?;
+    let predictive_p_value =
+        best.and_then(|best| summary::predictive_p_value(specification, set, best, &found));
+    Some(Posterior { predictive_p_value, ..found })
 }
 
 /// Returns the moments of an evaluation, if it is feasible.

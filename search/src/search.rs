@@ -6,9 +6,9 @@
 
 use std::sync::Arc;
 
-use osteon_common::data_statistics::kolmogorov_test;
+use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
 use osteon_common::digest::PathDigest;
-use osteon_common::inference::{Conclusions, below_noise_from, meaning};
+use osteon_common::inference::{Agreement, Conclusions, agreement, below_noise_from, meaning};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::parameters::Point;
@@ -350,6 +350,18 @@ impl Summary {
         // The test holds for independent velocities with no scatter but the model's.
         let tested = given.filter(|set| set.subjects.is_none() && set.repeatability == 0.0);
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
+        let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
+        let set = row.role.group as usize;
+        let agreement = velocity
+            .as_ref()
+            .and_then(|velocity| agreement(specification, set, &row.point, velocity));
+        // Moments that the search could not match are not fitted.
+        let fitted = match (objective, agreement) {
+            (Objective::Likelihood, _) | (_, Some(Agreement { matched: true, .. })) => {
+                FittedMoments::of(specification)
+            }
+            _ => FittedMoments::Neither,
+        };
         let mut best = BestPoint {
             point: row.point,
             meaning: row.cost.map(|cost| meaning(specification, cost)),
@@ -358,15 +370,15 @@ impl Summary {
             below_noise_from: None,
             cost_error: by_likelihood
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
-            velocity: statistics::estimate(monte_carlo, &row.point, outcomes),
+            velocity,
             failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
-            kolmogorov: tested
-                .and_then(|set| kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling)),
+            kolmogorov: tested.and_then(|set| {
+                kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling, fitted)
+            }),
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),
         };
-        let set = row.role.group as usize;
         best.below_noise_from = below_noise_from(specification, set, &best, &self.history);
         Some(best)
     }

@@ -1,6 +1,7 @@
 //! Output as text for people.
 
 mod check;
+mod data_notes;
 mod fit;
 mod groups;
 mod identified;

@@ -40,17 +40,30 @@ pub fn agreement(
     let data = specification.data.as_ref()?;
     let noise = noise(data, set, estimate);
     let differences = log_ratios(estimate.moments, data.moments(set));
-    let variances = variances(&noise);
+    Some(compared(specification, set, point, differences, &noise))
+}
+
+/// Compares a model at `point`, given how far its moments are from those of the data, and the noise
+/// of this difference.
+pub(super) fn compared(
+    specification: &JobSpecification,
+    set: usize,
+    point: &Point,
+    differences: [f64; 2],
+    noise: &Noise,
+) -> Agreement {
+    let variances = variances(noise);
     let limit = |axis: usize| (NEGLIGIBLE * NEGLIGIBLE * variances[axis]).max(EXACT * EXACT);
     let negligible = |axis: usize| differences[axis] * differences[axis] <= limit(axis);
     let held = is_on_bound(specification, point) && !(negligible(0) && negligible(1));
-    let counted = if held { at_most_normal(data, set, &noise) } else { variances };
-    Some(Agreement {
+    let normal = specification.data.as_ref().filter(|_| held);
+    let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
+    Agreement {
         differences,
         errors: noise.data.map(|_| variances.map(f64::sqrt)),
         matched: is_within(differences, counted),
         held,
-    })
+    }
 }
 
 /// Returns whether the differences are within the noise.

@@ -388,3 +388,45 @@ fn intervals_of_few_velocities_hold_the_truth_as_often_as_they_say() {
         assert!(shares.iter().all(|share| (0.93..=0.97).contains(share)), "{count}: {shares:?}");
     }
 }
+
+/// The model's law has the moments of the model, and the data are of the same law. One of a hundred
+/// velocities is doubled: the interval by the moments is then much longer, while the likelihood has its maximum where
+/// it was.
+#[test]
+fn a_likelihood_has_intervals_in_spite_of_a_wrong_velocity() {
+    let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
+    let quantiles = |count: u32| -> Vec<f64> {
+        let score = |k| standard_normal_quantile((f64::from(k) + 0.5) / f64::from(count));
+        (0..count).map(|k| mean * (1.0 + coefficient_of_variation * score(k))).collect()
+    };
+    let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
+    let of = |velocities: Vec<f64>, objective: Objective| {
+        let mut specification = specification(&free, Some(velocities));
+        specification.objective = objective;
+        let mut best = best(0.0, Moments { mean: 1e-6, coefficient_of_variation: 1e-9 });
+        best.outcomes = quantiles(2747).into_iter().map(Ok).collect();
+        let mut rows = vec![row(OPTIMUM, None)];
+        for parameter in free {
+            let mut point = OPTIMUM;
+            point.0[parameter as usize] += 1e-5 * specification.range(parameter).edge();
+            rows.push(row(point, Some(parameter)));
+        }
+        inference(&specification, 0, &best, &rows).unwrap()
+    };
+    for (count, most) in [(100, 0.25), (2747, 0.05)] {
+        let clean = quantiles(count);
+        let mut wrong = clean.clone();
+        wrong[count as usize / 2] *= 2.0;
+        let by_moments = of(wrong.clone(), Objective::Moments);
+        let [clean, wrong] = [clean, wrong].map(|data| {
+            let found = of(data, Objective::Likelihood);
+            assert!(found.matched);
+            let [low, high] = found.dispersion.known.unwrap().interval;
+            high - low
+        });
+        assert!((wrong / clean - 1.0).abs() < most, "{wrong} {clean}");
+        let of_moments =
+            by_moments.dispersion.known.map(|known| known.interval[1] - known.interval[0]);
+        assert!(of_moments.is_none_or(|length| length > 2.0 * wrong), "{of_moments:?} {wrong}");
+    }
+}

@@ -17,6 +17,8 @@
 //! - The second term is the floor, a Cauchy law of the weight ε: a velocity far from all of the model's has a
 //!   finite cost, and one that still says in which direction the model's law is to be moved.
 
+mod location_scale;
+
 use super::kernel_density::KernelDensity;
 use super::sum::Sum;
 use super::{PointStatistics, Sample, blocks};
@@ -25,6 +27,8 @@ use crate::outcome::Outcome;
 use crate::parameters::Point;
 use crate::quantile::quantile;
 use crate::results::Moments;
+
+pub use self::location_scale::{LikelihoodFit, likelihood_fit};
 
 /// Weight ε of the floor: it exceeds a normal law from 4.4 standard deviations on, and biases a
 /// standard deviation by less than 1e-4 of it.

@@ -1,6 +1,6 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
-use osteon_common::moments::{ConfidenceInterval, KolmogorovTest};
+use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, Outlier};
 use osteon_common::results::{self, BestPoint, DataSummary};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,8 +82,9 @@ impl From<Option<&BestPoint>> for Velocity {
     }
 }
 
-/// Moments of the data; where velocities were measured also their intervals, and a test of the model.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Moments of the data; where velocities were measured also their intervals, those far from
+/// the others, and a test of the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Data {
     /// The moments, that of the mean in m/s.
     #[serde(flatten)]
@@ -104,6 +105,16 @@ pub struct Data {
         deserialize_with = "absent_or_nullable"
     )]
     pub kolmogorov: Option<Option<KolmogorovTest>>,
+    /// The velocities farther from the median than 6 robust standard deviations (and than 6 + 300/n²
+    /// for n of them), in their order, at most the first 100; not there where there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<Outlier>,
+    /// Number of all such velocities; not there where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outlier_count: Option<u64>,
+    /// Step to which the velocities are rounded, m/s; not there where none is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<f64>,
     /// Number of the velocities; only of groups.
     #[serde(
         default,
@@ -121,6 +132,9 @@ impl Data {
             moments: data.moments.into(),
             interval: measured.then(|| data.intervals.map(MomentIntervals::from)),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
+            outliers: data.outliers.clone(),
+            rounding: data.rounding,
+            outlier_count: Some(data.outlier_count).filter(|count| *count > 0),
             count: None,
         }
     }

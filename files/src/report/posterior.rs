@@ -54,9 +54,15 @@ pub struct PosteriorReport {
     /// The entries of the mean elasticity matrix (Kelvin-Mandel, Pa), named by row and column from `11`
     /// to `66`.
     pub mandel: BTreeMap<String, QuantityPosterior>,
-    /// Probability of a Kolmogorov distance between data and posterior-predictive law at least as large
-    /// as that of the data; null where only moments are known.
+    /// Probability of a Kolmogorov distance at least as large as that of the data from the law of the
+    /// best point, moved to the posterior means of the moments, as `data.kolmogorov.p_value`; null where
+    /// only moments are known, and with subjects or a repeatability.
     pub predictive_p_value: Option<f64>,
+    /// Probability that a measured velocity is not from the model's law but wrong: its posterior mean,
+    /// given the posterior means of the moments; null where all velocities are near the median, or only
+    /// moments are known.
+    #[serde(default)]
+    pub outlier_share: Option<f64>,
 }
 
 impl From<&Posterior> for PosteriorReport {
@@ -87,6 +93,7 @@ impl From<&Posterior> for PosteriorReport {
             coefficient_of_variation: (&found.coefficient_of_variation).into(),
             mandel: found.entries.iter().map(entry).collect(),
             predictive_p_value: found.predictive_p_value.and_then(finite_or_null),
+            outlier_share: found.outlier_share.and_then(finite_or_null),
         }
     }
 }

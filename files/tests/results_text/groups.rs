@@ -145,3 +145,29 @@ fn the_best_point_of_a_group_is_found_by_its_name() {
     assert!(ResultFile::from_json(&identified(&failed())).unwrap().groups().is_empty());
     assert_eq!(read.to_json(), text);
 }
+
+#[test]
+fn velocities_far_from_the_others_are_listed() {
+    let mut velocities: Vec<f64> = (0..200).map(|k| 3900.0 + f64::from(k % 11)).collect();
+    let report = |velocities: &[f64]| {
+        let data = DataSummary::from_data(&Data::from_velocities(velocities.to_vec()), 0);
+        let result = JobResult { data: Some(data), ..result() };
+        serde_json::from_str::<serde_json::Value>(&identification_text(&result)).unwrap()
+    };
+    let clean = report(&velocities);
+    assert!(
+        clean["data"].get("outliers").is_none() && clean["data"].get("outlier_count").is_none()
+    );
+    velocities[7] = 7800.0;
+    let found = report(&velocities);
+    assert_eq!(found["data"]["outlier_count"], 1);
+    let outliers = found["data"]["outliers"].as_array().unwrap();
+    assert_eq!((&outliers[0]["index"], &outliers[0]["velocity"]), (&7.into(), &7800.0.into()));
+    assert!(outliers[0]["deviations"].as_f64().unwrap() > 100.0);
+    // A million wrong velocities must not make a file of their own.
+    velocities.resize(400, 5000.0);
+    velocities.resize(1000, 3904.0);
+    let found = report(&velocities);
+    assert_eq!(found["data"]["outlier_count"], 201);
+    assert_eq!(found["data"]["outliers"].as_array().unwrap().len(), 100);
+}

@@ -62,7 +62,14 @@ fn result() -> JobResult {
             estimated_error: Some(EstimatedError { median: 2.5e-5, largest: 1e-4 / 3.0 }),
             outcomes: outcomes(),
         }),
-        data: Some(DataSummary { moments: moments(3906.3, 0.02709), count: None, intervals: None }),
+        data: Some(DataSummary {
+            moments: moments(3906.3, 0.02709),
+            count: None,
+            intervals: None,
+            outliers: Vec::new(),
+            rounding: None,
+            outlier_count: 0,
+        }),
         conclusions: Conclusions::default(),
         groups: Vec::new(),
         objective: Objective::Moments,
@@ -122,7 +129,7 @@ fn identified_by(specification: &JobSpecification, result: &JobResult) -> String
         let penalty = specification.has_priors().then(|| specification.penalty(&best.point));
         BestPoint { meaning: Some(meaning(specification, cost)), penalty, ..best }
     });
-    let moments = result.data.unwrap().moments;
+    let moments = result.data.as_ref().unwrap().moments;
     identification_text(&JobResult {
         data: Some(DataSummary {
             moments,

@@ -39,6 +39,7 @@ fn posterior() -> Posterior {
         bulk_velocity: summary(4096.0),
         entries: vec![(0, 0, summary(25e9)), (4, 5, summary(0.0))],
         predictive_p_value: Some(0.5),
+        outlier_share: Some(0.0125),
         draws: vec![draw(0.1029), draw(0.125)],
     }
 }
@@ -86,6 +87,7 @@ fn the_posterior_of_a_job() {
         "coefficient_of_variation": quantity(0.03125),
         "mandel": { "11": quantity(25e9), "56": quantity(0.0) },
         "predictive_p_value": 0.5,
+        "outlier_share": 0.0125,
     });
     assert_eq!(value["posterior"], expected);
 }

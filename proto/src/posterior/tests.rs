@@ -43,6 +43,7 @@ prop_compose! {
         moments in (summary_of_any().boxed(), summary_of_any().boxed(), summary_of_any().boxed()),
         entries in proptest::collection::vec((0_usize..6, 0_usize..6, summary_of_any()), 0..4),
         predictive_p_value in proptest::option::of(number()),
+        outlier_share in proptest::option::of(number()),
         draws in proptest::collection::vec(draw(), 0..5),
         free in Just(free),
     ) -> Posterior {
@@ -67,6 +68,7 @@ prop_compose! {
             bulk_velocity,
             entries: entries.into_iter().map(upper).collect(),
             predictive_p_value,
+            outlier_share,
             draws,
         }
     }
@@ -117,6 +119,7 @@ fn complete() -> (v1::Posterior, Vec<PosteriorDraw>) {
         bulk_velocity: summary,
         entries: vec![(0, 5, summary)],
         predictive_p_value: None,
+        outlier_share: None,
         draws: vec![draw; 2],
     };
     (to_message(&posterior), posterior.draws)

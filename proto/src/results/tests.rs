@@ -10,8 +10,9 @@ use osteon_common::inference::{
     Spread, Spreads, Uncertainty,
 };
 use osteon_common::job::{Prior, Sampling, SearchMethod};
+use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{JobFailure, PointMeaning, Status};
+use osteon_common::results::{DataSummary, JobFailure, PointMeaning, Status};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
 pub(crate) fn number() -> impl Strategy<Value = f64> {
@@ -90,16 +91,27 @@ fn interval() -> impl Strategy<Value = ConfidenceInterval> {
     (number(), number()).prop_map(|(low, high)| ConfidenceInterval { low, high })
 }
 
+fn outlier() -> impl Strategy<Value = Outlier> {
+    (any::<u64>(), number(), number()).prop_map(|(index, velocity, deviations)| Outlier {
+        index,
+        velocity,
+        deviations,
+    })
+}
+
 prop_compose! {
     fn data()(
         moments in moments(),
         count: Option<u64>,
         intervals in proptest::option::of((interval(), interval(), 0.0..1.0)),
+        outliers in proptest::collection::vec(outlier(), 0..3),
+        outlier_count: u64,
+        rounding in proptest::option::of(number()),
     ) -> DataSummary {
         let intervals = intervals.map(|(mean, coefficient_of_variation, level)| {
             MomentIntervals { mean, coefficient_of_variation, level }
         });
-        DataSummary { moments, count, intervals }
+        DataSummary { moments, count, intervals, outliers, outlier_count, rounding }
     }
 }
 

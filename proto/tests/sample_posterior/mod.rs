@@ -35,6 +35,7 @@ pub(crate) fn posterior(point: Point) -> Posterior {
         bulk_velocity: summary(4000.0),
         entries: vec![(0, 0, summary(25e9)), (4, 5, summary(1e7))],
         predictive_p_value: Some(0.4),
+        outlier_share: Some(0.01),
         draws: (0..3).map(draw).collect(),
     }
 }

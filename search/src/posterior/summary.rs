@@ -1,8 +1,10 @@
 //! Summaries of a population, and the result that they make up.
 
+use osteon_common::data_statistics::{FittedMoments, predictive_test};
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
+use osteon_common::results::{BestPoint, Moments};
 
 use super::population::{Member, Population, moments as moments_of};
 use super::{PosteriorProblem, PosteriorSearch};
@@ -39,6 +41,9 @@ impl PosteriorSearch {
         let reason = self.reason(problem, effective);
         let noise = problem.likelihood.errors();
         let share = |k: usize| errors[k] / noise[k] * (errors[k] / noise[k]);
+        let (mean, variation) =
+            (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
+        let at = [mean.mean, variation.mean].map(libm::log);
         let settings = specification.posterior.unwrap_or_default();
         let count = usize::try_from(settings.draws).unwrap_or(usize::MAX);
         Some(Posterior {
@@ -54,13 +59,14 @@ impl PosteriorSearch {
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
-            mean: of(&|point| self.moment(point, 0)),
-            coefficient_of_variation: of(&|point| self.moment(point, 1)),
+            mean,
+            coefficient_of_variation: variation,
             bulk_velocity: of(&|point| {
                 super::closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
             entries: entries(&population, &prior),
             predictive_p_value: None,
+            outlier_share: problem.likelihood.outlier_share(at).map(|share| share.mean),
             draws: draws(&population, problem, count),
         })
     }
@@ -83,6 +89,27 @@ impl PosteriorSearch {
             )
         })
     }
+}
+
+/// Returns the p-value of the data under the law of the best point's velocities, moved to the
+/// posterior means of the moments; `None` without velocities, and where they are not independent or
+/// have scatter of the instrument.
+pub(super) fn predictive_p_value(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+    found: &Posterior,
+) -> Option<f64> {
+    let data = specification.data.as_ref()?.set(set)?;
+    if data.subjects.is_some() || data.repeatability > 0.0 {
+        return None;
+    }
+    let coefficient_of_variation = found.coefficient_of_variation.mean;
+    let at = Moments { mean: found.mean.mean, coefficient_of_variation };
+    let fitted = FittedMoments::of(specification);
+    let sampling = specification.monte_carlo.sampling;
+    let test = predictive_test(data.velocities, &best.outcomes, sampling, fitted, at)?;
+    Some(test.p_value)
 }
 
 /// Summarises a quantity of the population's points and of the prior's.

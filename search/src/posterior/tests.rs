@@ -264,3 +264,17 @@ fn a_result_that_does_not_pass_is_not_called_converged() {
         assert!(reason.contains(expected), "{reason}");
     }
 }
+
+/// One of a hundred velocities is doubled, which raises their coefficient of variation from 0.027 to
+/// 0.1.
+#[test]
+fn a_wrong_velocity_hardly_moves_the_posterior() {
+    let clean = specification(&[Parameter::Dispersion], 100, PosteriorSettings::default());
+    let mut velocities = velocities(&OPTIMUM, 100);
+    velocities[50] *= 2.0;
+    let data = Some(Data::from_velocities(velocities));
+    let found = posterior(&JobSpecification { data, ..clean });
+    let off = found.parameters[0].mean - OPTIMUM.dispersion();
+    assert!(off.abs() < 0.3 * found.parameters[0].standard_deviation, "{:?}", found.parameters);
+    assert!((0.008..0.03).contains(&found.outlier_share.unwrap()), "{:?}", found.outlier_share);
+}

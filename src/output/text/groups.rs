@@ -7,7 +7,7 @@ use osteon_common::visible;
 use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
 
 use super::result::scale;
-use super::{aligned, significant};
+use super::{aligned, data_notes, significant};
 
 /// A column of numbers: its heading, and for each group a value with its interval.
 struct Column {
@@ -202,7 +202,11 @@ fn notes(groups: &[Group]) -> String {
         let note = format!("* {}: {}", group.name, note(group)?);
         Some(format!("{}\n", visible::line(&note)))
     };
-    let notes: String = groups.iter().filter_map(note).collect();
+    let outlying = groups.iter().filter_map(|group| {
+        let outliers = data_notes::outliers(&group.data)?;
+        Some(format!("{}\n", visible::line(&format!("{}: {outliers}", group.name))))
+    });
+    let notes: String = groups.iter().filter_map(note).chain(outlying).collect();
     if notes.is_empty() { notes } else { format!("\n{notes}") }
 }
 

@@ -9,6 +9,8 @@ use super::result::{readable, scale};
 
 /// Posterior probability below which the data would be surprising under the model.
 const SURPRISING: f64 = 0.01;
+/// Share of wrong velocities from which it is stated.
+const NOTABLE: f64 = 0.005;
 
 /// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
 pub(super) fn text(found: &PosteriorReport) -> String {
@@ -17,6 +19,7 @@ pub(super) fn text(found: &PosteriorReport) -> String {
         "`from data`: share of the prior variance that the data removed; near 0 %, the prior alone \
          makes the interval.",
     ));
+    text.push_str(&outliers(found).unwrap_or_default());
     text.push_str(&wrapped(&effort(found)));
     text.push_str(&doubts(found));
     text
@@ -84,6 +87,15 @@ fn effort(found: &PosteriorReport) -> String {
     format!(
         "{effective} effective draws from {evaluations} evaluations; posterior.csv has {draws} draws."
     )
+}
+
+/// Says how many of the velocities the posterior takes to be wrong, if some may be.
+fn outliers(found: &PosteriorReport) -> Option<String> {
+    let share = found.outlier_share.filter(|share| *share >= NOTABLE)?;
+    let percent = glued(&format!("{} %", digits(100.0 * share, 2)));
+    Some(wrapped(&format!(
+        "An estimated {percent} of the velocities are not from the model's law; they count little."
+    )))
 }
 
 /// Returns the warnings: an accuracy that was not reached, and data that the model hardly explains.

@@ -11,7 +11,7 @@ use osteon_files::report::{Data, Identification, Moment, Propagation, ResultFile
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
-use super::{fit, groups, identified, posterior, solver};
+use super::{data_notes, fit, groups, identified, posterior, solver};
 use crate::output::ShownResult;
 use crate::result_status;
 
@@ -66,7 +66,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     text.push_str(&moments_and_cost(found));
     let data = found.data.as_ref();
     text.push_str(&notes(found.control_variate, &found.velocity, &found.failures));
-    text.push_str(&data.and_then(kolmogorov).unwrap_or_default());
+    text.push_str(&data.map(data_notes::text).unwrap_or_default());
     text.push('\n');
     text.push_str(&parameters(found, &point, specification));
     if found.status == Status::Failed {
@@ -242,17 +242,6 @@ fn effect_of_failures(
         "Had the failed realizations succeeded, the mean would change by an estimated {mean} and \
          the coefficient of variation by {variation}."
     ))
-}
-
-/// Returns whether the data agree with the model's law, if that was tested.
-fn kolmogorov(data: &Data) -> Option<String> {
-    let test = data.kolmogorov.flatten()?;
-    let (distance, p) = (digits(test.distance, 2), digits(test.p_value, 2));
-    let numbers = glued(&format!("D = {distance}, p = {p}"));
-    Some(wrapped(&format!(
-        "Kolmogorov–Smirnov test, data vs model: {numbers} (optimistic: the model was fitted to \
-         these data)"
-    )))
 }
 
 /// Returns the best point, each parameter with the digits that its uncertainty justifies.

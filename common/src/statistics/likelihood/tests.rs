@@ -5,23 +5,24 @@ use crate::realization::Ensemble;
 use crate::special::standard_normal_quantile;
 use crate::statistics::moments;
 
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+pub(super) const OPTIMUM: Point =
+    Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const MEAN: f64 = 3906.0;
 const DEVIATION: f64 = 105.0;
 
 /// `count` draws of a normal law.
-fn drawn(seed: u64, count: usize) -> Vec<f64> {
+pub(super) fn drawn(seed: u64, count: usize) -> Vec<f64> {
     let germs = (0..).flat_map(|index| *Germs::draw(seed, index).values());
     germs.take(count).map(|u| MEAN + DEVIATION * standard_normal_quantile(u)).collect()
 }
 
 /// Quantiles of the same law: data without sampling noise.
-fn quantiles(count: u32) -> Vec<f64> {
+pub(super) fn quantiles(count: u32) -> Vec<f64> {
     let at = |k: u32| standard_normal_quantile((f64::from(k) + 0.5) / f64::from(count));
     (0..count).map(|k| MEAN + DEVIATION * at(k)).collect()
 }
 
-fn outcomes(velocities: &[f64]) -> Vec<Outcome> {
+pub(super) fn outcomes(velocities: &[f64]) -> Vec<Outcome> {
     velocities.iter().map(|&velocity| Ok(velocity)).collect()
 }
 
