@@ -40,7 +40,9 @@ impl RobustScale {
         ascending.sort_unstable_by(f64::total_cmp);
         let median = quantile(&ascending, 0.5)?;
         let range = quantile(&ascending, 0.75)? - quantile(&ascending, 0.25)?;
-        let mut distances: Vec<f64> = ascending.iter().map(|one| (one - median).abs()).collect();
+        // In place, since a million velocities take 8 MB.
+        let mut distances = ascending;
+        distances.iter_mut().for_each(|one| *one = (*one - median).abs());
         distances.sort_unstable_by(f64::total_cmp);
         let half = quantile(&distances, 0.5)?;
         let deviation = (OF_ABSOLUTE_DEVIATION * half).max(range / OF_QUARTILES);

@@ -191,9 +191,7 @@ impl Warnings {
         velocities: &[f64],
         (origin, set): (Option<&Origin>, usize),
     ) {
-        let mut ascending = velocities.to_vec();
-        ascending.sort_unstable_by(f64::total_cmp);
-        let Some(median) = quantile(&ascending, 0.5) else { return };
+        let Some(median) = median(velocities) else { return };
         if let Some(doubt) = plausible::VELOCITY.doubt(median) {
             self.add(field, format!("their median {doubt}"));
         }
@@ -377,4 +375,10 @@ mod tests {
         assert!(found[1].contains(listed), "{found:?}");
         assert!(found[1].contains(" from the median 3902 m/s and 3 more; check"), "{found:?}");
     }
+}
+
+fn median(velocities: &[f64]) -> Option<f64> {
+    let mut ascending = velocities.to_vec();
+    ascending.sort_unstable_by(f64::total_cmp);
+    quantile(&ascending, 0.5)
 }

@@ -80,7 +80,7 @@ struct Tally {
 }
 
 /// One parameter set.
-enum Drawn {
+enum TruthOutcome {
     /// Too many of its realizations fail.
     Unusable,
     Posterior(Box<Posterior>, Point),
@@ -111,8 +111,8 @@ pub fn table(
         });
         for (number, drawn) in drawn {
             match drawn? {
-                Drawn::Unusable => tally.unusable += 1,
-                Drawn::Posterior(posterior, truth) => {
+                TruthOutcome::Unusable => tally.unusable += 1,
+                TruthOutcome::Posterior(posterior, truth) => {
                     tally.add(&posterior, &truth);
                     progress(&tally.line(number, &posterior, &truth));
                 }
@@ -187,21 +187,22 @@ impl Tally {
     }
 }
 
-fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<Drawn, StudyError> {
+fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<TruthOutcome, StudyError> {
     let truth = mean_model(study.seed, number);
     let monte_carlo =
         model_germs(REALIZATIONS[usize::from(study.velocities >= MANY)], study.seed + number);
     let modelled = outcomes(&truth, &monte_carlo, study.isa)?;
     if !PointStatistics::from_outcomes(&monte_carlo, &truth, &modelled).feasible {
-        return Ok(Drawn::Unusable);
+        return Ok(TruthOutcome::Unusable);
     }
     let Some(data) = simulated(study, &truth, number)? else {
-        return Ok(Drawn::Unusable);
+        return Ok(TruthOutcome::Unusable);
     };
     let specification = specification(data, monte_carlo);
     let found = identify(&specification, &mut RealizationCache::new(), study.isa)?;
     let posterior = found.result.conclusions.posterior;
-    Ok(posterior.map_or(Drawn::Unusable, |found| Drawn::Posterior(Box::new(found), truth)))
+    Ok(posterior
+        .map_or(TruthOutcome::Unusable, |found| TruthOutcome::Posterior(Box::new(found), truth)))
 }
 
 fn name(quantity: usize) -> String {

@@ -11,9 +11,18 @@ const EFFICIENCY_MIN: f64 = 0.95;
 /// There, more accuracy costs next to nothing.
 const ERROR_MAX_OF_FEW: f64 = 1e-3;
 
+/// Largest mean square error of a draw, in units of the data's noise, with which the interpolation is
+/// accepted. An error moves a draw along the pivots by that part of the noise, which is a small part
+/// of what the other parameters leave open; and the batch itself still reduces it.
+const SQUARE_ERROR_MAX: f64 = 0.5;
+
 /// The evaluated draws of a batch.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BatchCheck {
+    /// Expected mean square error over all draws, before calibration.
+    pub(super) expected: f64,
+    /// Square errors at points to learn from, in units of those expected.
+    learnt: Vec<f64>,
     /// Logarithm of the evaluated density minus that of the interpolated one; minus infinity where
     /// the point is infeasible.
     log_ratios: Vec<f64>,
@@ -24,6 +33,8 @@ pub(super) struct BatchCheck {
 pub(super) enum Doubt {
     /// It has only so many draws, and not as many as needed.
     FewDraws(usize, usize),
+    /// The mean square error of all draws is this, in units of the data's noise.
+    SquareError(f64),
     /// Only this share of the feasible draws counts after weighting.
     Efficiency(f64),
     /// The log density has this error, nats.
@@ -36,6 +47,17 @@ impl BatchCheck {
     /// Adds a draw.
     pub(super) fn add(&mut self, log_ratio: f64) {
         self.log_ratios.push(log_ratio);
+    }
+
+    /// Adds the square error at a point to learn from, in units of that expected.
+    pub(super) fn learn(&mut self, ratio: f64) {
+        self.learnt.push(ratio);
+    }
+
+    /// Returns the mean square error over all draws, in units of the data's noise.
+    fn square_error(&self) -> f64 {
+        let factor = self.learnt.iter().sum::<f64>() / self.learnt.len().max(1) as f64;
+        self.expected * factor
     }
 
     /// Returns the number of draws.
@@ -54,6 +76,10 @@ impl BatchCheck {
         let efficiency = efficiency(&feasible);
         if efficiency < EFFICIENCY_MIN {
             return Some(Doubt::Efficiency(efficiency));
+        }
+        let square = self.square_error();
+        if square > SQUARE_ERROR_MAX {
+            return Some(Doubt::SquareError(square));
         }
         let error = self.error();
         if few && error > ERROR_MAX_OF_FEW {
@@ -111,6 +137,13 @@ impl fmt::Display for Doubt {
                 100.0 * efficiency,
                 100.0 * EFFICIENCY_MIN
             ),
+            Self::SquareError(square) => write!(
+                f,
+                "the interpolated model still differs from the model: by {:.2} of the data's noise, \
+                 root mean square over all draws with their tails, {:.2} are allowed; {MORE}",
+                square.sqrt(),
+                SQUARE_ERROR_MAX.sqrt()
+            ),
             Self::Error(error) => write!(
                 f,
                 "the interpolated model still differs from the model: by {error:.1e} in the log \
@@ -131,7 +164,7 @@ mod tests {
     use super::*;
 
     fn check(ratios: &[f64], few: bool, expected: Option<Doubt>) {
-        let check = BatchCheck { log_ratios: ratios.to_vec() };
+        let check = BatchCheck { log_ratios: ratios.to_vec(), ..BatchCheck::default() };
         assert_eq!(check.doubt(4, few), expected, "{ratios:?}");
     }
 
@@ -145,5 +178,16 @@ mod tests {
         check(&[0.0, 0.0, 0.0, NEVER], false, Some(Doubt::Infeasible(1, 4)));
         check(&[NEVER; 4], false, Some(Doubt::Efficiency(0.0)));
         check(&[0.0, -1e3, 0.0, -1e3], false, Some(Doubt::Efficiency(0.5)));
+    }
+
+    #[test]
+    fn errors_in_the_tails_count() {
+        let mut check = BatchCheck { expected: 0.2, ..BatchCheck::default() };
+        (0..4).for_each(|_| check.add(0.0));
+        assert_eq!(check.doubt(4, false), None);
+        check.learn(3.0);
+        check.learn(5.0);
+        let Some(Doubt::SquareError(square)) = check.doubt(4, false) else { panic!() };
+        assert!((square - 0.8).abs() < 1e-12, "{square}");
     }
 }

@@ -122,6 +122,12 @@ impl PosteriorProblem {
         Population::new(members.collect())
     }
 
+    /// Returns the sum of square errors of ln v and ln Δ, in units of the data's noise.
+    pub(super) fn in_noise(&self, squares: [f64; 2]) -> f64 {
+        let noise = self.likelihood.errors();
+        squares[0] / (noise[0] * noise[0]) + squares[1] / (noise[1] * noise[1])
+    }
+
     /// Returns whether there are at most two free parameters: the result is then exact to 1e-3 of a
     /// standard deviation.
     pub(super) fn is_of_few(&self) -> bool {
@@ -241,15 +247,38 @@ impl Population {
         if squares > 0.0 { 1.0 / squares } else { 0.0 }
     }
 
+    /// Returns the weighted mean of a value of each member.
+    pub(super) fn mean(&self, values: &[f64]) -> f64 {
+        self.weights.iter().zip(values).map(|(weight, value)| weight * value).sum()
+    }
+
+    /// Returns the population with its weights multiplied by a factor for each member; as it is if
+    /// nothing would be left.
+    pub(super) fn reweighted(&self, factors: &[f64]) -> Self {
+        let total = self.mean(factors);
+        let mut changed = self.clone();
+        if total > 0.0 && total.is_finite() {
+            let weights = changed.weights.iter_mut().zip(factors);
+            weights.for_each(|(weight, factor)| *weight *= factor / total);
+        }
+        changed
+    }
+
     /// Returns members in proportion to their weights, in systematic steps; `offset` from 0 to 1
     /// shifts these.
     pub(super) fn resampled(&self, count: usize, offset: f64) -> Vec<&Member> {
+        let chosen = self.resampled_indices(count, offset);
+        chosen.into_iter().map(|index| &self.members[index]).collect()
+    }
+
+    /// Returns the places of [`resampled`](Self::resampled) members.
+    pub(super) fn resampled_indices(&self, count: usize, offset: f64) -> Vec<usize> {
         let mut chosen = Vec::with_capacity(count);
         let mut below = 0.0;
-        for (member, weight) in self.members.iter().zip(&self.weights) {
+        for (index, weight) in self.weights.iter().enumerate() {
             below += weight;
             while chosen.len() < count && (chosen.len() as f64 + offset) < below * count as f64 {
-                chosen.push(member);
+                chosen.push(index);
             }
         }
         // Rounding may leave the last step just beyond the last member.

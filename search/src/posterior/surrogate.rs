@@ -122,6 +122,12 @@ impl Surrogate {
         let at = self.scale.apply(features);
         [0, 1].map(|k| self.processes[k].mean(&self.inputs, &at))
     }
+
+    /// Returns the variances of the prediction at a point, as the processes expect them.
+    pub(super) fn variances(&self, features: &Features) -> Deviations {
+        let at = self.scale.apply(features);
+        [0, 1].map(|k| self.processes[k].variance_at(&self.inputs, &at))
+    }
 }
 
 impl Process {
@@ -219,6 +225,13 @@ impl Process {
         let products = used.map(|(k, weight)| weight * self.kernel(&inputs[*k], at));
         self.level + products.sum::<f64>()
     }
+
+    fn variance_at(&self, inputs: &[Features], at: &Features) -> f64 {
+        let row = self.row(inputs, at, 0.0);
+        let Some((own, others)) = row.split_last() else { return 0.0 };
+        let known = self.factor.solve_lower(others);
+        self.variance * (own - dot(&known, &known)).max(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -247,6 +260,29 @@ mod tests {
                 assert!((found - expected).abs() < 2e-3, "{found} {expected}");
             }
         }
+    }
+
+    /// The errors at other points are, in the mean, as large as expected within a factor of three.
+    #[test]
+    fn expected_errors_are_those_found() {
+        let inputs = sample(60, 3);
+        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
+        surrogate.fit(true);
+        let mut sums = [[0.0; 2]; 2];
+        for x in sample(200, 4) {
+            let (found, expected) = (surrogate.mean(&x), deviations(&x));
+            for (k, variance) in surrogate.variances(&x).into_iter().enumerate() {
+                sums[k][0] += (found[k] - expected[k]) * (found[k] - expected[k]);
+                sums[k][1] += variance;
+            }
+        }
+        for [found, expected] in sums {
+            let ratio = (found / expected).sqrt();
+            assert!((0.33..3.0).contains(&ratio), "{ratio}");
+        }
+        let at_points = inputs.iter().map(|x| surrogate.variances(x)[0]);
+        assert!(at_points.fold(0.0, f64::max) < 1e-4 * sums[0][1] / 200.0);
     }
 
     #[test]

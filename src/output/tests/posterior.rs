@@ -34,5 +34,15 @@ fn a_model_that_misses_the_data_has_a_posterior_that_says_little() {
     let missed = r#"{ "cost": 0.01, "velocity": { "mean": 3700.5 } }"#;
     let text = unwrapped(&shown(JobKind::Identification, &FREE, &with_posterior(missed)));
     let expected = "The model does not fit the data, so the posterior below says little.";
-    assert!(text.contains(expected) && text.contains("The data fix the mean"), "{text}");
+    assert!(text.contains(expected) && text.contains("that comes closest:"), "{text}");
+    assert!(!text.contains("The data fix"), "{text}");
+}
+
+#[test]
+fn a_posterior_holds_where_the_search_was_misled_by_a_wrong_velocity() {
+    let misled = r#"{ "cost": 0.01, "velocity": { "mean": 3700.5 }, "data": {
+        "outliers": [{ "index": 3, "velocity": 7800.0, "deviations": 37.0 }] } }"#;
+    let text = unwrapped(&shown(JobKind::Identification, &FREE, &with_posterior(misled)));
+    assert!(text.contains("the posterior below allows for them."), "{text}");
+    assert!(text.contains("The data fix the mean velocity"), "{text}");
 }

@@ -60,6 +60,12 @@ fn difference(found: &Identification, moment: Moment) -> Option<f64> {
     Some(found.velocity.moments.get(moment)? / found.data.as_ref()?.moments.get(moment)? - 1.0)
 }
 
+/// Returns whether the data contain velocities far from the others. A search counts them in full, a
+/// posterior hardly.
+pub(super) fn has_outliers(found: &Identification) -> bool {
+    found.data.as_ref().is_some_and(|data| !data.outliers.is_empty())
+}
+
 /// Returns the statement that the model misses the data, by how much, and at which bounds.
 pub(super) fn misfit(
     found: &Identification,
@@ -76,9 +82,12 @@ pub(super) fn misfit(
         let percent = glued(&format!("{} %", digits(100.0 * difference.abs(), 2)));
         Some(format!("{percent} {side} the data's"))
     };
-    let intervals = match found.posterior() {
-        Some(_) => "so the posterior below says little",
-        None => "so no intervals can be given",
+    let intervals = match (found.posterior(), has_outliers(found)) {
+        (Some(_), true) => {
+            "which contain velocities far from the others; the posterior below allows for them"
+        }
+        (Some(_), false) => "so the posterior below says little",
+        (None, _) => "so no intervals can be given",
     };
     let mut text = format!("The model does not fit the data, {intervals}.");
     // The reason in the headline has said the rest.

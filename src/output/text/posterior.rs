@@ -14,7 +14,16 @@ const NOTABLE: f64 = 0.005;
 
 /// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
 pub(super) fn text(found: &PosteriorReport) -> String {
-    let mut text = format!("\n{}{}", wrapped(&fixed(found)), aligned(&rows(found)));
+    introduced(&fixed(found), found)
+}
+
+/// Returns the same for a model that misses the data, of which nothing is said to be fixed.
+pub(super) fn text_of_misfit(found: &PosteriorReport) -> String {
+    introduced("Posterior of the model that comes closest:", found)
+}
+
+fn introduced(introduction: &str, found: &PosteriorReport) -> String {
+    let mut text = format!("\n{}{}", wrapped(introduction), aligned(&rows(found)));
     text.push_str(&wrapped(
         "`from data`: share of the prior variance that the data removed; near 0 %, the prior alone \
          makes the interval.",

@@ -77,7 +77,11 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
         text.push_str(&identified::text(found));
     } else {
         text.push_str(&fit::misfit(found, &point, specification));
-        text.push_str(&found.posterior().map(posterior::text).unwrap_or_default());
+        let of_posterior = match fit::has_outliers(found) {
+            true => posterior::text,
+            false => posterior::text_of_misfit,
+        };
+        text.push_str(&found.posterior().map(of_posterior).unwrap_or_default());
     }
 }
 

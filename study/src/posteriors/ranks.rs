@@ -44,7 +44,7 @@ mod tests {
         for below in [0, 199, 200, 1999, 2000] {
             ranks.add(below, 2000);
         }
-        assert_eq!(ranks.to_string(), "2 1 0 0 0 0 0 0 0 2");
+        assert_eq!(ranks.to_string(), "3 0 0 0 0 0 0 0 0 2");
     }
 
     #[test]
