@@ -299,6 +299,12 @@ fn period(velocities: &[f64]) -> Option<usize> {
     (period >= COPIES_MIN).then_some(period)
 }
 
+fn median(velocities: &[f64]) -> Option<f64> {
+    let mut ascending = velocities.to_vec();
+    ascending.sort_unstable_by(f64::total_cmp);
+    quantile(&ascending, 0.5)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -375,10 +381,4 @@ mod tests {
         assert!(found[1].contains(listed), "{found:?}");
         assert!(found[1].contains(" from the median 3902 m/s and 3 more; check"), "{found:?}");
     }
-}
-
-fn median(velocities: &[f64]) -> Option<f64> {
-    let mut ascending = velocities.to_vec();
-    ascending.sort_unstable_by(f64::total_cmp);
-    quantile(&ascending, 0.5)
 }
