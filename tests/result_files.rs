@@ -167,10 +167,14 @@ impl Runs {
     }
 }
 
+/// Returns the documentation of results.
+fn page() -> String {
+    read(Path::new(env!("CARGO_MANIFEST_DIR")), "docs/results.md")
+}
+
 /// Returns the keys or columns that the documentation of results lists for a file.
 fn documented(heading: &str) -> Vec<String> {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
-    let page = fs::read_to_string(page).unwrap();
+    let page = page();
     let mut sections = page.split("\n## ").flat_map(|chapter| chapter.split("\n### "));
     let section = sections.find(|section| section.lines().next() == Some(heading));
     let section = section.unwrap_or_else(|| panic!("no section {heading:?}"));
@@ -318,6 +322,20 @@ fn every_key_of_a_posterior_is_documented() {
         names(&schema["$defs"]["PosteriorReport"]["properties"]).into_iter().collect();
     let told: BTreeSet<String> = documented("`posterior` of a result").into_iter().collect();
     assert_eq!(told, real);
+}
+
+/// The runs of these tests use one method; the schema has the keys of all of them.
+#[test]
+fn every_key_of_every_solver_is_documented() {
+    let (schema, page) = (committed_schema("result"), page());
+    let methods = schema["$defs"]["Solver"]["oneOf"].as_array().unwrap();
+    for method in methods {
+        let properties = &method["properties"];
+        let mut told = names(properties);
+        told.push(properties["method"]["const"].as_str().unwrap().to_owned());
+        told.retain(|name| !page.contains(&format!("`{name}`")));
+        assert!(told.is_empty(), "not in docs/results.md: {told:?}");
+    }
 }
 
 /// Lists the keys of `value` that `schema` does not know, or that it lacks.

@@ -146,11 +146,14 @@ pub struct NominalSampling {
 impl NominalSampling {
     /// Returns the sampling of a setup; `None` for methods other than the exact one.
     pub fn from_setup(setup: &Setup) -> Option<Self> {
-        (setup.solver.method == Method::Exact).then(|| {
-            let sampling = nominal(setup);
-            let pairs = sampling.pairs(sampling.first_band).round() as u64;
-            Self { band: sampling.first_band, period: sampling.period, pairs }
-        })
+        match setup.solver.method {
+            Method::Exact => {
+                let sampling = nominal(setup);
+                let pairs = sampling.pairs(sampling.first_band).round() as u64;
+                Some(Self { band: sampling.first_band, period: sampling.period, pairs })
+            }
+            Method::Hybrid => None,
+        }
     }
 }
 

@@ -25,11 +25,7 @@ fn one_after_another(criterion: &mut Criterion, method: Method, isa: Isa, bones:
     let solver = Solver::with_isa(&setup(method, 1.0), isa);
     let mut workspace = Workspace::default();
     let mut bones = bones.iter().cycle();
-    let group = match method {
-        Method::Exact => "exact",
-        Method::Hybrid => "hybrid",
-    };
-    let mut group = criterion.benchmark_group(group);
+    let mut group = criterion.benchmark_group(method.name());
     if method == Method::Hybrid {
         group.sample_size(10).measurement_time(Duration::from_secs(10));
     }

@@ -87,7 +87,10 @@ fn settings(given: &SolverSettings) -> [SolverSettings; 3] {
     let default = SolverSettings::default();
     let exact = SolverSettings { refinement: given.refinement, ..default };
     let refinement = (REFERENCE * given.refinement).min(REFINEMENT_MAX);
-    let hybrid = SolverSettings { method: Method::Hybrid, ..*given };
+    let hybrid = match given.method {
+        Method::Hybrid => *given,
+        Method::Exact => SolverSettings { method: Method::Hybrid, ..exact },
+    };
     [exact, hybrid, SolverSettings { refinement, ..exact }]
 }
 

@@ -10,12 +10,13 @@ use crate::error::PanickedCase;
 /// A computing device. On every device, an outcome must be a function of the work and the index
 /// alone, to the bit.
 pub(crate) trait Backend: fmt::Debug + Send {
-    /// Returns how many realizations it computes at the same time; the coordinator sizes batches by
-    /// it.
+    /// Returns how many realizations it computes at the same time, 1 to `WORKER_THREADS_MAX`; the
+    /// coordinator sizes batches by it.
     fn slots(&self) -> u32;
 
-    /// Starts a batch without waiting for it. Calls `done` once with the result, on any thread.
-    /// Batches start in the order of the calls.
+    /// Starts a batch without waiting for it. Calls `done` once with the result, on a thread of the
+    /// device: `done` may block, and panics on the caller's thread, which belongs to the async
+    /// runtime. Batches start in the order of the calls.
     fn start(&mut self, task: Task, work: Work, done: Done);
 
     /// Releases a batch that is no longer needed, because it has ended or was revoked. One that has

@@ -1,7 +1,7 @@
 //! The processor cores of this worker as a [`Backend`].
 //!
 //! Realization i of a batch is drawn by [`Ensemble`] from (point, germs, i), and solved by
-//! [`Solver::arrival`]; its bits depend on nothing else: not on the thread, the batch, or earlier
+//! [`Solver::realization`]; its bits depend on nothing else: not on the thread, the batch, or earlier
 //! computations. If a drawn tensor is not positive definite in floating point, or if no realization
 //! can be drawn at the point, the outcome of each realization concerned is the failure
 //! `not_finite`.
@@ -137,23 +137,12 @@ fn compute(
             if stop.is_raised() {
                 return Err(Interrupted::Stopped);
             }
-            catch_unwind(AssertUnwindSafe(|| realization(&solver, &ensemble, index)))
-                .map_err(|payload| panicked(index, payload))
+            catch_unwind(AssertUnwindSafe(|| {
+                WORKSPACE.with_borrow_mut(|memory| solver.realization(&ensemble, index, memory))
+            }))
+            .map_err(|payload| panicked(index, payload))
         })
         .collect()
-}
-
-fn realization(solver: &Solver, ensemble: &Ensemble, index: u64) -> RealizationResult {
-    let Ok(bone) = ensemble.bone(index) else {
-        return RealizationResult::failed(FailureKind::NotFinite);
-    };
-    match WORKSPACE.with_borrow_mut(|workspace| solver.arrival(&bone, workspace)) {
-        Ok(arrival) => RealizationResult {
-            outcome: Ok(arrival.velocity),
-            estimated_error: arrival.estimated_error,
-        },
-        Err(failure) => RealizationResult::failed(failure.kind),
-    }
 }
 
 fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
