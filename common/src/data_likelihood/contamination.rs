@@ -48,7 +48,7 @@ struct FarVelocity {
     broad: f64,
 }
 
-/// What the data say about wrong velocities among them.
+/// Share of wrong velocities among the data, and which ones they probably are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlierShare {
     /// Posterior mean of ε, the probability that a velocity is not from the model's law.
