@@ -114,17 +114,14 @@ impl DataLikelihood {
         let squares: f64 = right.iter().map(|v| (v - centre) * (v - centre)).sum();
         let deviation = (squares / count).sqrt();
         let repeatability = with_rounding(repeatability, velocities, deviation);
-        let Some(scale) = scale else {
-            let classes = classes(velocities.iter().copied().zip(subjects.iter().copied()), centre);
-            return Self::from_classes(centre, deviation, repeatability, classes);
-        };
         let all = || velocities.iter().copied().zip(subjects.iter().copied());
-        let is_far =
-            |(velocity, _): &(f64, u32)| Contamination::is_far(&scale, *velocity, has_subjects);
+        let is_far = |(velocity, _): &(f64, u32)| {
+            scale.is_some_and(|scale| Contamination::is_far(&scale, *velocity, has_subjects))
+        };
         let far: Vec<f64> = all().filter(is_far).map(|(velocity, _)| velocity).collect();
         let classes = classes(all().filter(|one| !is_far(one)), centre);
         let core = velocities.len() - far.len();
-        let contamination = Contamination::new(&scale, core, &far, centre);
+        let contamination = scale.and_then(|scale| Contamination::new(&scale, core, &far, centre));
         let found = Self::from_classes(centre, deviation, repeatability, classes)?;
         Some(Self { contamination, ..found })
     }

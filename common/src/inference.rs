@@ -69,14 +69,10 @@ pub fn inference(
     let linear = Linear::from_jacobian(&jacobian);
     let likely = by_likelihood(specification, set, best);
     let ends = if likely.is_none() { LogarithmicEnds::of_data(data, set) } else { None };
+    let of_moments = noise(data, set, &estimate);
     let (noise, residual) = match likely {
-        Some((of_data, residual)) => {
-            (Noise { data: Some(of_data), ..noise(data, set, &estimate) }, residual)
-        }
-        None => {
-            let residual = log_ratios(data.moments(set), estimate.moments);
-            (noise(data, set, &estimate), residual)
-        }
+        Some((of_data, residual)) => (Noise { data: Some(of_data), ..of_moments }, residual),
+        None => (of_moments, log_ratios(data.moments(set), estimate.moments)),
     };
     let quantile = noise.quantile();
     let Agreement { matched, held, .. } =

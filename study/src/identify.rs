@@ -32,6 +32,21 @@ pub(crate) fn outcomes(
     Ok(solved.into_iter().map(|one| one.outcome).collect())
 }
 
+/// Returns the velocities of independent realizations at a point of the paper's geometry, without
+/// those that fail.
+///
+/// # Errors
+/// If the point has no ensemble.
+pub(crate) fn velocities(
+    point: &Point,
+    count: u64,
+    seed: u64,
+    isa: Isa,
+) -> Result<Vec<f64>, PointError> {
+    let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
+    Ok(outcomes(point, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect())
+}
+
 /// Runs an identification to its end. The realizations at its first point are taken from `known`,
 /// or stored there.
 ///

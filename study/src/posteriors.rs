@@ -9,7 +9,6 @@ mod tests;
 
 use std::sync::mpsc;
 
-use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
@@ -27,6 +26,7 @@ use self::ranks::Ranks;
 use crate::identify::{RealizationCache, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::MarkdownTable;
+use crate::twins::bulk_velocity;
 use crate::{RowCallback, StudyError};
 
 /// Default number of parameter sets.
@@ -212,8 +212,7 @@ fn name(quantity: usize) -> String {
 
 /// Returns quantity number `k` of a point: the seven parameters, then √(c1111/ρ).
 fn quantity(point: &Point, k: usize) -> f64 {
-    let speed = || bulk_velocity(point).map_or(f64::NAN, |found| libm::exp(found.logarithm));
-    point.0.get(k).copied().unwrap_or_else(speed)
+    point.0.get(k).copied().unwrap_or_else(|| bulk_velocity(point))
 }
 
 /// Returns the number of draws below the truth in quantity number `k`.

@@ -8,14 +8,13 @@ use osteon_common::inference::{DerivedQuantity, Inference, Uncertainty};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
-use osteon_common::outcome::Outcome;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::PointError;
 use osteon_search::IdentifyError;
 use osteon_solver::Isa;
 
 use crate::draws::OPTIMUM;
-use crate::identify::{RealizationCache, identify, outcomes};
+use crate::identify::{RealizationCache, identify, velocities};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{MarkdownTable, two_digits};
 use crate::{RowCallback, StudyError};
@@ -162,12 +161,6 @@ fn data_seed(seed: u64, number: u64) -> u64 {
     seed + 1 + number
 }
 
-/// Returns the velocities of independent realizations at a point.
-fn velocities(point: &Point, count: u64, seed: u64, isa: Isa) -> Result<Vec<f64>, PointError> {
-    let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
-    Ok(outcomes(point, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect())
-}
-
 /// Returns a specification in which dispersion and `searched` are free, with starts in the middle
 /// of their bounds, and the rest is known.
 fn specification(
@@ -239,7 +232,8 @@ fn errors(found: &DerivedQuantity, truth: f64) -> Option<f64> {
     found.known.map(|known| (found.value - truth) / known.standard_error)
 }
 
-fn bulk_velocity(point: &Point) -> f64 {
+/// Returns √(c1111/ρ) of a mean model, m/s; NaN if it is not admissible.
+pub(crate) fn bulk_velocity(point: &Point) -> f64 {
     let found = osteon_common::bulk_velocity::bulk_velocity(point);
     found.map_or(f64::NAN, |found| libm::exp(found.logarithm))
 }

@@ -31,15 +31,15 @@ pub(super) struct BatchCheck {
 /// Why a batch does not show that the result is that of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Doubt {
-    /// It has only so many draws, and not as many as needed.
+    /// The batch is too small: its number of draws, and the number needed.
     FewDraws(usize, usize),
-    /// The mean square error of all draws is this, in units of the data's noise.
+    /// The mean square error of all draws is too large: its value, in units of the data's noise.
     SquareError(f64),
-    /// Only this share of the feasible draws counts after weighting.
+    /// Too few of the feasible draws count after weighting: their share.
     Efficiency(f64),
-    /// The log density has this error, nats.
+    /// The error of the log density is too large: its value, nats.
     Error(f64),
-    /// So many of this number of draws are infeasible.
+    /// Too many draws are infeasible: their number, and the number of all draws.
     Infeasible(usize, usize),
 }
 

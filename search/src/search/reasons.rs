@@ -82,8 +82,7 @@ fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status
     };
     let misfit = misfit(best, agreement, specification);
     let on_bounds = on_bounds(best, specification);
-    // The lowest cost of a likelihood, or with priors, need not match both moments.
-    if specification.objective == Objective::Likelihood || specification.has_priors() {
+    if is_compromise(specification) {
         let held = !agreement.matched && !on_bounds.is_empty();
         let reason = format!("{misfit}; {on_bounds}; widen the bounds, or free more parameters");
         return (Status::Converged, held.then_some(reason));
@@ -105,11 +104,15 @@ fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status
     (status, Some(reason))
 }
 
+/// Returns whether the lowest cost need not match both moments: that of a likelihood, or with priors.
+fn is_compromise(specification: &JobSpecification) -> bool {
+    specification.objective == Objective::Likelihood || specification.has_priors()
+}
+
 /// Explains how far off the best point is after the last evaluation, unless it matches.
 fn used_up(evidence: &Evidence<'_>, specification: &JobSpecification) -> Option<String> {
     let (best, agreement) = evidence.best.zip(evidence.agreement.as_ref())?;
-    let compromise = specification.objective == Objective::Likelihood || specification.has_priors();
-    if agreement.matched || compromise {
+    if agreement.matched || is_compromise(specification) {
         return None;
     }
     let Search { max_evaluations, starts, .. } = specification.search;

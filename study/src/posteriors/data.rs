@@ -1,13 +1,12 @@
 //! Velocities as users have them.
 
-use osteon_common::job::{Data, Measurements, MonteCarlo};
-use osteon_common::outcome::Outcome;
+use osteon_common::job::{Data, Measurements};
 use osteon_common::parameters::Point;
 use osteon_common::realization::PointError;
 
 use super::PosteriorCalibration;
 use crate::generator::Generator;
-use crate::identify::outcomes;
+use crate::identify::velocities;
 
 /// Realizations drawn for each velocity: some fail.
 const DRAWN_EACH: f64 = 1.5;
@@ -72,9 +71,7 @@ pub(super) fn simulated(
     };
     let seed = study.seed + DATA_SEEDS + number;
     let realizations = (DRAWN_EACH * count as f64).ceil() as u64;
-    let drawn = MonteCarlo { realizations, seed, ..MonteCarlo::default() };
-    let mut velocities: Vec<f64> =
-        outcomes(truth, &drawn, study.isa)?.into_iter().filter_map(Outcome::ok).collect();
+    let mut velocities = velocities(truth, realizations, seed, study.isa)?;
     if (velocities.len() as u64) < count {
         return Ok(None);
     }

@@ -7,8 +7,7 @@
 //! exact posterior.
 
 use osteon_common::data_likelihood::DataLikelihood;
-use osteon_common::job::{Data, Measurements, MonteCarlo};
-use osteon_common::outcome::Outcome;
+use osteon_common::job::{Data, Measurements};
 use osteon_common::parameters::Point;
 use osteon_common::posterior::Posterior;
 use osteon_common::results::Estimate;
@@ -16,7 +15,7 @@ use osteon_common::statistics::{PointStatistics, estimate};
 
 use super::{QUANTITIES, model_germs, name, quantity, specification};
 use crate::draws::{Draws, OPTIMUM};
-use crate::identify::{RealizationCache, identify, outcomes};
+use crate::identify::{RealizationCache, identify, outcomes, velocities};
 use crate::table::MarkdownTable;
 use crate::{RowCallback, StudyError};
 
@@ -40,10 +39,7 @@ const REPORTED: usize = 100;
 /// # Errors
 /// If a point has no ensemble.
 pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
-    let isa = draws.isa;
-    let drawn = MonteCarlo { realizations: VELOCITIES, seed: DATA_SEED, ..MonteCarlo::default() };
-    let velocities: Vec<f64> =
-        outcomes(&OPTIMUM, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect();
+    let velocities = velocities(&OPTIMUM, VELOCITIES, DATA_SEED, draws.isa)?;
     let half = half_of(&velocities);
     let Some(posterior) = posterior_of(Data::from_velocities(velocities.clone()), draws, None)?
     else {
