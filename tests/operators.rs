@@ -22,7 +22,7 @@ use secure::{Made, Secure, certificate};
 use serde_json::Value;
 use service::{Service, undisturbed};
 use support::{
-    Coordinator, Finished, Owned, Scratch, eventually, job, osteon, run, run_with, text,
+    Coordinator, Finished, Owned, Scratch, eventually, job, osteon, run, run_with, text, warnings,
 };
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
@@ -174,7 +174,7 @@ fn the_log_tells_what_happened_to_every_job_and_worker() {
     assert!(recovered[0].contains("unfinished_jobs=0 ended_jobs=0"), "{recovered:?}");
     assert!(recovered[1].contains("unfinished_jobs=0 ended_jobs=1"), "{recovered:?}");
     // None of this was an error.
-    assert!(!log.contains("WARN") && !log.contains("ERROR"), "{log}");
+    assert!(warnings(&log).is_empty(), "{log}");
     let worker = fs::read_to_string(scratch.path("workers.log")).unwrap();
     for what in ["attached", "worker=1", "draining", "ended"] {
         assert!(worker.contains(what), "{what}:\n{worker}");

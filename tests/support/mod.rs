@@ -130,6 +130,14 @@ impl Finished {
     }
 }
 
+/// Returns the lines of a log that warn or tell of errors, but for those of a machine so busy that
+/// the coordinator was not run for seconds.
+pub(crate) fn warnings(log: &str) -> Vec<&str> {
+    let is_warning = |line: &&str| line.contains("WARN") || line.contains("ERROR");
+    let is_pause = |line: &&str| line.contains("the coordinator was paused");
+    log.lines().filter(is_warning).filter(|line| !is_pause(line)).collect()
+}
+
 /// A process that is killed when the test ends, however it ends.
 pub(crate) struct Owned(Child);
 
