@@ -6,6 +6,7 @@ use osteon_common::results::Status;
 use osteon_common::visible;
 use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
 
+use super::layout::wrapped;
 use super::result::scale;
 use super::{aligned, data_notes, significant};
 
@@ -224,17 +225,22 @@ fn caveat(groups: &[Group]) -> String {
         return String::new();
     }
     let by_likelihood = groups.iter().any(|group| group.cost_standard_error.is_some());
-    let data = if by_likelihood { "The law of one velocity" } else { "Two moments" };
-    let known = if dispersion { " and the dispersion are" } else { " is" };
-    format!(
-        "\n{data} cannot determine {} parameters. Only √(c1111/ρ){known} constrained in each\n\
-         group that the model fits; many other parameter sets fit equally well. Fix what is known from elsewhere\n\
-         (`fixed = …`) to compare single parameters.\n",
-        NUMBERS.get(searched.len()).unwrap_or(&"so many")
-    )
+    let known = if by_likelihood { "The distribution of one velocity" } else { "Two moments" };
+    let mut text = format!(
+        "{known} cannot determine {} parameters. The data of a group that the model fits fix its \
+         mean velocity and its coefficient of variation; many other parameter sets fit equally \
+         well. Fix parameters that are known from other measurements (`fixed = …`) to compare \
+         single ones.",
+        searched.len()
+    );
+    if groups.iter().all(|group| group.posterior.is_none()) {
+        text.push_str(
+            " A section `[posterior]` in the job file gives intervals that include what is left \
+             free.",
+        );
+    }
+    format!("\n{}", wrapped(&text))
 }
-
-const NUMBERS: [&str; 8] = ["no", "one", "two", "three", "four", "five", "six", "seven"];
 
 #[cfg(test)]
 mod tests;

@@ -47,6 +47,11 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
         count.push_str(&format!(" and {} for the posterior", posterior.evaluations));
     }
     if let Some(groups) = &found.groups {
+        let posteriors = groups.iter().filter_map(|group| group.posterior.as_ref());
+        match posteriors.map(|posterior| posterior.evaluations).sum() {
+            0 => {}
+            of_posteriors => count.push_str(&format!(" and {of_posteriors} for the posteriors")),
+        }
         text.push_str(&count);
         text.push_str(&groups::table(groups));
         return;
