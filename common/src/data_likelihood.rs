@@ -5,27 +5,25 @@
 //! independent velocities it is that of a normal sample, which also holds for few of them. With
 //! several velocities of each subject it is that of random effects: a share ρ of the variance
 //! belongs to the subjects, the rest to the velocities of one subject, and ρ, which is unknown, is
-//! integrated out under a uniform prior (S. R. Searle, G. Casella and C. E. McCulloch, Variance
-//! Components (1992), Sec. 3.7). The scatter of the instrument adds a known variance to each
-//! velocity.
+//! integrated out under a uniform prior (`random_effects.rs`). The scatter of the instrument adds a
+//! known variance to each velocity.
 //!
 //! A few wrong velocities would move the moments of such a sample without limit. So each velocity
 //! has a small unknown probability of coming from a broad law instead (`contamination.rs`).
 
 mod contamination;
+mod random_effects;
 #[cfg(test)]
 mod tests;
 
 use self::contamination::{Contamination, log_of_sum};
+use self::random_effects::{SubjectClass, Subjects};
 use crate::data_statistics::rounding;
 use crate::moments::Moments;
 use crate::robust::RobustScale;
 
 pub use self::contamination::OutlierShare;
 
-/// Number of values of ρ, the midpoints of equal intervals from 0 to 1, over which the likelihood
-/// is averaged.
-const SHARES: usize = 48;
 /// Nodes and weights of Gauss-Hermite quadrature for the standard normal law (M. Abramowitz and
 /// I. A. Stegun, Handbook of Mathematical Functions (1964), Table 25.10, n = 5).
 const NORMAL_NODES: [(f64, f64); 5] = [
@@ -35,6 +33,17 @@ const NORMAL_NODES: [(f64, f64); 5] = [
     (1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (2.856_970_013_872_806, 0.011_257_411_327_720_7),
 ];
+/// Largest error of the model's moments, in units of the data's, that Gauss-Hermite quadrature can
+/// average over; larger ones need nodes whose distance is a fraction of the data's error.
+const SMALL: f64 = 1.0;
+/// Distance of these nodes, in units of the data's error, and how far they reach, in units of the
+/// model's.
+const WIDE_NODES: (f64, f64) = (1.25, 4.5);
+/// Largest error of the model's moments, in units of the data's, that is averaged over.
+pub const MODEL_ERROR_MAX: f64 = 6.0;
+/// Distance from the data's moments, in units of their errors, beyond which the likelihood is
+/// negligible.
+const FAR: f64 = 15.0;
 /// Rounding that adds less than this share of the variance is negligible.
 const ROUNDING: f64 = 1e-3;
 /// Errors of the model's moments below this fraction of the data's are negligible.
@@ -49,31 +58,14 @@ pub struct DataLikelihood {
     deviation: f64,
     /// Variance of the instrument, m²/s².
     instrument: f64,
-    /// Subjects with equal numbers of velocities.
-    classes: Vec<SubjectClass>,
+    subjects: Subjects,
     /// Velocities that may be wrong, which are not in the classes; `None` if there are none.
     contamination: Option<Contamination>,
-    /// Values of ρ.
-    shares: Vec<f64>,
+    /// Relative standard errors of the model's moments.
+    model: [f64; 2],
     /// Errors of the model's moments, over which the likelihood is averaged: differences of both
     /// logarithms, and logarithms of their weights. A single zero if the model is exact.
     model_errors: Vec<([f64; 2], f64)>,
-}
-
-/// Subjects that have the same number of velocities each, and the sums over them that are
-/// sufficient for the likelihood.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct SubjectClass {
-    /// Velocities of each subject.
-    size: f64,
-    /// Number of subjects.
-    count: f64,
-    /// Sum of their means, from the centre.
-    means: f64,
-    /// Sum of the squares of their means, from the centre.
-    squares: f64,
-    /// Sum of squares within the subjects.
-    within: f64,
 }
 
 impl DataLikelihood {
@@ -93,10 +85,8 @@ impl DataLikelihood {
     /// Likelihood of `count` independent velocities of which only the moments are known.
     pub fn from_moments(moments: Moments, count: u64, repeatability: f64) -> Option<Self> {
         let deviation = moments.mean * moments.coefficient_of_variation;
-        let count = count as f64;
-        let squares = count * (deviation * deviation);
-        let class = SubjectClass { size: 1.0, count, means: 0.0, squares, within: 0.0 };
-        Self::from_classes(moments.mean, deviation, repeatability, vec![class])
+        let subjects = Subjects(vec![SubjectClass::of_moments(count as f64, deviation)]);
+        Self::from_subjects(moments.mean, deviation, repeatability, subjects)
     }
 
     fn new(
@@ -113,38 +103,37 @@ impl DataLikelihood {
         let centre = first + mean;
         let squares: f64 = right.iter().map(|v| (v - centre) * (v - centre)).sum();
         let deviation = (squares / count).sqrt();
-        let repeatability = with_rounding(repeatability, velocities, deviation);
         let all = || velocities.iter().copied().zip(subjects.iter().copied());
         let is_far = |(velocity, _): &(f64, u32)| {
             scale.is_some_and(|scale| Contamination::is_far(&scale, *velocity, has_subjects))
         };
         let far: Vec<f64> = all().filter(is_far).map(|(velocity, _)| velocity).collect();
-        let classes = classes(all().filter(|one| !is_far(one)), centre);
+        let subjects = Subjects::new(all().filter(|one| !is_far(one)), centre);
+        let within = subjects.within_variance().map_or(deviation, |within| within.sqrt());
+        let repeatability = with_rounding(repeatability, velocities, deviation.min(within));
+        let subjects = if repeatability > 0.0 { subjects } else { subjects.without_repeats() };
         let core = velocities.len() - far.len();
         let contamination = scale.and_then(|scale| Contamination::new(&scale, core, &far, centre));
-        let found = Self::from_classes(centre, deviation, repeatability, classes)?;
+        let found = Self::from_subjects(centre, deviation, repeatability, subjects)?;
         Some(Self { contamination, ..found })
     }
 
-    fn from_classes(
+    fn from_subjects(
         centre: f64,
         deviation: f64,
         repeatability: f64,
-        classes: Vec<SubjectClass>,
+        subjects: Subjects,
     ) -> Option<Self> {
         let instrument = repeatability * repeatability;
         let variance = deviation * deviation - instrument;
-        let several = classes.iter().any(|class| class.size > 1.0);
-        let middle = |k: usize| (k as f64 + 0.5) / SHARES as f64;
-        let shares = if several { (0..SHARES).map(middle).collect() } else { vec![0.0] };
         let known = variance > 0.0 && centre > 0.0 && variance.is_finite();
         known.then(|| Self {
             centre,
             deviation: variance.sqrt(),
             instrument,
-            classes,
+            subjects,
             contamination: None,
-            shares,
+            model: [0.0; 2],
             model_errors: vec![([0.0; 2], 0.0)],
         })
     }
@@ -153,17 +142,14 @@ impl DataLikelihood {
     /// are the same at every point, as common germs make them: its average over normal errors.
     pub fn with_model_errors(self, errors: [f64; 2]) -> Self {
         let noise = self.errors();
-        let nodes = |axis: usize| {
-            let matters = errors[axis] > NEGLIGIBLE * noise[axis];
-            if matters { NORMAL_NODES.to_vec() } else { vec![(0.0, 1.0)] }
-        };
-        let pairs = nodes(0).into_iter().flat_map(|mean| {
-            nodes(1).into_iter().map(move |variation| {
+        let [of_mean, of_variation] = [0, 1].map(|axis| normal_nodes(errors[axis] / noise[axis]));
+        let pairs = of_mean.iter().flat_map(|mean| {
+            of_variation.iter().map(move |variation| {
                 let steps = [mean.0 * errors[0], variation.0 * errors[1]];
                 (steps, libm::log(mean.1 * variation.1))
             })
         });
-        Self { model_errors: pairs.collect(), ..self }
+        Self { model_errors: pairs.collect(), model: errors, ..self }
     }
 
     /// Returns the logarithm of the likelihood of a model with this logarithm of the mean (m/s) and
@@ -173,11 +159,10 @@ impl DataLikelihood {
             let mean = libm::exp(mean + step[0]);
             let deviation = mean * libm::exp(variation + step[1]);
             let variance = deviation * deviation;
-            let of_share = |share: &f64| self.log_with(mean - self.centre, variance, *share);
             let far = self.contamination.as_ref().map_or(0.0, |contamination| {
                 contamination.log(mean - self.centre, variance + self.instrument)
             });
-            weight + far + log_of_sum(self.shares.iter().map(of_share))
+            weight + far + self.subjects.log(mean - self.centre, variance, self.instrument)
         };
         log_of_sum(self.model_errors.iter().map(of))
     }
@@ -199,31 +184,58 @@ impl DataLikelihood {
         [libm::log(self.centre), libm::log(self.deviation / self.centre)]
     }
 
-    /// Returns rough standard errors of these, for a grid of values or a measure of misfit: those
-    /// of a normal sample, each subject counted once.
+    /// Returns rough standard errors of these, as a measure of misfit: those of a normal sample in
+    /// which the velocities of a subject are as alike as they seem to be.
     pub fn errors(&self) -> [f64; 2] {
-        let subjects: f64 = self.classes.iter().map(|class| class.count).sum();
-        let total = self.deviation * self.deviation + self.instrument;
-        let inflated = total / (self.deviation * self.deviation);
-        [total.sqrt() / (self.centre * subjects.sqrt()), inflated / (2.0 * subjects).sqrt()]
+        let variance = self.deviation * self.deviation;
+        let share = self.subjects.share(variance, self.instrument);
+        let counts = self.subjects.effective_counts(share * variance, self.total());
+        self.errors_of(counts)
     }
 
-    /// Returns the logarithm of the likelihood, with the mean given as distance from the centre.
-    fn log_with(&self, mean: f64, variance: f64, share: f64) -> f64 {
-        let within = (1.0 - share) * variance + self.instrument;
-        let between = share * variance;
-        let of = |class: &SubjectClass| {
-            let whole = within + class.size * between;
-            let residual = class.squares - 2.0 * mean * class.means + class.count * (mean * mean);
-            let logs = (class.size - 1.0) * libm::log(within) + libm::log(whole);
-            class.count * logs + class.within / within + class.size * residual / whole
-        };
-        -0.5 * self.classes.iter().map(of).sum::<f64>()
+    /// Returns the distances from the moments beyond which the likelihood is negligible: each
+    /// subject may count once only, and the model has its own errors.
+    pub fn extent(&self) -> [f64; 2] {
+        let errors = self.errors_of([self.subjects.count(); 2]);
+        [0, 1].map(|k| FAR * errors[k].mul_add(errors[k], self.model[k] * self.model[k]).sqrt())
+    }
+
+    /// Returns the errors of a sample with as much information on the mean and on the variance as
+    /// these numbers of velocities.
+    fn errors_of(&self, counts: [f64; 2]) -> [f64; 2] {
+        let total = self.total();
+        let inflated = total / (self.deviation * self.deviation);
+        [(total / counts[0]).sqrt() / self.centre, inflated / (2.0 * counts[1]).sqrt()]
+    }
+
+    /// Returns the variance of one velocity, with the instrument's.
+    fn total(&self) -> f64 {
+        self.deviation * self.deviation + self.instrument
     }
 }
 
+/// Returns nodes and weights of the average over a normal error, in units of its standard deviation,
+/// for a function whose width is 1/`ratio` of that.
+fn normal_nodes(ratio: f64) -> Vec<(f64, f64)> {
+    if ratio <= NEGLIGIBLE {
+        return vec![(0.0, 1.0)];
+    }
+    if ratio <= SMALL {
+        return NORMAL_NODES.to_vec();
+    }
+    let (distance, reach) = WIDE_NODES;
+    let half = (reach * ratio.min(MODEL_ERROR_MAX) / distance).ceil();
+    let nodes = (0..=2 * half as usize).map(|k| {
+        let z = reach * (k as f64 / half - 1.0);
+        (z, libm::exp(-0.5 * z * z))
+    });
+    let nodes: Vec<(f64, f64)> = nodes.collect();
+    let total: f64 = nodes.iter().map(|node| node.1).sum();
+    nodes.into_iter().map(|(z, weight)| (z, weight / total)).collect()
+}
+
 /// Returns the instrument's standard deviation together with that of a rounding error, for velocities
-/// of which `deviation` is the standard deviation: a rounding error within a step h has the variance
+/// of which `deviation` is the smallest standard deviation that matters: a rounding error within a step h has the variance
 /// h²/12 (W. F. Sheppard, Proc. London Math. Soc. 29 (1898)).
 fn with_rounding(repeatability: f64, velocities: &[f64], deviation: f64) -> f64 {
     let variance = rounding(velocities).map_or(0.0, |step| step * step / 12.0);
@@ -231,36 +243,4 @@ fn with_rounding(repeatability: f64, velocities: &[f64], deviation: f64) -> f64 
         return repeatability;
     }
     repeatability.mul_add(repeatability, variance).sqrt()
-}
-
-/// Sums the velocities by subject, and the subjects by the number of their velocities.
-fn classes(velocities: impl Iterator<Item = (f64, u32)>, centre: f64) -> Vec<SubjectClass> {
-    let mut sums: Vec<[f64; 3]> = Vec::new();
-    for (velocity, subject) in velocities {
-        let off = velocity - centre;
-        sums.resize(sums.len().max(subject as usize + 1), [0.0; 3]);
-        let [size, sum, square] = &mut sums[subject as usize];
-        *size += 1.0;
-        *sum += off;
-        *square += off * off;
-    }
-    let mut classes: Vec<SubjectClass> = Vec::new();
-    for [size, sum, square] in sums {
-        if size == 0.0 {
-            continue;
-        }
-        let mean = sum / size;
-        let within = (square - sum * mean).max(0.0);
-        let one = SubjectClass { size, count: 1.0, means: mean, squares: mean * mean, within };
-        match classes.iter_mut().find(|class| class.size == size) {
-            Some(class) => {
-                class.count += 1.0;
-                class.means += one.means;
-                class.squares += one.squares;
-                class.within += one.within;
-            }
-            None => classes.push(one),
-        }
-    }
-    classes
 }

@@ -13,7 +13,7 @@ use super::section::section;
 use super::value::{known_wrong, number, quantity};
 
 /// Maximum distance of a prior's center from the bounds, in spreads: a normal law has a probability
-/// of 1e-23 beyond, which still divides without loss.
+/// of 1e-23 beyond.
 const SPREADS_MAX: f64 = 10.0;
 
 /// Records all violations of the settings of a posterior by themselves, and in relation to the

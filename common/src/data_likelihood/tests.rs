@@ -51,17 +51,132 @@ fn velocities_of_one_subject_are_correlated() {
     let found = DataLikelihood::of_subjects(&velocities, &[0, 0, 1, 1], 10.0).unwrap();
     let direct = |mean: f64, variation: f64| {
         let variance = (mean * variation) * (mean * variation);
-        let of = |k: usize| {
-            let share = (k as f64 + 0.5) / SHARES as f64;
+        let of = |k: u32| {
+            let share = (f64::from(k) + 0.5) / 1e4;
             let (total, both) = (variance + 100.0, share * variance);
             let [a, b, c, d] = velocities;
             libm::exp(pair([a, b], mean, total, both) + pair([c, d], mean, total, both))
         };
-        libm::log((0..SHARES).map(of).sum::<f64>() / SHARES as f64)
+        libm::log((0..10_000).map(of).sum::<f64>())
     };
     let difference = log(&found, 3980.0, 0.02) - log(&found, 3900.0, 0.03);
     let expected = direct(3980.0, 0.02) - direct(3900.0, 0.03);
-    assert!((difference - expected).abs() < 1e-9, "{difference} {expected}");
+    assert!((difference - expected).abs() < 1e-6, "{difference} {expected}");
+}
+
+/// Draws `size` velocities of each of `count` subjects, with this share of the variance 100² within
+/// subjects.
+fn of_subjects(seed: u64, [count, size]: [usize; 2], within: f64) -> (Vec<f64>, Vec<u32>) {
+    let germs = normal(seed, count * (size + 1));
+    let (means, others) = germs.split_at(count);
+    let one = |k: usize| {
+        let off = |velocity: f64| velocity - 3900.0;
+        let between = (1.0 - within).sqrt() * off(means[k / size]);
+        (3900.0 + between + within.sqrt() * off(others[k]), (k / size) as u32)
+    };
+    (0..count * size).map(one).unzip()
+}
+
+/// The integral over the share between subjects by very many equal steps of ln(1 - ρ) and of ρ.
+fn by_many_steps(subjects: &Subjects, mean: f64, variance: f64, instrument: f64) -> f64 {
+    let log = |within: f64| {
+        let rest = (within - instrument) / variance;
+        let of = |class: &SubjectClass| class.log(mean, within, (1.0 - rest) * variance);
+        subjects.0.iter().map(of).sum::<f64>()
+    };
+    let of = |k: u32| {
+        // 1 - ρ from 1 down to 1e-9, in steps that are equal in its logarithm.
+        let rest = libm::exp(-20.7 * (f64::from(k) + 0.5) / 4e5);
+        log(rest.mul_add(variance, instrument)) + libm::log(rest * 20.7 / 4e5)
+    };
+    log_of_sum((0..400_000).map(of).collect::<Vec<f64>>().into_iter())
+}
+
+#[test]
+fn the_share_between_subjects_is_integrated_out() {
+    for (seed, sizes, within, instrument) in [
+        (1, [20, 4], 0.5, 0.0),
+        (2, [20, 4], 0.002, 0.0),
+        (3, [20, 2], 0.001, 0.0),
+        (4, [40, 8], 0.02, 0.0),
+        (5, [687, 4], 0.05, 0.0),
+        (6, [687, 4], 1.0, 0.0),
+        (7, [5, 4], 1.0, 0.0),
+        (8, [40, 8], 0.005, 20.0),
+    ] {
+        let (velocities, indices) = of_subjects(seed, sizes, within);
+        let pairs = velocities.iter().copied().zip(indices);
+        let subjects = Subjects::new(pairs, 3900.0);
+        let log = |mean: f64, deviation: f64, by: &dyn Fn(&Subjects, f64, f64, f64) -> f64| {
+            by(&subjects, mean, deviation * deviation, instrument)
+        };
+        let origin = (5.0, 105.0);
+        for (mean, deviation) in [(5.0, 95.0), (-20.0, 130.0), (0.0, 60.0)] {
+            let difference = |by: &dyn Fn(&Subjects, f64, f64, f64) -> f64| {
+                log(mean, deviation, by) - log(origin.0, origin.1, by)
+            };
+            let (found, expected) = (difference(&Subjects::log), difference(&by_many_steps));
+            assert!(
+                (found - expected).abs() < 1e-3,
+                "{sizes:?}, {within} within, {deviation}: {found} instead of {expected}"
+            );
+        }
+    }
+}
+
+/// With a small share within the subjects, the scatter was found too small without limit.
+#[test]
+fn intervals_hold_the_scatter_whatever_its_share_within_subjects() {
+    for within in [0.002, 0.02, 0.3] {
+        let held = (0..60).filter(|seed| {
+            let (velocities, subjects) = of_subjects(100 + seed, [20, 4], within);
+            let found = DataLikelihood::of_subjects(&velocities, &subjects, 0.0).unwrap();
+            let logs = (0..400).map(|k| {
+                let deviation = 40.0 * libm::exp(1.8 * (f64::from(k) + 0.5) / 400.0);
+                // The mean is nearly independent of the scatter.
+                let mean = found.moments()[0];
+                libm::exp(found.log([mean, libm::log(deviation) - mean]) + 300.0) * deviation
+            });
+            let densities: Vec<f64> = logs.collect();
+            let total: f64 = densities.iter().sum();
+            let below: f64 = densities[..203].iter().sum();
+            // 100 is at 0.9163/1.8 of the range.
+            (0.025..0.975).contains(&(below / total))
+        });
+        let held = held.count();
+        // 57 expected; 5 standard deviations.
+        assert!(held >= 48, "{within}: {held} of 60");
+    }
+}
+
+#[test]
+fn repeats_of_one_velocity_count_once() {
+    let velocities: Vec<f64> = normal(8, 30);
+    let twice: Vec<f64> = velocities.iter().chain(&velocities).copied().collect();
+    let indices: Vec<u32> = (0..30).chain(0..30).collect();
+    let repeated = DataLikelihood::of_subjects(&twice, &indices, 0.0).unwrap();
+    let single = DataLikelihood::independent(&velocities, 0.0).unwrap();
+    let difference = |of: &DataLikelihood| log(of, 3900.0, 0.03) - log(of, 3920.0, 0.02);
+    assert!((difference(&repeated) - difference(&single)).abs() < 1e-9);
+}
+
+/// Errors of the model several times as large as the data's are averaged over just the same.
+#[test]
+fn large_errors_of_the_model_are_averaged_over() {
+    let exact = DataLikelihood::independent(&normal(2, 400), 0.0).unwrap();
+    for ratio in [1.5, 3.0, MODEL_ERROR_MAX] {
+        let error = ratio * exact.errors()[0];
+        let blurred = exact.clone().with_model_errors([error, 0.0]);
+        let [mean, variation] = exact.moments();
+        // Two normal laws, one after the other, are a normal law.
+        let wide = 1.0 + ratio * ratio;
+        for steps in [1.0, 2.0, 3.0] {
+            let off = steps * wide.sqrt() * exact.errors()[0];
+            let found = blurred.log([mean, variation]) - blurred.log([mean + off, variation]);
+            let expected = 0.5 * steps * steps;
+            assert!((found / expected - 1.0).abs() < 0.05, "{ratio}, {steps}: {found}");
+        }
+    }
 }
 
 /// Compares with the average over many errors of the model's mean, of the size of the data's.
