@@ -14,7 +14,8 @@
 //! all draws, which has to be small, too. (Points of the largest error, whatever their probability,
 //! would be the textbook's choice. With 200 of them the interpolation was seven times less accurate
 //! over the posterior than with draws: they lie in remote corners.) With one or two, batches are drawn
-//! from a wider law.
+//! from a wider law. If no point within the bounds matches the data as far as is known, draws of the
+//! prior are evaluated first.
 //!
 //! All of this is a function of the specification and the evaluations, in their order.
 
@@ -49,6 +50,8 @@ const SCOUTS: u64 = 2048;
 const BATCH: usize = 32;
 /// Further points of each batch, where draws matter that the interpolation knows least.
 const LEARNT: usize = 8;
+/// Largest number of batches of the prior.
+const EXPLORED_MAX: u64 = 2;
 /// Limit of the expected square error of a draw, in units of the data's noise: beyond, one draw is as
 /// wrong as another.
 const ERROR_LIMIT: f64 = 9.0;
@@ -115,6 +118,8 @@ pub(crate) struct PosteriorSearch {
     pending: Vec<Pending>,
     evaluations: u64,
     populations: u64,
+    /// Number of batches of the prior.
+    explored: u64,
     /// The evaluated draws of the last batch.
     check: BatchCheck,
 }
@@ -122,10 +127,21 @@ pub(crate) struct PosteriorSearch {
 /// A point that is to be evaluated.
 #[derive(Debug, Clone, Copy)]
 struct Pending {
-    member: Member,
-    /// The expected square error of a point to learn from, in units of the data's noise; `None` for
-    /// a draw that checks.
-    expected: Option<f64>,
+    point: Point,
+    purpose: Purpose,
+}
+
+/// What a point is evaluated for.
+#[derive(Debug, Clone, Copy)]
+enum Purpose {
+    /// It is a draw of the posterior, and checks the interpolation; with the interpolated logarithms of
+    /// its moments.
+    Check([f64; 2]),
+    /// The interpolation is uncertain there; with the interpolated logarithms of its moments, and the
+    /// expected square error in units of the data's noise.
+    Learn([f64; 2], f64),
+    /// It is a draw of the prior.
+    Explore,
 }
 
 impl PosteriorSearch {
@@ -148,6 +164,7 @@ impl PosteriorSearch {
             pending: Vec::new(),
             evaluations: 0,
             populations: 0,
+            explored: 0,
             check: BatchCheck::default(),
         };
         known.for_each(|(point, moments)| search.learn(&point, moments));
@@ -157,34 +174,33 @@ impl PosteriorSearch {
 
     /// Returns the next point, unless the search has ended.
     pub(crate) fn point(&self) -> Option<Point> {
-        self.pending.last().map(|pending| pending.member.point)
+        self.pending.last().map(|pending| pending.point)
     }
 
     /// Returns at most `most` points that follow the pending one.
     pub(crate) fn candidates(&self, most: usize) -> Vec<Point> {
         let following = self.pending.iter().rev().skip(1).take(most);
-        following.map(|pending| pending.member.point).collect()
+        following.map(|pending| pending.point).collect()
     }
 
     /// Takes the moments of the pending point; `None` if it is infeasible.
     pub(crate) fn tell(&mut self, moments: Option<Moments>) {
         let (Some(pending), Some(problem)) = (self.pending.pop(), &self.problem) else { return };
-        let Pending { member, expected } = pending;
         self.evaluations += 1;
         let logs = moments.map(logarithms);
-        match (expected, logs) {
-            (None, logs) => {
+        match (pending.purpose, logs) {
+            (Purpose::Check(interpolated), logs) => {
                 let exact = logs.map_or(f64::NEG_INFINITY, |logs| problem.likelihood.log(logs));
-                self.check.add(exact - problem.likelihood.log(member.moments));
+                self.check.add(exact - problem.likelihood.log(interpolated));
             }
-            (Some(expected), Some(logs)) => {
-                let errors = [0, 1].map(|k| logs[k] - member.moments[k]);
+            (Purpose::Learn(interpolated, expected), Some(logs)) => {
+                let errors = [0, 1].map(|k| logs[k] - interpolated[k]);
                 self.check.learn(problem.in_noise(errors.map(|error| error * error)) / expected);
             }
-            (Some(_), None) => {}
+            (Purpose::Learn(..), None) | (Purpose::Explore, _) => {}
         }
         if let Some(moments) = moments {
-            self.learn(&member.point, moments);
+            self.learn(&pending.point, moments);
         }
         if self.pending.is_empty() {
             self.next_batch();
@@ -221,13 +237,22 @@ impl PosteriorSearch {
         }
         let mut population = problem.population(&self.surrogate, SCOUTS, number);
         if population.members.is_empty() {
+            let skipped = self.explored as usize * BATCH;
+            let enough = self.explored == EXPLORED_MAX;
+            let points = if enough { Vec::new() } else { problem.prior_points(SCOUTS) };
+            let points = points.into_iter().skip(skipped).take(BATCH.min(left));
+            self.pending =
+                points.map(|point| Pending { point, purpose: Purpose::Explore }).collect();
+            self.explored += 1;
             return;
         }
         if problem.is_of_few() {
             population = problem.widened(population);
         }
         let draws = population.resampled(BATCH.min(left), 0.5);
-        let checking = draws.iter().map(|member| Pending { member: **member, expected: None });
+        let checking = draws
+            .iter()
+            .map(|member| Pending { point: member.point, purpose: Purpose::Check(member.moments) });
         let mut pending: Vec<Pending> = checking.collect();
         self.check = BatchCheck::default();
         if !problem.is_of_few() {
@@ -267,10 +292,10 @@ fn most_uncertain(
     let chosen = reweighted.resampled_indices(count, 0.5);
     let mut pending: Vec<Pending> = Vec::new();
     for index in chosen {
-        let (member, expected) = (population.members[index], errors[index]);
-        let known = pending.iter().any(|other| other.member.point == member.point);
+        let (Member { point, moments, .. }, expected) = (population.members[index], errors[index]);
+        let known = pending.iter().any(|other| other.point == point);
         if expected > 0.0 && !known {
-            pending.push(Pending { member, expected: Some(expected) });
+            pending.push(Pending { point, purpose: Purpose::Learn(moments, expected) });
         }
     }
     pending.into_iter()

@@ -37,8 +37,8 @@ impl MomentsGrid {
     /// Tabulates the likelihood where it is not negligible within `reach`, the moments that a model
     /// can have.
     pub(super) fn new(likelihood: &DataLikelihood, reach: [LogSpan; 2]) -> Self {
-        let (centre, errors) = (likelihood.moments(), likelihood.errors());
-        let mut spans = [0, 1].map(|k| nearby(centre[k], 15.0 * errors[k], reach[k]));
+        let (centre, extent) = (likelihood.moments(), likelihood.extent());
+        let mut spans = [0, 1].map(|k| nearby(centre[k], extent[k], reach[k]));
         let mut logs = Vec::new();
         for _ in 0..NARROWED {
             logs = tabulated(likelihood, spans);

@@ -54,8 +54,10 @@ impl Pivots {
     }
 }
 
-/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7);
-/// `None` if there is none. Of two values `branch` 0 is the larger.
+/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7).
+/// Where there is none, c1111 is larger than wanted everywhere: then the value with which it is
+/// smallest, without regard to bounds. `None` if the point is not admissible with any density. Of two
+/// values `branch` 0 is the larger.
 pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -> Option<f64> {
     let [density, e_l, nu_l, _, e_t, nu_t, _] = point.0;
     let stiffness = density * libm::exp(2.0 * logarithm);
@@ -68,11 +70,12 @@ pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usi
             density * libm::exp(2.0 * (velocity.logarithm - logarithm))
         }
         Parameter::LongitudinalYoungModulus => {
-            let root = (0.25 * stiffness * stiffness - stiffness * b / a).sqrt();
+            let root = (0.25 * stiffness * stiffness - stiffness * b / a).max(0.0).sqrt();
             if branch == 0 { 0.5 * stiffness + root } else { 0.5 * stiffness - root }
         }
-        Parameter::LongitudinalPoissonRatio => (wanted / (2.0 * e_t)).sqrt(),
+        Parameter::LongitudinalPoissonRatio => (wanted.max(0.0) / (2.0 * e_t)).sqrt(),
         Parameter::TransverseYoungModulus => wanted / (2.0 * nu_l * nu_l),
+        Parameter::TransversePoissonRatio if stiffness <= e_l => -1.0,
         Parameter::TransversePoissonRatio => 1.0 - stiffness * b / (stiffness * e_l - e_l * e_l),
         Parameter::LongitudinalShearModulus | Parameter::Dispersion => return None,
     };

@@ -20,15 +20,17 @@ use crate::search_box::admissible;
 
 /// Number of points drawn from the prior for scales and ranges.
 const PRIOR_POINTS: u64 = 1024;
-/// How far ln v may be from ln √(c1111/ρ), and ln Δ from ln δ.
-const REACH: [[f64; 2]; 2] = [[-0.1, 0.1], [-1.6, -1.0]];
+/// How far ln v may be from ln √(c1111/ρ), and ln Δ from ln δ: far more than in any plate. Nothing
+/// is drawn beyond.
+const REACH: [[f64; 2]; 2] = [[-0.3, 0.3], [-2.2, -0.5]];
 /// Maximum number of corrections of the pivots for one point.
 const CORRECTIONS_MAX: usize = 40;
 /// Corrections end when the deviations change by at most this.
 const CORRECTED: f64 = 1e-9;
-/// Points whose deviations still change by more than this have no solution.
+/// Points whose moments differ from those wanted by more than this are no solutions.
 const UNSOLVED: f64 = 1e-8;
-/// Fraction of the bounds' distance by which a pivot may leave them while it is corrected.
+/// Fraction of the bounds' distance by which a pivot may leave them while it is corrected. It stays
+/// there meanwhile, since only the solution has to be within the bounds.
 const OVERSHOOT: f64 = 0.1;
 /// Step of the derivatives by the pivots, relative to the bounds' distance.
 const STEP: f64 = 1e-5;
@@ -169,7 +171,7 @@ impl PosteriorProblem {
     }
 
     /// Solves for the pivots: returns the point at which the model has the moments `wanted`, as far
-    /// as pivots can be chosen for that.
+    /// as pivots can be chosen for that. The pivots of `point` are where the corrections begin.
     fn solved(
         &self,
         model: &Surrogate,
@@ -177,8 +179,8 @@ impl PosteriorProblem {
         wanted: [f64; 2],
         branch: usize,
     ) -> Option<Point> {
-        let mut deviations: Deviations = RULE_OF_THUMB;
-        let mut change = f64::INFINITY;
+        let first = features(&point).map(|at| model.mean(&at));
+        let mut deviations: Deviations = first.unwrap_or(RULE_OF_THUMB);
         for _ in 0..CORRECTIONS_MAX {
             if self.pivots.dispersion {
                 let dispersion = libm::exp(wanted[1] - deviations[1]);
@@ -189,21 +191,32 @@ impl PosteriorProblem {
                 self.set(&mut point, pivot, value)?;
             }
             let found = model.mean(&features(&point)?);
-            change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
+            let change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
             deviations = found;
             if change <= CORRECTED {
-                return Some(point);
+                break;
             }
         }
-        (change <= UNSOLVED).then_some(point)
+        let closed = closed_form(&point)?;
+        let is_solved =
+            |k: usize| (closed[k] + deviations[k] - wanted[k]).abs() <= UNSOLVED || !self.solves(k);
+        (is_solved(0) && is_solved(1)).then_some(point)
     }
 
-    /// Sets a pivot, unless it is far outside its bounds.
+    /// Returns whether a pivot is solved for ln v (0) or ln Δ (1).
+    fn solves(&self, moment: usize) -> bool {
+        if moment == 0 { self.pivots.mean.is_some() } else { self.pivots.dispersion }
+    }
+
+    /// Sets a pivot to a value, or to the nearest one not far outside its bounds.
     fn set(&self, point: &mut Point, parameter: Parameter, value: f64) -> Option<()> {
         let prior = self.priors.iter().find(|prior| prior.parameter == parameter)?;
         let slack = OVERSHOOT * (prior.upper - prior.lower);
-        let near = (prior.lower - slack..=prior.upper + slack).contains(&value) && value > 0.0;
-        near.then(|| point.0[parameter as usize] = value)
+        // What is positive within the bounds stays so.
+        let low = if prior.lower > 0.0 { 0.5 * prior.lower } else { f64::NEG_INFINITY };
+        let low = low.max(prior.lower - slack);
+        point.0[parameter as usize] = value.clamp(low, prior.upper + slack);
+        Some(())
     }
 
     /// Returns |∂y/∂z| for the pivots z; 1 if there are none.

@@ -11,6 +11,9 @@ pub(super) struct ParameterPrior {
     pub(super) lower: f64,
     pub(super) upper: f64,
     law: PosteriorPrior,
+    /// Whether the bounds are above the law's centre. Then it is mirrored: probabilities close to 1
+    /// would have lost their digits.
+    mirrored: bool,
     /// Probabilities of the law below both bounds.
     below: [f64; 2],
 }
@@ -29,14 +32,14 @@ impl ParameterPrior {
     }
 
     fn new(parameter: Parameter, lower: f64, upper: f64, law: PosteriorPrior) -> Self {
-        let prior = Self { parameter, lower, upper, law, below: [0.0, 1.0] };
-        let below = match law {
-            PosteriorPrior::Uniform => prior.below,
-            PosteriorPrior::Normal { .. } | PosteriorPrior::LogNormal { .. } => {
-                [lower, upper].map(|bound| normal_probability(prior.score(bound)))
-            }
-        };
-        Self { below, ..prior }
+        let prior = Self { parameter, lower, upper, law, mirrored: false, below: [0.0, 1.0] };
+        if law == PosteriorPrior::Uniform {
+            return prior;
+        }
+        let [low, high] = [lower, upper].map(|bound| prior.score(bound));
+        let mirrored = low > 0.0;
+        let scores = if mirrored { [-high, -low] } else { [low, high] };
+        Self { mirrored, below: scores.map(normal_probability), ..prior }
     }
 
     /// Returns the value below which the prior has this probability.
@@ -54,8 +57,9 @@ impl ParameterPrior {
     /// Returns the logarithm of the density at a value, up to a constant; `None` outside the
     /// bounds.
     pub(super) fn log_density(&self, value: f64) -> Option<f64> {
+        let possible = value > 0.0 || !matches!(self.law, PosteriorPrior::LogNormal { .. });
         let within = (self.lower..=self.upper).contains(&value);
-        within.then(|| match self.law {
+        (within && possible).then(|| match self.law {
             PosteriorPrior::Uniform => 0.0,
             PosteriorPrior::Normal { .. } => -0.5 * self.score(value) * self.score(value),
             PosteriorPrior::LogNormal { .. } => {
@@ -74,6 +78,7 @@ impl ParameterPrior {
         match self.law {
             PosteriorPrior::Uniform => 0.0,
             PosteriorPrior::Normal { center, spread } => (value - center) / spread,
+            PosteriorPrior::LogNormal { .. } if value <= 0.0 => f64::NEG_INFINITY,
             PosteriorPrior::LogNormal { center, spread } => libm::log(value / center) / spread,
         }
     }
@@ -81,8 +86,11 @@ impl ParameterPrior {
     /// Returns the quantile of the truncated standard normal law.
     fn normal_score(&self, u: f64) -> f64 {
         let [low, high] = self.below;
+        let u = if self.mirrored { 1.0 - u } else { u };
         let tiny = f64::MIN_POSITIVE;
-        standard_normal_quantile((low + u * (high - low)).clamp(tiny, 1.0 - f64::EPSILON))
+        let below = (low + u * (high - low)).clamp(tiny, 1.0 - f64::EPSILON);
+        let score = standard_normal_quantile(below);
+        if self.mirrored { -score } else { score }
     }
 }
 
@@ -104,8 +112,32 @@ mod tests {
         // Half of this law is cut off.
         let cut = prior(PosteriorPrior::Normal { center: 2000.0, spread: 20.0 });
         assert!((cut.quantile(0.5) - (2000.0 - 0.674_489_75 * 20.0)).abs() < 1e-4);
+        // Only the outermost tails are left of these, which mirror each other.
+        let [above, below] = [1420.0, 2080.0].map(|center| {
+            let law = prior(PosteriorPrior::Normal { center, spread: 10.0 });
+            [0.05, 0.5, 0.95].map(|u| law.quantile(u))
+        });
+        for (k, part) in [0.05, 0.5, 0.95].into_iter().enumerate() {
+            // An exponential law with the rate 8/10 is close by.
+            let near = -1.25 * libm::log(1.0 - part);
+            assert!(
+                (above[k] - 1500.0 + below[2 - k] - 2000.0).abs() < 1e-6,
+                "{above:?} {below:?}"
+            );
+            assert!((above[k] - 1500.0 - near).abs() < 0.05 * near, "{above:?}");
+        }
         let log = prior(PosteriorPrior::LogNormal { center: 1700.0, spread: 0.01 });
         assert!((log.quantile(0.841_344_746) - 1700.0 * libm::exp(0.01)).abs() < 1e-3);
+    }
+
+    /// Poisson ratios may have a negative bound.
+    #[test]
+    fn a_law_of_positive_values_has_none_below_zero() {
+        let law = PosteriorPrior::LogNormal { center: 0.3, spread: 0.1 };
+        let prior = ParameterPrior::new(Parameter::TransversePoissonRatio, -0.2, 0.5, law);
+        assert!((prior.quantile(0.5) - 0.3).abs() < 1e-6, "{}", prior.quantile(0.5));
+        assert_eq!(prior.log_density(-0.1), None);
+        assert_eq!(prior.log_density(0.0), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Summaries of a population, and the result that they make up.
 
+use osteon_common::data_likelihood::MODEL_ERROR_MAX;
 use osteon_common::data_statistics::{FittedMoments, predictive_test};
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
@@ -38,9 +39,9 @@ impl PosteriorSearch {
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
         let efficiency = self.check.efficiency();
         let effective = population.effective() * efficiency;
-        let reason = self.reason(problem, effective);
         let noise = problem.likelihood.errors();
-        let share = |k: usize| errors[k] / noise[k] * (errors[k] / noise[k]);
+        let of_model = [0, 1].map(|k| errors[k] / noise[k]);
+        let reason = self.reason(problem, effective, of_model);
         let (mean, variation) =
             (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
         let at = [mean.mean, variation.mean].map(libm::log);
@@ -55,7 +56,7 @@ impl PosteriorSearch {
             model_error: self.check.error(),
             check_efficiency: efficiency,
             pareto_k: self.check.pareto_shape(),
-            sampling_error: (share(0) + share(1)).sqrt(),
+            sampling_error: libm::hypot(of_model[0], of_model[1]),
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
@@ -76,11 +77,25 @@ impl PosteriorSearch {
         moments_of(&self.surrogate, point).map_or(f64::NAN, |found| libm::exp(found[axis]))
     }
 
-    /// Returns why the result is not accurate; `None` if it is.
-    fn reason(&self, problem: &PosteriorProblem, effective: f64) -> Option<String> {
+    /// Returns why the result is not accurate; `None` if it is. `of_model` are the errors of the
+    /// model's moments in units of the data's.
+    fn reason(
+        &self,
+        problem: &PosteriorProblem,
+        effective: f64,
+        of_model: [f64; 2],
+    ) -> Option<String> {
         if let Some(doubt) = self.doubt(problem) {
             let evaluations = self.evaluations;
             return Some(format!("after {evaluations} evaluations {doubt}"));
+        }
+        let largest = of_model[0].max(of_model[1]);
+        if largest > MODEL_ERROR_MAX {
+            return Some(format!(
+                "the sampling errors of the model's moments are {largest:.0} times those of the \
+                 data, {MODEL_ERROR_MAX} are allowed; raise [monte_carlo] realizations, or use \
+                 its sampling = \"sobol\" with control_variate = true"
+            ));
         }
         (effective < EFFECTIVE_MIN).then(|| {
             format!(
