@@ -128,12 +128,12 @@ pub(crate) struct PosteriorSearch {
 #[derive(Debug, Clone, Copy)]
 struct Pending {
     point: Point,
-    purpose: Purpose,
+    used_for: PointUse,
 }
 
 /// What a point is evaluated for.
 #[derive(Debug, Clone, Copy)]
-enum Purpose {
+enum PointUse {
     /// It is a draw of the posterior, and checks the interpolation; with the interpolated logarithms of
     /// its moments.
     Check([f64; 2]),
@@ -188,16 +188,16 @@ impl PosteriorSearch {
         let (Some(pending), Some(problem)) = (self.pending.pop(), &self.problem) else { return };
         self.evaluations += 1;
         let logs = moments.map(logarithms);
-        match (pending.purpose, logs) {
-            (Purpose::Check(interpolated), logs) => {
+        match (pending.used_for, logs) {
+            (PointUse::Check(interpolated), logs) => {
                 let exact = logs.map_or(f64::NEG_INFINITY, |logs| problem.likelihood.log(logs));
                 self.check.add(exact - problem.likelihood.log(interpolated));
             }
-            (Purpose::Learn(interpolated, expected), Some(logs)) => {
+            (PointUse::Learn(interpolated, expected), Some(logs)) => {
                 let errors = [0, 1].map(|k| logs[k] - interpolated[k]);
                 self.check.learn(problem.in_noise(errors.map(|error| error * error)) / expected);
             }
-            (Purpose::Learn(..), None) | (Purpose::Explore, _) => {}
+            (PointUse::Learn(..), None) | (PointUse::Explore, _) => {}
         }
         if let Some(moments) = moments {
             self.learn(&pending.point, moments);
@@ -242,7 +242,7 @@ impl PosteriorSearch {
             let points = if enough { Vec::new() } else { problem.prior_points(SCOUTS) };
             let points = points.into_iter().skip(skipped).take(BATCH.min(left));
             self.pending =
-                points.map(|point| Pending { point, purpose: Purpose::Explore }).collect();
+                points.map(|point| Pending { point, used_for: PointUse::Explore }).collect();
             self.explored += 1;
             return;
         }
@@ -250,9 +250,10 @@ impl PosteriorSearch {
             population = problem.widened(population);
         }
         let draws = population.resampled(BATCH.min(left), 0.5);
-        let checking = draws
-            .iter()
-            .map(|member| Pending { point: member.point, purpose: Purpose::Check(member.moments) });
+        let checking = draws.iter().map(|member| Pending {
+            point: member.point,
+            used_for: PointUse::Check(member.moments),
+        });
         let mut pending: Vec<Pending> = checking.collect();
         self.check = BatchCheck::default();
         if !problem.is_of_few() {
@@ -295,7 +296,7 @@ fn most_uncertain(
         let (Member { point, moments, .. }, expected) = (population.members[index], errors[index]);
         let known = pending.iter().any(|other| other.point == point);
         if expected > 0.0 && !known {
-            pending.push(Pending { point, purpose: Purpose::Learn(moments, expected) });
+            pending.push(Pending { point, used_for: PointUse::Learn(moments, expected) });
         }
     }
     pending.into_iter()

@@ -14,8 +14,9 @@ const DRAWN_EACH: f64 = 1.5;
 const DATA_SEEDS: u64 = 500_000_000;
 /// Velocities of each subject.
 const SERIES: usize = 4;
-/// Range of the share of the variance that lies between subjects.
-const BETWEEN: (f64, f64) = (0.2, 0.95);
+/// Range of the share of the variance that lies within subjects, uniform in its logarithm: from a
+/// device that repeats to 5 % of the scatter between people, to subjects that hardly differ.
+const WITHIN: (f64, f64) = (0.002, 0.8);
 /// Step of rounded velocities, m/s.
 const STEP: f64 = 10.0;
 /// Probability of an outlier, which is half or twice the velocity.
@@ -29,7 +30,7 @@ pub enum Scenario {
     /// They are independent realizations.
     Independent,
     /// Each subject has four velocities; between a fifth and nearly all of the variance lies between
-    /// subjects.
+    /// subjects, often nearly all.
     Subjects,
     /// They are rounded to 10 m/s.
     Rounded,
@@ -110,8 +111,8 @@ fn changed(
 fn in_series(velocities: &[f64], count: usize, generator: &mut Generator) -> Data {
     let (of_subjects, others) = velocities.split_at(count);
     let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
-    let between = generator.between(BETWEEN.0, BETWEEN.1);
-    let (shared, own) = (between.sqrt(), (1.0 - between).sqrt());
+    let within = libm::exp(generator.between(libm::log(WITHIN.0), libm::log(WITHIN.1)));
+    let (shared, own) = ((1.0 - within).sqrt(), within.sqrt());
     let one = |(k, velocity): (usize, &f64)| {
         let subject = k / SERIES;
         let of_subject = of_subjects.get(subject).unwrap_or(&mean);
