@@ -43,8 +43,8 @@ use self::agreement::compared;
 pub use self::agreement::{Agreement, agreement};
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
-pub(crate) use self::noise::student_quantile;
 pub use self::noise::{DataNoise, Noise, data_noise, noise};
+pub(crate) use self::noise::{PARTS_MIN, student_quantile};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
 pub use self::weights::MomentWeights;
@@ -85,7 +85,7 @@ pub fn inference(
         quantile,
         residual,
         ends,
-        known: matched && !held && linear.undetermined.is_empty(),
+        known: matched && !held && linear.undetermined.is_empty() && is_enough(&noise),
     };
     Some(Inference {
         matched,
@@ -99,6 +99,11 @@ pub fn inference(
         parameters: context.parameters(&jacobian.free),
         noise: noise.errors(),
     })
+}
+
+/// Returns whether the data tell enough of their own noise for intervals.
+fn is_enough(noise: &Noise) -> bool {
+    noise.data.is_some_and(|data| data.freedom + 1 >= PARTS_MIN)
 }
 
 /// Returns noise and residual of the moments by which the velocities are most likely, if a likelihood

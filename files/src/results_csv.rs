@@ -3,11 +3,12 @@
 
 use std::fmt::{self, Write as _};
 
-use osteon_common::inference::DerivedQuantity;
+use osteon_common::inference::{Conclusions, DerivedQuantity};
 use osteon_common::job::{Data, JobSpecification, Range};
 use osteon_common::moments::ConfidenceInterval;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Parameter;
+use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
 
 /// Returns the text of `history.csv`: one row per evaluation of the search, with the seven
@@ -107,8 +108,7 @@ pub fn groups(
         ];
         for quantity in quantities_of(group) {
             fields.push(number(quantity.map(|quantity| quantity.value)));
-            let interval = quantity.and_then(|quantity| quantity.known).map(|known| known.interval);
-            fields.extend(ends(interval));
+            fields.extend(ends(quantity.and_then(|quantity| quantity.interval)));
         }
         fields.extend(Parameter::ALL.map(|name| number(best.map(|best| best.point.get(name)))));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
@@ -141,13 +141,20 @@ fn header(free: &[Parameter]) -> String {
     columns.join(",") + "\n"
 }
 
-/// Returns a free parameter with the ends of its interval, if the data determine it.
+/// Returns a free parameter with the ends of its interval, if the data determine it or there is a
+/// posterior.
 fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
-    let found = group.conclusions.inference.as_ref();
-    let of = found.and_then(|found| found.parameters.iter().find(|(known, _)| *known == name));
-    let quantity = of.map(|(_, quantity)| *quantity).filter(|quantity| quantity.known.is_some());
-    let [lower, upper] =
-        ends(quantity.and_then(|quantity| quantity.known).map(|known| known.interval));
+    let Conclusions { inference, posterior, .. } = &group.conclusions;
+    let quantity = match posterior {
+        Some(posterior) => of_posterior(posterior, name),
+        None => {
+            let found = inference.iter().flat_map(|found| &found.parameters);
+            let mut found = found.filter(|(known, _)| *known == name);
+            found.next().map(|(_, quantity)| (*quantity).into())
+        }
+    };
+    let quantity = quantity.filter(|quantity| quantity.interval.is_some());
+    let [lower, upper] = ends(quantity.and_then(|quantity| quantity.interval));
     [number(quantity.map(|quantity| quantity.value)), lower, upper]
 }
 
@@ -184,7 +191,9 @@ fn reason(group: &GroupResult) -> &str {
             "the model does not match the data within their noise: no intervals"
         }
         _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
-        (_, Some(found)) if !found.undetermined.is_empty() => {
+        (_, Some(found))
+            if !found.undetermined.is_empty() && group.conclusions.posterior.is_none() =>
+        {
             "the data leave directions free: no intervals without a posterior"
         }
         _ => "",
@@ -229,15 +238,12 @@ pub fn comparison(result: &JobResult) -> String {
 /// Returns the difference of two quantities, and the ends of its interval, which follow from the
 /// distances of the ends of both intervals from their values (MOVER: G. Y. Zou and A. Donner, Stat.
 /// Med. 27 (2008)): intervals of few data are far from symmetric.
-fn difference(
-    (first, second): (Option<DerivedQuantity>, Option<DerivedQuantity>),
-) -> [Option<f64>; 3] {
+fn difference((first, second): (Option<GroupQuantity>, Option<GroupQuantity>)) -> [Option<f64>; 3] {
     let Some((first, second)) = first.zip(second) else { return [None; 3] };
     let difference = first.value - second.value;
-    let Some((one, other)) = first.known.zip(second.known) else {
+    let Some((one, other)) = first.interval.zip(second.interval) else {
         return [Some(difference), None, None];
     };
-    let [one, other] = [one.interval, other.interval];
     let reach = |first_end: f64, second_end: f64| {
         libm::hypot(first_end - first.value, second_end - second.value)
     };
@@ -246,9 +252,40 @@ fn difference(
     [Some(difference), Some(difference - below), Some(difference + above)]
 }
 
-fn quantities_of(group: &GroupResult) -> [Option<DerivedQuantity>; 2] {
-    let found = group.conclusions.inference.as_ref();
-    [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)]
+/// A quantity of a group: by its posterior if there is one, as on the terminal, otherwise by the best
+/// point.
+#[derive(Debug, Clone, Copy)]
+struct GroupQuantity {
+    value: f64,
+    interval: Option<[f64; 2]>,
+}
+
+impl From<DerivedQuantity> for GroupQuantity {
+    fn from(found: DerivedQuantity) -> Self {
+        Self { value: found.value, interval: found.known.map(|known| known.interval) }
+    }
+}
+
+impl From<&PosteriorSummary> for GroupQuantity {
+    fn from(found: &PosteriorSummary) -> Self {
+        Self { value: found.mean, interval: Some(found.interval()) }
+    }
+}
+
+fn of_posterior(posterior: &Posterior, name: Parameter) -> Option<GroupQuantity> {
+    let place = posterior.free.iter().position(|free| *free == name)?;
+    posterior.parameters.get(place).map(GroupQuantity::from)
+}
+
+/// Returns √(c1111/ρ) and the dispersion.
+fn quantities_of(group: &GroupResult) -> [Option<GroupQuantity>; 2] {
+    let Conclusions { inference, posterior, .. } = &group.conclusions;
+    let found = inference.as_ref();
+    let by_point = [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)];
+    let by_point = by_point.map(|quantity| quantity.map(GroupQuantity::from));
+    let Some(posterior) = posterior else { return by_point };
+    let dispersion = of_posterior(posterior, Parameter::Dispersion);
+    [Some((&posterior.bulk_velocity).into()), dispersion.or(by_point[1])]
 }
 
 /// Formats a number; empty if it is absent or not finite.
@@ -317,7 +354,7 @@ mod tests {
         let [mut above, mut below] = [0; 2];
         for seed in 0..1000 {
             let groups = (variation(2 * seed, 5), variation(2 * seed + 1, 200));
-            let [_, lower, upper] = difference((Some(groups.0), Some(groups.1)));
+            let [_, lower, upper] = difference((Some(groups.0.into()), Some(groups.1.into())));
             above += u32::from(lower.unwrap() > 0.0);
             below += u32::from(upper.unwrap() < 0.0);
         }

@@ -120,8 +120,20 @@ pub(crate) struct PosteriorSearch {
     populations: u64,
     /// Number of batches of the prior.
     explored: u64,
+    /// Whether no point matches the data, as far as is known.
+    nothing_matches: bool,
     /// The evaluated draws of the last batch.
     check: BatchCheck,
+}
+
+/// How the search for a posterior has ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum SearchOutcome {
+    Converged,
+    /// The result may not be that of the model, for this reason.
+    Doubtful(String),
+    /// No parameter set within the bounds and the priors comes near the data.
+    NothingMatches,
 }
 
 /// A point that is to be evaluated.
@@ -165,6 +177,7 @@ impl PosteriorSearch {
             evaluations: 0,
             populations: 0,
             explored: 0,
+            nothing_matches: false,
             check: BatchCheck::default(),
         };
         known.for_each(|(point, moments)| search.learn(&point, moments));
@@ -207,6 +220,20 @@ impl PosteriorSearch {
         }
     }
 
+    /// Returns how the search has ended.
+    pub(crate) fn outcome(&self) -> SearchOutcome {
+        let Some(problem) = self.problem.as_ref().filter(|_| !self.nothing_matches) else {
+            return SearchOutcome::NothingMatches;
+        };
+        let evaluations = self.evaluations;
+        match self.doubt(problem) {
+            Some(doubt) => {
+                SearchOutcome::Doubtful(format!("after {evaluations} evaluations {doubt}"))
+            }
+            None => SearchOutcome::Converged,
+        }
+    }
+
     fn learn(&mut self, point: &Point, moments: Moments) {
         let logs = logarithms(moments);
         let deviations =
@@ -236,7 +263,8 @@ impl PosteriorSearch {
             return;
         }
         let mut population = problem.population(&self.surrogate, SCOUTS, number);
-        if population.members.is_empty() {
+        self.nothing_matches = population.members.is_empty();
+        if self.nothing_matches {
             let skipped = self.explored as usize * BATCH;
             let enough = self.explored == EXPLORED_MAX;
             let points = if enough { Vec::new() } else { problem.prior_points(SCOUTS) };

@@ -5,6 +5,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::CONFIDENCE;
 use super::few::{FewIntervals, intervals_of_velocities};
+use crate::inference::PARTS_MIN;
 use crate::job::VelocitySet;
 use crate::moments::{ConfidenceInterval, MomentIntervals, Moments};
 use crate::quantile::quantile;
@@ -13,9 +14,6 @@ use crate::statistics::{Sum, moments, without_repeatability};
 
 /// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
-/// Smallest number of velocities, or of subjects, with intervals: fewer say next to nothing of the
-/// scatter of their law.
-const PARTS_MIN: usize = 5;
 /// Largest number of subjects that are resampled, which takes a fraction of a
 /// second; for more, the normal approximation of their moments gives the same result.
 const RESAMPLED_MAX: usize = 5_000;
@@ -29,7 +27,7 @@ const RESAMPLED_MAX: usize = 5_000;
 /// job.
 pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
     let parts = set.parts();
-    if parts < PARTS_MIN {
+    if (parts as u64) < PARTS_MIN {
         return None;
     }
     let measured = moments(set.velocities)?;

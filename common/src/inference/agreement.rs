@@ -19,7 +19,8 @@ const NEGLIGIBLE: f64 = 0.05;
 pub struct Agreement {
     /// Differences of the logarithms of mean and coefficient of variation, model minus data.
     pub differences: [f64; 2],
-    /// Standard errors of these, of data and sampling together; `None` if the data's are not known.
+    /// Standard errors of these, of data and sampling together, as they are counted; `None` if the
+    /// data's are not known.
     pub errors: Option<[f64; 2]>,
     /// Whether both differences are at most three standard errors of data and sampling, or
     /// negligible. Where a parameter lies on a bound, errors count at most as those of a normal law:
@@ -60,7 +61,7 @@ pub(super) fn compared(
     let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
     Agreement {
         differences,
-        errors: noise.data.map(|_| variances.map(f64::sqrt)),
+        errors: noise.data.map(|_| counted.map(f64::sqrt)),
         matched: is_within(differences, counted),
         held,
     }

@@ -35,6 +35,10 @@ pub struct DataNoise {
     pub freedom: u64,
 }
 
+/// Fewest independent velocities, or subjects, whose scatter tells of that of their law: with fewer no
+/// interval is stated, and their own noise gives no weights.
+pub(crate) const PARTS_MIN: u64 = 5;
+
 /// Returns the noise of set number `set` of the data, and of a model's estimate.
 pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
     Noise { data: data_noise(data, set), model: model.relative_errors().map(|error| error * error) }

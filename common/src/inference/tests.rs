@@ -5,7 +5,7 @@ use crate::bulk_velocity::bulk_velocity;
 use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
 use crate::ensemble::Germs;
-use crate::job::{Data, JobKind, MonteCarlo, Objective, Range, Search};
+use crate::job::{Data, JobKind, Measurements, MonteCarlo, Objective, Range, Search};
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, EvaluationRole, Moments};
@@ -19,14 +19,23 @@ fn model(point: &Point) -> Moments {
     }
 }
 
+/// Moments of so many velocities that they have no noise.
+fn without_noise(mean: f64, coefficient_of_variation: f64) -> Data {
+    let count = Some(1 << 60);
+    let measurements = Measurements::Moments { mean, coefficient_of_variation, count };
+    Data { measurements, repeatability: 0.0 }
+}
+
 fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecification {
     let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
     JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(
-            velocities
-                .map_or(Data::from_moments(mean, coefficient_of_variation), Data::from_velocities),
+            velocities.map_or_else(
+                || without_noise(mean, coefficient_of_variation),
+                Data::from_velocities,
+            ),
         ),
         parameters: Parameter::ALL.map(|parameter| {
             let (start, (lower, upper)) = (OPTIMUM.get(parameter), BOUNDS[parameter as usize]);
@@ -178,10 +187,8 @@ fn what_the_search_has_left_lengthens_the_intervals() {
     let mut specification = specification(&free, None);
     let full = found(&specification, [1e-3, 2e-2]);
     let Moments { mean, coefficient_of_variation } = model(&OPTIMUM);
-    specification.data = Some(Data::from_moments(
-        mean * libm::exp(1e-3),
-        coefficient_of_variation * libm::exp(-2e-2),
-    ));
+    specification.data =
+        Some(without_noise(mean * libm::exp(1e-3), coefficient_of_variation * libm::exp(-2e-2)));
     let stopped = found(&specification, [1e-3, 2e-2]);
     for (full, stopped, left) in [
         (full.bulk_velocity, stopped.bulk_velocity, 1e-3),

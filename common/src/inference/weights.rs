@@ -1,13 +1,10 @@
 //! Weights of the two moments by the noise of the data: the cost χ² = rᵀ C⁻¹ r.
 
 use super::jacobian::log_ratios;
-use super::noise::{data_noise, normal_law_noise};
+use super::noise::{PARTS_MIN, data_noise, normal_law_noise};
 use crate::job::Data;
 use crate::moments::Moments;
 
-/// Fewest independent velocities, or subjects, whose own scatter gives the weights; the covariance
-/// of fewer is nearly singular, as two velocities always have the same spread about their mean.
-const PARTS_MIN: u64 = 5;
 /// Largest correlation of the errors of both logarithms that counts, for the same reason.
 const CORRELATION_MAX: f64 = 0.95;
 
@@ -24,6 +21,7 @@ impl MomentWeights {
     /// Returns the weights of set number `set` of the data; `None` if its noise is not known.
     pub fn of_data(data: &Data, set: usize) -> Option<Self> {
         let found = data_noise(data, set)?;
+        // The covariance is nearly singular: two velocities have the same spread about their mean.
         let few = found.freedom + 1 < PARTS_MIN;
         let normal = few.then(|| normal_law_noise(data, set)).flatten();
         Self::of_covariance(normal.unwrap_or(found).covariance)

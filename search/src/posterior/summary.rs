@@ -8,7 +8,7 @@ use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANT
 use osteon_common::results::{BestPoint, Moments};
 
 use super::population::{Member, Population, moments as moments_of};
-use super::{PosteriorProblem, PosteriorSearch};
+use super::{PosteriorProblem, PosteriorSearch, SearchOutcome};
 
 /// Sobol' points of the population that the result summarises, with up to two free parameters and
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
@@ -41,7 +41,7 @@ impl PosteriorSearch {
         let effective = population.effective() * efficiency;
         let noise = problem.likelihood.errors();
         let of_model = [0, 1].map(|k| errors[k] / noise[k]);
-        let reason = self.reason(problem, effective, of_model);
+        let reason = self.reason(effective, of_model);
         let (mean, variation) =
             (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
         let at = [mean.mean, variation.mean].map(libm::log);
@@ -79,15 +79,9 @@ impl PosteriorSearch {
 
     /// Returns why the result is not accurate; `None` if it is. `of_model` are the errors of the
     /// model's moments in units of the data's.
-    fn reason(
-        &self,
-        problem: &PosteriorProblem,
-        effective: f64,
-        of_model: [f64; 2],
-    ) -> Option<String> {
-        if let Some(doubt) = self.doubt(problem) {
-            let evaluations = self.evaluations;
-            return Some(format!("after {evaluations} evaluations {doubt}"));
+    fn reason(&self, effective: f64, of_model: [f64; 2]) -> Option<String> {
+        if let SearchOutcome::Doubtful(reason) = self.outcome() {
+            return Some(reason);
         }
         let largest = of_model[0].max(of_model[1]);
         if largest > MODEL_ERROR_MAX {

@@ -306,6 +306,7 @@ impl DatasetSearch {
             trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,
+            posterior: self.posterior.as_ref().map(|posterior| posterior.outcome()),
         };
         // Always set before the end.
         let stop = self.stop.unwrap_or(StopReason::Converged);

@@ -1,10 +1,13 @@
 //! Explanations of how a search ended.
 
 use osteon_common::inference::Agreement;
-use osteon_common::job::{JobSpecification, Objective, Search};
+use osteon_common::job::{JobSpecification, Objective, Range, Search};
+use osteon_common::parameters::Parameter;
 use osteon_common::results::{Evaluation, Status};
 
-use super::{Ending, advice};
+use super::Ending;
+use super::advice as failure_advice;
+use crate::posterior::SearchOutcome;
 use crate::proposal::StopReason;
 use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
@@ -21,6 +24,8 @@ pub(super) struct Evidence<'a> {
     pub(super) first: Option<&'a Evaluation>,
     /// Number of evaluations.
     pub(super) evaluations: u64,
+    /// How the search for the posterior ended, if the job asks for one.
+    pub(super) posterior: Option<SearchOutcome>,
 }
 
 /// Points that a search evaluated after its best one, which lowered the cost no further.
@@ -41,6 +46,10 @@ impl Trials {
         }
     }
 }
+
+/// Said of a posterior that does not exist.
+const NO_POSTERIOR: &str = "no parameter set within the bounds and the priors comes near the data, \
+                            so there is no posterior; widen them, or free more parameters";
 
 /// A search was stopped by failed realizations if at least one point in this many had too many of
 /// them. Points that measure slopes lie beside the best one and are rarely refused.
@@ -70,38 +79,67 @@ pub(super) fn ending(
             (Status::Failed, Some(no_feasible_point(evidence, specification)))
         }
     };
+    let reason = match evidence.posterior {
+        Some(SearchOutcome::NothingMatches) if specification.is_searched() => {
+            Some(reason.map_or(NO_POSTERIOR.to_owned(), |why| format!("{why}; {NO_POSTERIOR}")))
+        }
+        _ => reason,
+    };
     Ending::from_search(status, reason)
+}
+
+/// Returns status and explanation of a job that asks for nothing but the posterior.
+fn of_posterior(outcome: Option<&SearchOutcome>) -> (Status, Option<String>) {
+    match outcome {
+        Some(SearchOutcome::Converged) | None => (Status::Converged, None),
+        Some(SearchOutcome::Doubtful(reason)) => (Status::MaxEvaluations, Some(reason.clone())),
+        Some(SearchOutcome::NothingMatches) => (Status::NotMatched, Some(NO_POSTERIOR.to_owned())),
+    }
 }
 
 /// Returns status and explanation of a search that found nothing better, which is no match of the
 /// data by itself.
 fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status, Option<String>) {
-    let found = evidence.best.zip(evidence.agreement.as_ref());
-    let Some((best, agreement)) = found.filter(|_| specification.is_searched()) else {
+    if !specification.is_searched() {
+        return of_posterior(evidence.posterior.as_ref());
+    }
+    let Some((best, agreement)) = evidence.best.zip(evidence.agreement.as_ref()) else {
         return (Status::Converged, None);
     };
-    let misfit = misfit(best, agreement, specification);
     let on_bounds = on_bounds(best, specification);
-    if is_compromise(specification) {
-        let held = !agreement.matched && !on_bounds.is_empty();
-        let reason = format!("{misfit}; {on_bounds}; widen the bounds, or free more parameters");
-        return (Status::Converged, held.then_some(reason));
+    // How far off a compromise may be is unknown without the noise of the data, unless a bound holds
+    // it back.
+    let is_free = agreement.errors.is_none() && on_bounds.is_empty();
+    if is_compromise(specification) && (agreement.matched || is_free) {
+        return (Status::Converged, None);
     }
+    let misfit = misfit(best, agreement, specification);
     let status = if agreement.matched { Status::Converged } else { Status::NotMatched };
+    let advice = advice(specification, !on_bounds.is_empty());
+    let advice = if advice.is_empty() { advice } else { format!("; {advice}") };
     let reason = match stopped_by_failures(&evidence.trials, specification) {
         Some(failures) => format!(
             "{failures}; {misfit}; raise [monte_carlo] max_failed_fraction, or change what fails \
              (bounds, [solver] refinement)"
         ),
-        None if on_bounds.is_empty() => {
-            format!("no nearby point fits better: {misfit}; free more parameters")
-        }
-        None => format!(
-            "no nearby point fits better: {misfit}; {on_bounds}; widen the bounds, or free more \
-             parameters"
-        ),
+        None if on_bounds.is_empty() => format!("no nearby point fits better: {misfit}{advice}"),
+        None => format!("no nearby point fits better: {misfit}; {on_bounds}{advice}"),
     };
     (status, Some(reason))
+}
+
+/// Returns what may bring a search closer to the data.
+fn advice(specification: &JobSpecification, on_bounds: bool) -> String {
+    let is_fixed =
+        |parameter: &Parameter| matches!(specification.range(*parameter), Range::Fixed(_));
+    let choices = [
+        (specification.has_priors(), "lower the weights of [search.priors]"),
+        (on_bounds, "widen the bounds"),
+        (Parameter::ALL.iter().any(is_fixed), "free more parameters"),
+    ];
+    let choices: Vec<&str> =
+        choices.into_iter().filter(|choice| choice.0).map(|choice| choice.1).collect();
+    choices.join(", or ")
 }
 
 /// Returns whether the lowest cost need not match both moments: that of a likelihood, or with priors.
@@ -145,14 +183,19 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
         ""
     };
     let cost = match specification.objective {
+        Objective::ChiSquare if specification.has_priors() => "best χ² with the priors' penalty",
         Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
         Objective::Moments | Objective::Likelihood => "best cost",
     };
+    let tolerance = match specification.objective {
+        // The search for a likelihood's maximum does not end at a cost.
+        Objective::Likelihood => String::new(),
+        _ => format!(", cost_tolerance is {:?}", specification.search.cost_tolerance),
+    };
     format!(
-        "the {cost} is {:.3e}, cost_tolerance is {:?}; the model's mean velocity is {}, its \
-         coefficient of variation {}{held}",
+        "the {cost} is {:.3e}{tolerance}; the model's mean velocity is {}, its coefficient of \
+         variation {}{held}",
         best.cost.unwrap_or(f64::NAN),
-        specification.search.cost_tolerance,
         off(0),
         off(1)
     )
@@ -226,7 +269,7 @@ fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) 
             "no feasible point among the {} evaluated; at the first {}; {}",
             evidence.evaluations,
             failed(row, specification),
-            advice::after_failures(row, specification)
+            failure_advice::after_failures(row, specification)
         ),
     }
 }

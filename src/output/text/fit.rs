@@ -1,9 +1,9 @@
 //! Statements on whether the model fits the data, and which parameters the data determine.
 
-use osteon_common::job::{JobSpecification, Objective, Range, SearchMethod};
+use osteon_common::job::{JobSpecification, Measurements, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::Status;
-use osteon_files::report::{Data, Identification, Moment};
+use osteon_files::report::{Data, Identification, Moment, PosteriorReport};
 use osteon_search::search_box::{SearchBox, Side};
 
 use super::identified;
@@ -17,17 +17,60 @@ const ERRORS_MAX: f64 = 3.0;
 /// computation of intervals.
 const EXACT: f64 = 1e-4;
 
-/// Returns whether the model at the best point fits the data: according to the inference from the
-/// derivatives, or, without it, to cost and moments.
+/// Returns whether the model fits the data: if nothing but the posterior was asked for, according to
+/// that, otherwise according to the inference from the derivatives, or, without it, to cost and
+/// moments.
 pub(super) fn fits(found: &Identification, specification: &JobSpecification) -> bool {
     if found.status == Status::NotMatched {
         return false;
+    }
+    if specification.search.method == SearchMethod::Posterior {
+        return found.posterior().is_some_and(|posterior| posterior_fits(found, posterior));
     }
     if let Some(identified) = found.identified() {
         return identified.matched;
     }
     is_reached(found, specification)
         || Moment::ALL.into_iter().all(|moment| is_within_noise(found, moment))
+}
+
+/// Returns whether the data's moments are among those that the posterior leaves possible. Priors may
+/// keep it from them.
+fn posterior_fits(found: &Identification, posterior: &PosteriorReport) -> bool {
+    let of = |moment: Moment| match moment {
+        Moment::Mean => &posterior.mean,
+        Moment::CoefficientOfVariation => &posterior.coefficient_of_variation,
+    };
+    let agrees = |moment: Moment| {
+        let data = found.data.as_ref().and_then(|data| data.moments.get(moment));
+        let known = of(moment).mean.zip(of(moment).standard_deviation);
+        let Some((data, (mean, deviation))) = data.zip(known) else { return false };
+        let noise = of_data(found, moment).hypot(deviation / mean);
+        (mean / data - 1.0).abs() <= (ERRORS_MAX * noise).max(EXACT)
+    };
+    // Outlying velocities count in the data's moments, and hardly in the posterior.
+    has_outliers(found) || Moment::ALL.into_iter().all(agrees)
+}
+
+/// Returns the relative standard error of a moment of the data; 0 if it is not known.
+fn of_data(found: &Identification, moment: Moment) -> f64 {
+    let Some(data) = &found.data else { return 0.0 };
+    let value = data.moments.get(moment).unwrap_or(f64::NAN);
+    if let Some(intervals) = data.intervals() {
+        let [low, high] = intervals.get(moment);
+        // An interval of 95 % reaches two standard errors to each side.
+        return (high - low) / 4.0 / value;
+    }
+    let Some(count) = data.count.flatten().filter(|count| *count > 1) else { return 0.0 };
+    // Of moments with a count, those of a normal law.
+    let count = count as f64;
+    match moment {
+        Moment::Mean => {
+            let variation = data.moments.get(Moment::CoefficientOfVariation);
+            variation.unwrap_or(f64::NAN) / count.sqrt()
+        }
+        Moment::CoefficientOfVariation => 1.0 / (2.0 * count).sqrt(),
+    }
 }
 
 /// Returns whether the search reached its target cost.
@@ -39,19 +82,9 @@ fn is_reached(found: &Identification, specification: &JobSpecification) -> bool 
 /// Returns whether a moment of the model agrees with the data within the noise of both.
 fn is_within_noise(found: &Identification, moment: Moment) -> bool {
     let Some(difference) = difference(found, moment) else { return false };
-    let relative = |error: f64, moment: Option<f64>| error / moment.unwrap_or(f64::NAN);
     let of_model = found.velocity.standard_error.get(moment).unwrap_or(0.0);
-    let data = found.data.as_ref();
-    // An interval of 95 % reaches two standard errors to each side.
-    let of_data = data.and_then(Data::intervals).map_or(0.0, |intervals| {
-        let [low, high] = intervals.get(moment);
-        (high - low) / 4.0
-    });
-    let errors = [
-        relative(of_model, found.velocity.moments.get(moment)),
-        relative(of_data, data.and_then(|data| data.moments.get(moment))),
-    ];
-    let noise = errors[0].hypot(errors[1]);
+    let of_model = of_model / found.velocity.moments.get(moment).unwrap_or(f64::NAN);
+    let noise = of_model.hypot(of_data(found, moment));
     difference.abs() <= (ERRORS_MAX * noise).max(EXACT)
 }
 
@@ -152,10 +185,14 @@ pub(super) fn uniqueness(
          (`fixed = …`) to narrow the others down."
     );
     if found.posterior().is_none() {
-        text.push_str(
-            " A section `[posterior]` in the job file gives intervals that include what is left \
-             free.",
-        );
+        let needed = match specification.data.as_ref().map(|data| &data.measurements) {
+            Some(Measurements::Moments { count: None, .. }) => "With `data.count`, a",
+            _ => "A",
+        };
+        text.push_str(&format!(
+            " {needed} section `[posterior]` in the job file gives intervals that include what is \
+             left free."
+        ));
     }
     if !shown_below {
         let dispersion = if dispersion {

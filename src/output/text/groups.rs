@@ -64,9 +64,13 @@ pub(super) fn table(groups: &[Group]) -> String {
         text.push_str(&side_by_side(groups, [column(pair.first()), column(pair.get(1))]));
     }
     let of_posterior = groups.iter().any(|group| group.posterior.is_some());
-    let intervals =
-        if of_posterior { "intervals of the posterior" } else { "confidence intervals" };
-    text.push_str(&format!("\nIn brackets: 95 % {intervals}, each group by itself.\n"));
+    let intervals = if of_posterior {
+        "confidence intervals of the data, and 95 % intervals of the posterior"
+    } else {
+        "confidence intervals"
+    };
+    let brackets = wrapped(&format!("In brackets: 95 % {intervals}, each group by itself."));
+    text.push_str(&format!("\n{brackets}"));
     text.push_str(&notes(groups));
     text.push_str(&caveat(groups));
     text

@@ -14,7 +14,11 @@ const NOTABLE: f64 = 0.005;
 
 /// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
 pub(super) fn text(found: &PosteriorReport) -> String {
-    introduced(&fixed(found), found)
+    if found.converged {
+        introduced(&fixed(found), found)
+    } else {
+        introduced("Posterior, which did not converge:", found)
+    }
 }
 
 /// Returns the same for a model that misses the data, of which nothing is said to be fixed.
@@ -121,8 +125,8 @@ fn doubts(found: &PosteriorReport) -> String {
     if let Some(p) = found.predictive_p_value.filter(|p| *p < SURPRISING) {
         let p = glued(&format!("p = {}", digits(p, 2)));
         text.push_str(&wrapped(&format!(
-            "Warning: no point of the posterior explains the distribution of the data \
-             (Kolmogorov–Smirnov test of the posterior-predictive law: {p})."
+            "Warning: the model with the posterior means of both moments does not explain the \
+             distribution of the data (Kolmogorov–Smirnov test: {p})."
         )));
     }
     text

@@ -162,6 +162,9 @@ fn moments_and_cost(found: &Identification) -> String {
         let (name, shown) = match found.objective {
             Objective::Likelihood => ("cost (nats)", measured(cost, error)),
             Objective::Moments => ("cost", digits(cost, 3)),
+            Objective::ChiSquare if found.search.penalty.is_some() => {
+                ("cost (χ² and priors)", digits(cost, 3))
+            }
             Objective::ChiSquare => ("cost (χ²)", digits(cost, 3)),
         };
         rows.push([name.to_owned(), shown, String::new(), String::new()]);

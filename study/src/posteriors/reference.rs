@@ -15,6 +15,7 @@ use osteon_common::statistics::{PointStatistics, estimate};
 
 use super::{QUANTITIES, model_germs, name, quantity, specification};
 use crate::draws::{Draws, OPTIMUM};
+use crate::generator::Generator;
 use crate::identify::{RealizationCache, identify, outcomes, velocities};
 use crate::table::MarkdownTable;
 use crate::{RowCallback, StudyError};
@@ -29,12 +30,15 @@ const DATA_SEED: u64 = 20081;
 /// The quantiles that are compared, by their places in a summary.
 const ENDS: [usize; 2] = [0, 6];
 const LEVELS: [f64; 2] = [0.025, 0.975];
+/// Resamplings of the evaluated draws, for the standard errors of what they give.
+const RESAMPLINGS: u64 = 400;
 /// Rows are reported each time that this number of draws has been evaluated.
 const REPORTED: usize = 100;
 
 /// Compares the posterior of the example's data with that of exact importance sampling:
-/// mean, standard deviation and the ends of the 95 % interval of each quantity, and their differences
-/// in standard deviations of the posterior. `realizations` is the number of draws.
+/// mean, standard deviation and the ends of the 95 % interval of each quantity by importance sampling,
+/// and how far the posterior's are off with the standard error of importance sampling, both in
+/// standard deviations of the posterior. `realizations` is the number of draws.
 ///
 /// # Errors
 /// If a point has no ensemble.
@@ -125,21 +129,14 @@ fn effective(weighted: &[(Point, f64)]) -> f64 {
 /// Returns the table of both posteriors.
 fn compared(posterior: &Posterior, weighted: &[(Point, f64)]) -> MarkdownTable {
     let mut table = MarkdownTable::new(&[
-        "quantity",
-        "mean",
-        "difference",
-        "s.d.",
-        "difference",
-        "2.5 %",
-        "difference",
-        "97.5 %",
-        "difference",
-        "expected by chance",
+        "quantity", "mean", "off by", "s.d.", "off by", "2.5 %", "off by", "97.5 %", "off by",
     ]);
-    let effective = effective(weighted);
     for k in 0..QUANTITIES {
         let found = posterior.parameters.get(k).unwrap_or(&posterior.bulk_velocity);
-        let exact = exact(weighted, k);
+        let values: Vec<(f64, f64)> =
+            weighted.iter().map(|(point, weight)| (quantity(point, k), *weight)).collect();
+        let errors = standard_errors(&values, k as u64);
+        let exact = exact(values);
         let found = [
             found.mean,
             found.standard_deviation,
@@ -147,30 +144,68 @@ fn compared(posterior: &Posterior, weighted: &[(Point, f64)]) -> MarkdownTable {
             found.quantiles[ENDS[1]],
         ];
         let mut row = vec![name(k)];
-        for (exact_value, found) in exact.iter().zip(found) {
+        for ((exact_value, found), error) in exact.iter().zip(found).zip(errors) {
+            let off = (found - exact_value) / exact[1];
             row.push(format!("{exact_value:.5e}"));
-            row.push(format!("{:+.3}", (found - exact_value) / exact[1]));
+            row.push(format!("{off:+.3} ± {:.3}", error / exact[1]));
         }
-        row.push(format!("{:.3}", 1.0 / effective.sqrt()));
         table.push(row);
     }
     table
 }
 
-/// Returns mean, standard deviation and the quantiles of quantity number `k`.
-fn exact(weighted: &[(Point, f64)], k: usize) -> [f64; 4] {
-    let mut values: Vec<(f64, f64)> =
-        weighted.iter().map(|(point, weight)| (quantity(point, k), *weight)).collect();
+/// Returns the standard errors of [`exact`], by resampling the draws with their weights.
+fn standard_errors(values: &[(f64, f64)], number: u64) -> [f64; 4] {
+    let mut sums = [[0.0; 2]; 4];
+    for resampling in 0..RESAMPLINGS {
+        let mut generator = Generator::for_index(number, resampling);
+        let mut drawn = || {
+            let place = generator.between(0.0, values.len() as f64) as usize;
+            values[place.min(values.len() - 1)]
+        };
+        let found = exact((0..values.len()).map(|_| drawn()).collect());
+        for (sums, value) in sums.iter_mut().zip(found) {
+            *sums = [sums[0] + value, sums[1] + value * value];
+        }
+    }
+    let count = RESAMPLINGS as f64;
+    sums.map(|[sum, square]| ((square - sum * sum / count) / (count - 1.0)).max(0.0).sqrt())
+}
+
+/// Returns mean, standard deviation and the quantiles of weighted values.
+fn exact(mut values: Vec<(f64, f64)>) -> [f64; 4] {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let mean: f64 = values.iter().map(|(value, weight)| weight * value).sum();
-    let square: f64 = values.iter().map(|(v, weight)| weight * ((v - mean) * (v - mean))).sum();
+    let total: f64 = values.iter().map(|(_, weight)| weight).sum();
+    let mean = values.iter().map(|(value, weight)| weight * value).sum::<f64>() / total;
+    let square =
+        values.iter().map(|(v, weight)| weight * ((v - mean) * (v - mean))).sum::<f64>() / total;
     let quantile = |level: f64| {
         let mut below = 0.0;
         let reached = values.iter().find(|(_, weight)| {
             below += weight;
-            below >= level
+            below >= level * total
         });
         reached.or(values.last()).map_or(f64::NAN, |one| one.0)
     };
     [mean, square.sqrt(), quantile(LEVELS[0]), quantile(LEVELS[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The error of a mean of n equal weights is σ/√n, that of an end √(0.025 · 0.975/n)/density.
+    #[test]
+    fn standard_errors_are_those_of_independent_draws() {
+        let mut generator = Generator::for_index(3, 0);
+        let values: Vec<(f64, f64)> =
+            (0..1000).map(|_| (generator.between(0.0, 1.0), 1e-3)).collect();
+        let [mean, _, low, high] = standard_errors(&values, 1);
+        let expected = (1.0 / 12.0_f64 / 1000.0).sqrt();
+        assert!((mean / expected - 1.0).abs() < 0.2, "{mean}");
+        let expected = (0.025 * 0.975 / 1000.0_f64).sqrt();
+        for end in [low, high] {
+            assert!((end / expected - 1.0).abs() < 0.4, "{end}");
+        }
+    }
 }

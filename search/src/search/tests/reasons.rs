@@ -142,9 +142,15 @@ fn a_compromise_with_priors_has_converged() {
     job.search.priors[6] = Some(Prior { value: 0.2, weight: 1.0 });
     let (status, reason, _) = ended(&job, outcomes);
     assert_eq!((status, reason.as_str()), (Status::Converged, ""));
-    // On a bound the reason says what is missed.
+    // On a bound it has missed the data, and so it has with data whose noise is far smaller.
     job.data = Some(Data::from_moments(2000.0, 0.03));
     let (status, reason, _) = ended(&job, outcomes);
-    assert_eq!(status, Status::Converged);
-    check(&reason, &["longitudinal_young_modulus is on its lower bound"]);
+    assert_eq!(status, Status::NotMatched);
+    check(&reason, &["longitudinal_young_modulus is on its lower bound", "widen the bounds"]);
+    let velocities = (0..1000).map(|k| 3900.0 * (1.0 + 0.02 * (f64::from(k) / 499.5 - 1.0)));
+    job.data = Some(Data::from_velocities(velocities.collect()));
+    job.search.priors[6] = Some(Prior { value: 0.2, weight: 1e9 });
+    let (status, reason, _) = ended(&job, outcomes);
+    assert_eq!(status, Status::NotMatched);
+    check(&reason, &["lower the weights of [search.priors]"]);
 }
