@@ -33,8 +33,8 @@ pub struct Posterior {
     /// Shape k of the generalised Pareto law of the largest of these weights (A. Vehtari et al.,
     /// J. Mach. Learn. Res. 25 (2024)): above 0.7 they are unreliable. `None` with too few.
     pub pareto_k: Option<f64>,
-    /// Error of the logarithm of the density due to the sampling of the model's velocities, root
-    /// mean square, nats.
+    /// Errors of the model's moments due to sampling, relative to the data's: square root of the sum of
+    /// both squares.
     pub sampling_error: f64,
     /// The free parameters, in the order of the correlations.
     pub free: Vec<Parameter>,

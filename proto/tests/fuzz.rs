@@ -168,8 +168,7 @@ fn row(number: u64) -> v1::EvaluationRow {
 
 /// A job of two free parameters with two starts.
 fn job_of_two_starts() -> JobSpecification {
-    let text =
-        "[data]\nvelocities = [3900.0, 3950.0, 4000.0]\n[search]\nstarts = 2\n[parameters]\n";
+    let text = "[data]\nvelocities = [3900.0, 3950.0, 4000.0, 3909.2, 3990.8]\n[search]\nstarts = 2\n[parameters]\n";
     let ranges = Parameter::ALL.map(|parameter| {
         let (name, value) = (parameter.name(), POINT.get(parameter));
         match parameter {

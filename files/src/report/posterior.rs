@@ -36,8 +36,8 @@ pub struct PosteriorReport {
     /// Shape k of the generalised Pareto law of the largest of these weights: above 0.7 they are
     /// unreliable; null with too few.
     pub pareto_k: Option<f64>,
-    /// Root mean square error of the logarithm of the density by the sampling of the model's
-    /// velocities, nats.
+    /// Errors of the model's moments due to sampling, relative to the data's: square root of the sum of
+    /// both squares.
     pub sampling_error: Option<f64>,
     /// The free parameters, in their units.
     #[schemars(transform = keyed_by_parameter)]

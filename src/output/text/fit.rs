@@ -3,7 +3,7 @@
 use osteon_common::job::{JobSpecification, Measurements, Objective, Range, SearchMethod};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::Status;
-use osteon_files::report::{Data, Identification, Moment, PosteriorReport};
+use osteon_files::report::{Identification, Moment, PosteriorReport};
 use osteon_search::search_box::{SearchBox, Side};
 
 use super::identified;
