@@ -150,7 +150,7 @@ impl Runs {
         let measured = format!("[data]\nvelocities = {velocities:?}\n");
         let identified = run_job("identified", "identify", &search(&measured, "starts = 2\n"));
         let groups = format!(
-            "[data.groups]\nlonely = [3900.0]\nleft = {velocities:?}\nright = [3800.0, 3900.0, 3950.0]\n"
+            "[data.groups]\nlonely = [3900.0]\nleft = {velocities:?}\nright = [3800.0, 3900.0, 3950.0, 3850.0, 3920.0]\n"
         );
         let grouped = run_job("grouped", "identify", &search(&groups, "starts = 2\n"));
         let propagated = run_job("propagated", "propagate", &job(8, 1));
