@@ -1,6 +1,6 @@
 //! Explanations of searches that end without a match.
 
-use osteon_common::job::Measurements;
+use osteon_common::job::{Measurements, PosteriorSettings, SearchMethod};
 use osteon_common::outcome::FailureKind;
 
 use super::*;
@@ -153,4 +153,27 @@ fn a_compromise_with_priors_has_converged() {
     let (status, reason, _) = ended(&job, outcomes);
     assert_eq!(status, Status::NotMatched);
     check(&reason, &["lower the weights of [search.priors]"]);
+}
+
+/// A job that asks for nothing but the posterior is judged by it.
+#[test]
+fn a_posterior_that_is_none_or_not_exact_has_not_converged() {
+    let mut job = specification(400);
+    job.search.method = SearchMethod::Posterior;
+    job.posterior = Some(PosteriorSettings { max_evaluations: 20, ..PosteriorSettings::default() });
+    let around = |mean: f64| {
+        let velocities = (0..40).map(|k| mean * (1.0 + 0.05 * (f64::from(k) / 19.5 - 1.0)));
+        Some(Data::from_velocities(velocities.collect()))
+    };
+    job.data = around(3900.0);
+    let (status, reason, result) = ended(&job, outcomes);
+    assert_eq!(status, Status::MaxEvaluations, "{reason}");
+    check(&reason, &["checked at 20 draws", "[posterior] max_evaluations"]);
+    assert!(result.conclusions.posterior.is_none_or(|found| !found.converged));
+    // Far beyond what the bounds allow.
+    job.data = around(90_000.0);
+    let (status, reason, result) = ended(&job, outcomes);
+    assert_eq!(status, Status::NotMatched, "{reason}");
+    check(&reason, &["there is no posterior", "widen them"]);
+    assert!(result.conclusions.posterior.is_none());
 }
