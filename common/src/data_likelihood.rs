@@ -59,7 +59,7 @@ pub struct DataLikelihood {
     /// Variance of the instrument, m²/s².
     instrument: f64,
     subjects: Subjects,
-    /// Velocities that may be wrong, which are not in the classes; `None` if there are none.
+    /// Velocities that may be wrong, which are not among those of the subjects; `None` if there are none.
     contamination: Option<Contamination>,
     /// Relative standard errors of the model's moments.
     model: [f64; 2],

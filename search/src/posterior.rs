@@ -143,7 +143,7 @@ struct Pending {
     used_for: PointUse,
 }
 
-/// What a point is evaluated for.
+/// The reason for evaluating a point.
 #[derive(Debug, Clone, Copy)]
 enum PointUse {
     /// It is a draw of the posterior, and checks the interpolation; with the interpolated logarithms of
