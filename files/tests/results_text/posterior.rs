@@ -120,6 +120,27 @@ fn the_posterior_of_each_group() {
     assert_eq!(value["groups"][1]["posterior"], Value::Null);
 }
 
+/// As on the terminal: not those of the best point.
+#[test]
+fn tables_of_groups_have_the_means_and_intervals_of_the_posteriors() {
+    let result = of_groups();
+    let text = results_csv::groups(&specification(), &result, &[]);
+    let rows: Vec<Vec<&str>> = text.lines().take(3).map(|line| line.split(',').collect()).collect();
+    let cells = |row: usize, name: &str| {
+        ["", "_lower", "_upper"].map(|end| {
+            let column = format!("{name}{end}");
+            rows[row][rows[0].iter().position(|found| *found == column).unwrap()]
+        })
+    };
+    assert_eq!(cells(1, "bulk_velocity"), ["4096.0", "1024.0", "8192.0"]);
+    assert_eq!(cells(1, "dispersion"), ["0.125", "0.03125", "0.25"]);
+    assert_eq!(cells(2, "bulk_velocity"), ["", "", ""]);
+    // Both ends are as far from the difference as those of both intervals together.
+    let compared = results_csv::comparison(&result);
+    let row = compared.lines().find(|line| line.starts_with("left,\"right")).unwrap();
+    assert!(row.ends_with(",0.0,-5120.0,5120.0,0.0,-0.15625,0.15625"), "{row}");
+}
+
 /// Results of earlier programs of the same schema do not have the key.
 #[test]
 fn a_result_without_the_key_is_read() {
