@@ -11,8 +11,8 @@
 //! - T: from a receiver's earliest possible arrival on, one period includes the first packet and
 //!   the large wave that the bone's face reflects: if that wrapped round, it would overlap the
 //!   first arrival, which is a thousand times smaller;
-//! - band: the pulse's spectrum is cut smoothly below [`WaveSampling::first_band`] in the first pass
-//!   and, where that is not enough, below [`WaveSampling::band`]: the same lines and more;
+//! - band: the pulse's spectrum is cut smoothly below the first of [`WaveSampling::bands`] in the
+//!   first pass and, where that is not enough, below the wider ones: the same lines and more;
 //! - the sum over k ends where g (x3 + x3S), g = √(k² - ω²/c1²), has damped the integrand away.
 //!
 //! High in the band only the tail of the pulse's kink at t = 0 remains. There a shorter period
@@ -45,6 +45,8 @@ const THIN_PLATE: f64 = 2000.0;
 const THIN_PLATE_POWER: f64 = 1.6;
 /// Largest widening of the band for a thin plate.
 const THIN_PLATE_MAX: f64 = 3.0;
+/// Maximum number of bands in which a bone is computed with one sampling.
+pub const BANDS: usize = 3;
 /// Ratio of the highest frequency of traces to the centre frequency: a trace is accurate to 1e-3 of
 /// its largest value.
 const TRACE_BAND: f64 = 12.0;
@@ -88,11 +90,11 @@ const APART: f64 = 2.2;
 pub enum Grade {
     /// Sufficient for most bones.
     Quick,
-    /// The same without thinning of frequencies and without leaving out slow waves: for bones whose
-    /// first arrival is small compared to the later waves.
+    /// The same with thinning of frequencies, and slow waves left out, only where the thorough grade
+    /// does it, too: for bones whose first arrival is small compared to the later waves.
     Plain,
-    /// For bones whose first arrival is weak or slow, or close to later ones: twice the band, and a
-    /// period and length that include the whole window before the direct wave.
+    /// For bones whose first arrival is weak or slow, or close to later ones: from the second band
+    /// on, with a period and length that include the whole window before the direct wave.
     Thorough,
 }
 
@@ -107,10 +109,9 @@ pub struct WaveSampling {
     pub frequency_step: f64,
     /// α, 1/s.
     pub damping: f64,
-    /// Highest frequency of the first pass, Hz.
-    pub first_band: f64,
-    /// Highest frequency, Hz.
-    pub band: f64,
+    /// Highest frequencies of the passes, Hz, ascending; a band equal to the one before is not
+    /// computed again.
+    pub bands: [f64; BANDS],
     /// Δk, rad/m.
     pub wavenumber_step: f64,
     /// √(k² - (ω/c1)²) at which the sum over wavenumbers ends, rad/m.
@@ -149,8 +150,9 @@ impl NominalSampling {
         match setup.solver.method {
             Method::Exact => {
                 let sampling = nominal(setup);
-                let pairs = sampling.pairs(sampling.first_band).round() as u64;
-                Some(Self { band: sampling.first_band, period: sampling.period, pairs })
+                let band = sampling.first_band();
+                let pairs = sampling.pairs(band).round() as u64;
+                Some(Self { band, period: sampling.period, pairs })
             }
             Method::Hybrid => None,
         }
@@ -168,7 +170,7 @@ pub fn first_grade(setup: &Setup) -> Grade {
 /// is sufficient, at the usual speeds of bone.
 pub fn pair_count(setup: &Setup) -> f64 {
     let sampling = nominal(setup);
-    sampling.pairs(sampling.first_band)
+    sampling.pairs(sampling.first_band())
 }
 
 /// Returns the lowest speed bin whose upper edge is at least `speed` (m/s); `None` above all bins,
@@ -262,8 +264,7 @@ impl WaveSampling {
         let fc = setup.probe.center_frequency;
         let period = TRACE_MARGIN * duration;
         let mut sampling = Self::new(setup, Grade::Thorough, speed, period, duration);
-        sampling.band = TRACE_BAND * setup.solver.refinement * thinness(setup) * fc;
-        sampling.first_band = sampling.band;
+        sampling.bands = [TRACE_BAND * setup.solver.refinement * thinness(setup) * fc; BANDS];
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
         sampling.unit = f64::INFINITY;
@@ -276,10 +277,10 @@ impl WaveSampling {
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let fc = setup.probe.center_frequency;
-        let (first_band, band) = relative_bands(grade, refinement, thinness(setup));
+        let bands = relative_bands(grade, refinement, thinness(setup));
         let (unit, evanescence) = match grade {
             Grade::Quick => (thinness(setup).min(1.4), EVANESCENCE),
-            Grade::Plain => (f64::INFINITY, EVANESCENCE),
+            Grade::Plain => (3.0, EVANESCENCE),
             // Finer sampling is also less truncated, slowly.
             Grade::Thorough => (
                 1.5 * refinement.max(2.0),
@@ -294,8 +295,7 @@ impl WaveSampling {
             period,
             frequency_step: 2.0 * PI / period,
             damping: WRAP_DAMPING / period,
-            first_band: first_band * fc,
-            band: band * fc,
+            bands: bands.map(|band| band * fc),
             wavenumber_step: 2.0 * PI / length,
             evanescent_limit: evanescence / heights,
             upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
@@ -305,11 +305,21 @@ impl WaveSampling {
         }
     }
 
-    /// Returns the number of frequencies below the band's end, n = 0 … this - 1; [`WaveSampling::runs`]
+    /// Returns the highest frequency of the first pass, Hz.
+    pub fn first_band(&self) -> f64 {
+        self.bands[0]
+    }
+
+    /// Returns the highest frequency of all, Hz.
+    pub fn whole_band(&self) -> f64 {
+        self.bands[BANDS - 1]
+    }
+
+    /// Returns the number of frequencies below the whole band's end, n = 0 … this - 1; [`WaveSampling::runs`]
     /// lists those that are computed.
     pub fn frequencies(&self) -> usize {
         // The taper vanishes at the band's end.
-        (self.band * self.period).ceil() as usize
+        (self.whole_band() * self.period).ceil() as usize
     }
 
     /// Returns the angular frequency of sample `n`, rad/s.
@@ -384,13 +394,14 @@ impl WaveSampling {
     }
 }
 
-/// Highest frequencies of the first pass, and overall, as multiples of the centre frequency.
-fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> (f64, f64) {
+/// Returns the highest frequencies of the passes, as multiples of the centre frequency.
+fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> [f64; BANDS] {
     let wide = (10.5 * thinness).min(24.0);
     match grade {
-        Grade::Quick | Grade::Plain => (5.25 * thinness * refinement, wide * refinement),
+        Grade::Quick | Grade::Plain => [5.25 * thinness, wide, 2.0 * wide].map(|f| f * refinement),
         // 23 for a thick plate at refinement 5.
-        Grade::Thorough => (wide * refinement.sqrt(), wide * refinement.sqrt()),
+        Grade::Thorough if refinement > 1.0 => [wide * refinement.sqrt(); BANDS],
+        Grade::Thorough => [wide, wide, 2.0 * wide].map(|f| f * refinement.sqrt()),
     }
 }
 

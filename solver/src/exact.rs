@@ -1,10 +1,11 @@
 //! Exact layers in the (frequency, wavenumber) domain.
 //!
 //! A bone is computed in one or several passes. The first pass is quick and sufficient for most
-//! bones. If its estimated error is large, the band is widened. If the first arrival is small
-//! compared to later waves, the same is done without thinning. If the pick is unreliable (late,
-//! weak, off the line of the others, or missing), the bone is computed again with a thorough
-//! sampling, and if even that finds nothing or its estimated error is large, with a refined one.
+//! bones. As long as its estimated error is large, the band is widened, at most twice. If the first
+//! arrival is small compared to later waves, the same is done without thinning. If the pick is
+//! unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
+//! a thorough sampling, whose band is widened if it finds nothing or its estimated error is large.
+//! If the estimated error is still very large, a refined pass is made.
 //! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
 //! (the second replaces it). The tables are made for a geometric grid of speeds, whose intervals
 //! are called speed bins; near the edge of a bin the results of both neighbours are blended, too.
@@ -26,26 +27,29 @@ pub(crate) mod table_cache;
 pub(crate) mod tables;
 pub(crate) mod traces;
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use osteon_common::case::{Bone, Setup};
-use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{self, Grade};
 
 use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace};
 use crate::exact::plate::Plate;
-use crate::exact::table_cache::{CacheBytes, PAIRS_MARGIN, TableCache, TablesRef};
+use crate::exact::response::Spectra;
+use crate::exact::table_cache::{PAIRS_MAX, TableCache, TableMemory, TablesRef};
 use crate::isa::{Isa, Kernel};
 use crate::medium::Medium;
 use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::Vector;
 
-/// Estimated errors, at refinement 1, between which the weight of the pass with the
-/// wider band rises from 0 to 1.
-const NARROW_BAND: (f64, f64) = (4.5e-5, 7.5e-5);
-/// The same for every other pass.
-const LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
-/// Refinement of the last pass.
+/// Estimated errors, at refinement 1, between which the weight of the pass with the next wider band
+/// rises from 0 to 1.
+const LARGE_ERROR: (f64, f64) = (4.5e-5, 7.5e-5);
+/// The same for the refined pass, which is the last.
+const VERY_LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
+/// Factor of the refinement in the refined pass.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
 /// between which the weight of the next pass rises: a quick period has little room for a late
@@ -74,22 +78,21 @@ pub(crate) struct Exact {
     plain: TableCache,
     thorough: TableCache,
     refined: TableCache,
-    cache_bytes: CacheBytes,
 }
 
 impl Exact {
     pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
         let mut refined = *setup;
         refined.solver.refinement *= LAST_REFINEMENT;
+        let memory = Arc::new(TableMemory::default());
         Self {
             setup: *setup,
             distances: sampling::distances(setup).collect(),
             isa,
-            quick: TableCache::new(setup, Grade::Quick),
-            plain: TableCache::new(setup, Grade::Plain),
-            thorough: TableCache::new(setup, Grade::Thorough),
-            refined: TableCache::new(&refined, Grade::Thorough),
-            cache_bytes: CacheBytes::default(),
+            quick: TableCache::new(setup, Grade::Quick, &memory),
+            plain: TableCache::new(setup, Grade::Plain, &memory),
+            thorough: TableCache::new(setup, Grade::Thorough, &memory),
+            refined: TableCache::new(&refined, Grade::Thorough, &memory),
         }
     }
 
@@ -136,7 +139,7 @@ impl Exact {
         index: usize,
         speed: f64,
     ) -> Result<TablesRef<'a>, Failure> {
-        cache.tables(index, &self.cache_bytes).ok_or_else(|| too_large(speed))
+        cache.tables(index).ok_or_else(|| too_large(speed))
     }
 
     /// Returns an estimated error as it compares with the constants above, which are meant for
@@ -156,8 +159,7 @@ impl Exact {
             margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
         }
         let ratio = found.pick.ratio / self.setup.picking.threshold;
-        rise(self.counted(found.error), LARGE_ERROR)
-            .max(rise(delay * fc, LATE))
+        rise(delay * fc, LATE)
             .max(rise(found.pick.residual * fc, OFF_LINE))
             .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))
             .max(1.0 - rise(ratio, WEAK))
@@ -222,7 +224,7 @@ fn too_large(speed: f64) -> Failure {
         detail: format!(
             "waves of up to {} m/s need more than {:.0e} (frequency, wavenumber) pairs",
             readable(speed),
-            PAIRS_MARGIN * SAMPLING_PAIRS_MAX
+            PAIRS_MAX
         ),
     }
 }
@@ -262,66 +264,67 @@ impl BonePasses<'_> {
         }
         let weight = found.as_ref().map_or(1.0, |found| exact.fallback_weight(found, self.speed));
         if weight > 0.0 {
-            let last = self.thorough_or_refined();
-            found = exact.merged(found, last, weight);
+            let thorough = self.thorough(&exact.thorough);
+            found = exact.merged(found, thorough, weight);
+        }
+        let error = found.as_ref().map_or(0.0, |found| exact.counted(found.error));
+        let weight = rise(error, VERY_LARGE_ERROR);
+        if weight > 0.0 {
+            let refined = self.thorough(&exact.refined);
+            found = exact.merged_if_possible(found, refined, weight);
         }
         found
     }
 
-    /// Makes a pass in the first band, and one in the whole band if that is needed.
+    /// Makes the passes of a quick grade.
     fn quick(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
+        self.exact.fill_plate(self.medium, &mut self.workspace.fast);
+        self.bands(bin, |workspace| (&mut workspace.fast, &mut workspace.spectra))
+    }
+
+    /// Makes the passes of a thorough grade.
+    fn thorough(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
+        self.exact.fill_plate(self.medium, &mut self.workspace.accurate);
+        self.bands(bin, |workspace| (&mut workspace.accurate, &mut workspace.spectra))
+    }
+
+    /// Makes a pass in the first band of a bin, and in the wider ones as far as they are needed;
+    /// `parts` returns the plate to be used, and the spectra.
+    fn bands<const TERMS: usize>(
+        &mut self,
+        bin: &BinTables,
+        parts: fn(&mut ExactWorkspace) -> (&mut Plate<TERMS>, &mut Spectra),
+    ) -> Result<Estimated, Failure> {
         let exact = self.exact;
-        let bin = &*exact.bin_tables(cache, self.bin, self.speed)?;
-        exact.fill_plate(self.medium, &mut self.workspace.fast);
         self.workspace.spectra.clear(&bin.tables);
-        self.fill(bin, 0, bin.first.lines);
+        let fill = |passes: &mut Self, lines: Range<usize>| {
+            let (plate, spectra) = parts(passes.workspace);
+            passes.pairs += bin.tables.pairs(lines.clone());
+            spectra.fill(exact.isa, &bin.tables, passes.medium, plate, lines);
+        };
+        fill(self, 0..bin.first.lines);
         let mut found = self.pass(bin, &bin.first);
-        let weight =
-            found.as_ref().map_or(1.0, |found| rise(exact.counted(found.error), NARROW_BAND));
-        if weight > 0.0 {
-            self.fill(bin, bin.first.lines, bin.whole.lines);
-            let wider = self.pass(bin, &bin.whole);
+        let mut lines = bin.first.lines;
+        for band in &bin.wider {
+            let weight = match &found {
+                Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
+                // Whether there is an arrival is decided by the widest band.
+                Err(Failure { kind, .. }) => f64::from(matches!(
+                    kind,
+                    FailureKind::NoArrival | FailureKind::InconsistentArrival
+                )),
+            };
+            if weight == 0.0 {
+                break;
+            }
+            fill(self, lines..band.lines);
+            lines = band.lines;
+            let wider = self.pass(bin, band);
             found = exact.merged(found, wider, weight);
         }
         found
-    }
-
-    /// Makes a thorough pass, and a refined one if that is needed.
-    fn thorough_or_refined(&mut self) -> Result<Estimated, Failure> {
-        let exact = self.exact;
-        let thorough = self.thorough(&exact.thorough);
-        let weight = match &thorough {
-            Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
-            // Whether there is an arrival is decided by the best pass.
-            Err(Failure {
-                kind: FailureKind::NoArrival | FailureKind::InconsistentArrival,
-                ..
-            }) => 1.0,
-            Err(_) => 0.0,
-        };
-        if weight == 0.0 {
-            return thorough;
-        }
-        let refined = self.thorough(&exact.refined);
-        exact.merged_if_possible(thorough, refined, weight)
-    }
-
-    /// Makes one thorough pass.
-    fn thorough(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
-        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
-        let ExactWorkspace { accurate, spectra, .. } = &mut *self.workspace;
-        self.exact.fill_plate(self.medium, accurate);
-        spectra.clear(&bin.tables);
-        spectra.fill(self.exact.isa, &bin.tables, self.medium, accurate, 0..bin.whole.lines);
-        self.pairs += bin.whole.sampled.pairs;
-        self.pass(bin, &bin.whole)
-    }
-
-    /// Computes lines `from` … `to` - 1 of a quick sampling's spectra.
-    fn fill(&mut self, bin: &BinTables, from: usize, to: usize) {
-        let ExactWorkspace { fast, spectra, .. } = &mut *self.workspace;
-        spectra.fill(self.exact.isa, &bin.tables, self.medium, fast, from..to);
-        self.pairs += bin.tables.pairs(from..to);
     }
 
     fn pass(&mut self, bin: &BinTables, band: &Band) -> Result<Estimated, Failure> {

@@ -122,7 +122,7 @@ fn check_traces(solver: &Solver, bone: &Bone) {
     let duration = 2.0 / solver.setup().probe.center_frequency;
     let sampling =
         WaveSampling::for_traces(solver.setup(), speed_bound(solver.setup(), bone), duration);
-    if sampling.pairs(sampling.band) > PAIRS_MAX {
+    if sampling.pairs(sampling.whole_band()) > PAIRS_MAX {
         return;
     }
     match solver.traces(bone, duration, duration / 16.0) {

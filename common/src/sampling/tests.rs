@@ -61,7 +61,7 @@ fn the_repeated_source_is_heard_after_the_window() {
 fn the_taper_falls_from_one_to_nothing() {
     let sampling = WaveSampling::for_speed_bin(&Setup::default(), 18, Grade::Quick);
     let weights: Vec<f64> = (0..sampling.frequencies())
-        .map(|n| sampling.taper(n, velocity_taper(sampling.band)))
+        .map(|n| sampling.taper(n, velocity_taper(sampling.whole_band())))
         .collect();
     assert_eq!(weights[0], 1.0);
     assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]));
@@ -73,9 +73,10 @@ fn the_count_is_estimated_from_above_where_it_is_not_counted() {
     for refinement in [1.0, 4.0] {
         let setup = setup(|s| s.solver.refinement = refinement);
         let sampling = WaveSampling::for_traces(&setup, 4000.0, 16e-6);
-        let per_frequency =
-            (PI * sampling.band / 1500.0 + sampling.evanescent_limit) / sampling.wavenumber_step;
-        let ratio = sampling.band * sampling.period * per_frequency / sampling.pairs(sampling.band);
+        let per_frequency = (PI * sampling.whole_band() / 1500.0 + sampling.evanescent_limit)
+            / sampling.wavenumber_step;
+        let ratio = sampling.whole_band() * sampling.period * per_frequency
+            / sampling.pairs(sampling.whole_band());
         assert!((0.9..1.7).contains(&ratio), "{ratio}");
     }
     assert!(pair_count(&setup(|s| s.probe.receivers.pitch = 10.0)) > SAMPLING_PAIRS_MAX);

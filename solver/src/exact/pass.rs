@@ -1,5 +1,7 @@
-//! One pass (pass) at the first arrival: extrema of the signals in one band, the pick, and the
+//! One pass: extrema of the signals in one band, the pick, and the
 //! estimate of its error.
+
+use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::sampling::{self, RUN, WaveSampling, velocity_taper};
@@ -9,6 +11,7 @@ use crate::exact::Exact;
 use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::response::Spectra;
 use crate::exact::signal::{Signal, Slopes, TimeGrid};
+use crate::exact::table_cache::TableMemory;
 use crate::exact::tables::Tables;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -37,10 +40,10 @@ const ESTIMATE_FACTOR: f64 = 1.3;
 pub(crate) struct BinTables {
     pub(crate) tables: Tables,
     grid: TimeGrid,
-    /// The band of a first pass.
+    /// The band of the first pass.
     pub(crate) first: Band,
-    /// The whole band.
-    pub(crate) whole: Band,
+    /// The bands of further passes, each wider than the one before.
+    pub(crate) wider: Vec<Band>,
 }
 
 /// One band of a bin.
@@ -89,22 +92,28 @@ impl Estimated {
 }
 
 impl BinTables {
-    /// Returns the memory of a bin with this many pairs that keeps its tables, bytes.
-    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling, pairs: f64) -> u64 {
+    /// Returns the memory of a bin that is kept, without the contents of its lines, bytes.
+    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling) -> u64 {
         let lines = sampling.runs().len() * RUN;
-        (Tables::bytes(setup, sampling, pairs) + TimeGrid::bytes(setup, lines)) as u64
+        (Tables::bytes(setup, sampling) + TimeGrid::bytes(setup, lines)) as u64
     }
 
-    /// Creates the tables of a bin. `keep`: whether they are kept, or recomputed whenever they are
+    /// Creates the tables of a bin, which are kept in `memory`, or recomputed whenever they are
     /// needed.
-    pub(crate) fn new(setup: &Setup, sampling: WaveSampling, keep: bool) -> Self {
-        let whole = velocity_taper(sampling.band);
+    pub(crate) fn new(
+        setup: &Setup,
+        sampling: WaveSampling,
+        memory: Option<Arc<TableMemory>>,
+    ) -> Self {
+        let whole = velocity_taper(sampling.whole_band());
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
-        let tables = Tables::new(setup, sampling, 1.0, whole, keep);
+        let keep = memory.is_some();
+        let tables = Tables::new(setup, sampling, 1.0, whole, memory);
         let grid = TimeGrid::new(setup, &tables, keep);
-        let first = Band::new(&tables, sampling.first_band);
-        let whole = Band::new(&tables, sampling.band);
-        Self { tables, grid, first, whole }
+        let first = Band::new(&tables, sampling.first_band());
+        let wider = sampling.bands.windows(2).filter(|pair| pair[0] < pair[1]);
+        let wider = wider.map(|pair| Band::new(&tables, pair[1])).collect();
+        Self { tables, grid, first, wider }
     }
 }
 

@@ -79,11 +79,12 @@ pub(crate) fn respond<const TERMS: usize>(
     responses: &mut Vec<ComplexLanes>,
 ) {
     responses.clear();
+    let kept = tables.kept(line);
     let mut scratch = None;
     for b in 0..line.blocks {
         let k = tables.wavenumbers(b);
         isa.run(Prepare { plate, medium, s: line.s, k: (k.0[0], k.0[LANES - 1]) });
-        let (block, echo) = tables.block(line, b, &mut scratch);
+        let (block, echo) = tables.block(line, kept, b, &mut scratch);
         let inertia = line.inertia;
         responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
     }

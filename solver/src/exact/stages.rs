@@ -9,7 +9,7 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::{self, Grade, SPEED_BINS};
 
 use crate::exact::Exact;
-use crate::exact::pass::{Band, BinTables, ExactWorkspace};
+use crate::exact::pass::{Band, ExactWorkspace};
 use crate::exact::response::respond;
 use crate::exact::table_cache::TablesRef;
 use crate::isa::Isa;
@@ -85,14 +85,9 @@ impl Stages {
     }
 }
 
-/// Returns the first pass of a bin.
-fn band(bin: &BinTables, accurate: bool) -> &Band {
-    if accurate { &bin.whole } else { &bin.first }
-}
-
 impl<'b> Filled<'b> {
     fn band(&self) -> &Band {
-        band(&self.bin, self.accurate)
+        &self.bin.first
     }
 
     /// Returns the number of (frequency, wavenumber) pairs.
@@ -136,8 +131,8 @@ impl<'b> Summed<'_, 'b> {
     /// # Errors
     /// If a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
-        let Filled { exact, bin, accurate, speed, memory, .. } = &mut *self.0;
-        exact.observe(*speed, bin, band(bin, *accurate), &mut memory.exact)?;
+        let Filled { exact, bin, speed, memory, .. } = &mut *self.0;
+        exact.observe(*speed, bin, &bin.first, &mut memory.exact)?;
         Ok(Observed(self.0))
     }
 }

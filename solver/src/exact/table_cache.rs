@@ -2,34 +2,37 @@
 //! a sampling for waves up to its upper edge, and its tables are made when a bone first needs them.
 
 use std::ops::Deref;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{Grade, SPEED_BINS, WaveSampling};
+use osteon_common::sampling::{BANDS, Grade, SPEED_BINS, WaveSampling};
 
 use crate::exact::pass::BinTables;
 
 /// A bone may need this many times the maximum number of pairs of the setup's usual sampling before
 /// it fails.
-pub(crate) const PAIRS_MARGIN: f64 = 8.0;
-/// Memory for tables that one solver keeps, bytes; those of further bins are recomputed when
-/// needed.
-const CACHE_BYTES_MAX: u64 = 24_000_000;
+const PAIRS_MARGIN: f64 = 8.0;
+/// Maximum number of pairs of a bone.
+pub(crate) const PAIRS_MAX: f64 = PAIRS_MARGIN * SAMPLING_PAIRS_MAX;
+/// Memory for tables that one solver keeps, bytes; further ones are recomputed when needed, which
+/// takes several times as long as what they are for.
+const TABLE_BYTES_MAX: u64 = 48_000_000;
 
 /// Samplings of one grade, by speed.
 #[derive(Debug)]
 pub(crate) struct TableCache {
     setup: Setup,
     grade: Grade,
+    memory: Arc<TableMemory>,
     /// Each slot is filled when a bone first needs it.
     slots: [OnceLock<Slot>; SPEED_BINS],
 }
 
 /// Memory of the tables that all caches of a solver keep, bytes.
 #[derive(Debug, Default)]
-pub(crate) struct CacheBytes(AtomicU64);
+pub(crate) struct TableMemory(AtomicU64);
 
 /// Tables that are cached, or that were made for one pass.
 #[derive(Debug)]
@@ -49,39 +52,50 @@ enum Slot {
 }
 
 impl TableCache {
-    pub(crate) fn new(setup: &Setup, grade: Grade) -> Self {
-        Self { setup: *setup, grade, slots: [const { OnceLock::new() }; SPEED_BINS] }
+    /// Creates the cache of one grade; `memory` is that of all caches of a solver.
+    pub(crate) fn new(setup: &Setup, grade: Grade, memory: &Arc<TableMemory>) -> Self {
+        let memory = Arc::clone(memory);
+        Self { setup: *setup, grade, memory, slots: [const { OnceLock::new() }; SPEED_BINS] }
     }
 
     /// Returns the tables of the speed bin at `index`, unless it is too large.
-    pub(crate) fn tables(&self, index: usize, bytes: &CacheBytes) -> Option<TablesRef<'_>> {
-        match self.slots.get(index)?.get_or_init(|| self.slot(index, bytes)) {
+    pub(crate) fn tables(&self, index: usize) -> Option<TablesRef<'_>> {
+        match self.slots.get(index)?.get_or_init(|| self.slot(index)) {
             Slot::Tables(bin) => Some(TablesRef::Cached(bin)),
             Slot::SamplingOnly(sampling) => {
-                Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, false))))
+                Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, None))))
             }
             Slot::TooLarge => None,
         }
     }
 
-    fn slot(&self, index: usize, bytes: &CacheBytes) -> Slot {
-        let sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade);
-        let pairs = sampling.pairs(sampling.band);
-        if pairs > PAIRS_MARGIN * SAMPLING_PAIRS_MAX || pairs.is_nan() {
+    fn slot(&self, index: usize) -> Slot {
+        let mut sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade);
+        let mut pairs = sampling.pairs(sampling.whole_band());
+        // The widest bands are left out where they are too large.
+        for narrower in (0..BANDS - 1).rev() {
+            if pairs > PAIRS_MAX {
+                let band = sampling.bands[narrower];
+                sampling.bands[narrower + 1..].fill(band);
+                pairs = sampling.pairs(sampling.whole_band());
+            }
+        }
+        if pairs > PAIRS_MAX || pairs.is_nan() {
             return Slot::TooLarge;
         }
-        if bytes.reserve(BinTables::bytes(&self.setup, &sampling, pairs)) {
-            Slot::Tables(Box::new(BinTables::new(&self.setup, sampling, true)))
+        if self.memory.reserve(BinTables::bytes(&self.setup, &sampling)) {
+            let memory = Some(Arc::clone(&self.memory));
+            Slot::Tables(Box::new(BinTables::new(&self.setup, sampling, memory)))
         } else {
             Slot::SamplingOnly(Box::new(sampling))
         }
     }
 }
 
-impl CacheBytes {
+impl TableMemory {
     /// Reserves this much memory; returns whether the limit allows it.
-    fn reserve(&self, bytes: u64) -> bool {
-        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= CACHE_BYTES_MAX;
+    pub(crate) fn reserve(&self, bytes: u64) -> bool {
+        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= TABLE_BYTES_MAX;
         if !may {
             self.0.fetch_sub(bytes, Ordering::Relaxed);
         }
@@ -124,17 +138,16 @@ mod tests {
         let setup = Setup::default();
         let ensemble = Ensemble::new(&OPTIMUM, 7).unwrap();
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
-        let (keeps, keeps_none) =
-            (Exact::new(&setup, Isa::fastest()), Exact::new(&setup, Isa::fastest()));
-        assert!(keeps_none.cache_bytes.reserve(CACHE_BYTES_MAX));
-        assert_eq!(bits(&keeps_none, &bones), bits(&keeps, &bones));
-        let kept = |exact: &Exact| {
-            let slots = exact.quick.slots.iter().filter_map(OnceLock::get);
-            slots.filter(|slot| matches!(slot, Slot::Tables(_))).count()
-        };
-        assert_eq!((kept(&keeps_none), kept(&keeps) > 0), (0, true));
-        let held = |exact: &Exact| exact.cache_bytes.0.load(Ordering::Relaxed);
-        assert_eq!(held(&keeps_none), CACHE_BYTES_MAX);
-        assert!(held(&keeps) < CACHE_BYTES_MAX, "{}", held(&keeps));
+        let keeps = Exact::new(&setup, Isa::fastest());
+        let expected = bits(&keeps, &bones);
+        let held = |exact: &Exact| exact.quick.memory.0.load(Ordering::Relaxed);
+        assert!(held(&keeps) < TABLE_BYTES_MAX, "{}", held(&keeps));
+        // No bin is kept; some bins and lines are.
+        for free in [0, held(&keeps) / 4, held(&keeps) / 2] {
+            let keeps_few = Exact::new(&setup, Isa::fastest());
+            assert!(keeps_few.quick.memory.reserve(TABLE_BYTES_MAX - free));
+            assert_eq!(bits(&keeps_few, &bones), expected, "{free} bytes free");
+            assert!(held(&keeps_few) <= TABLE_BYTES_MAX, "{}", held(&keeps_few));
+        }
     }
 }

@@ -3,11 +3,13 @@
 
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
 use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling, distances};
 
 use crate::complex::Complex;
+use crate::exact::table_cache::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 
@@ -26,6 +28,8 @@ pub(crate) struct Tables {
     receivers: usize,
     /// Maximum number of blocks of a line.
     blocks: usize,
+    /// Memory in which lines are kept; without it they are recomputed whenever they are needed.
+    memory: Option<Arc<TableMemory>>,
 }
 
 /// One complex frequency.
@@ -41,10 +45,15 @@ pub(crate) struct Line {
     pub(crate) pulse: Complex,
     /// Number of blocks of wavenumbers; none if the line is not needed.
     pub(crate) blocks: usize,
-    /// The blocks, unless they would take too much memory.
-    kept: Vec<Block>,
-    /// exp(-2 g h1) of the kept blocks if echoes of the coupling's outer face matter, otherwise
-    /// empty.
+    /// Filled when the line is first needed; remains empty if it would take too much memory.
+    kept: OnceLock<KeptLine>,
+}
+
+/// Contents of a line that is kept.
+#[derive(Debug, Default)]
+pub(crate) struct KeptLine {
+    blocks: Vec<Block>,
+    /// exp(-2 g h1) of the blocks if echoes of the coupling's outer face matter, otherwise empty.
     echoes: Vec<ComplexLanes>,
 }
 
@@ -60,24 +69,23 @@ pub(crate) struct Block {
 }
 
 impl Tables {
-    /// Returns the memory of tables of this many pairs that are kept, bytes.
-    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling, pairs: f64) -> f64 {
-        let a_pair = (size_of::<Block>() + size_of::<ComplexLanes>()) / LANES;
+    /// Returns the memory of tables without their lines' contents, bytes.
+    pub(crate) fn bytes(setup: &Setup, sampling: &WaveSampling) -> f64 {
         let highest = sampling.runs().iter().flat_map(|run| run.frequencies()).max().unwrap_or(0);
         let cosines = sampling.wavenumbers(highest) * setup.probe.receivers.count as usize;
-        pairs * a_pair as f64 + (cosines * size_of::<f64>()) as f64
+        (cosines * size_of::<f64>()) as f64
     }
 
     /// Creates the tables for a pulse of the given amplitude.
     ///
-    /// `taper` cuts the whole band; `keep`: whether blocks are kept, or recomputed whenever they
-    /// are needed.
+    /// `taper` cuts the whole band; lines are kept in `memory`, or recomputed whenever they are
+    /// needed.
     pub(crate) fn new(
         setup: &Setup,
         sampling: WaveSampling,
         amplitude: f64,
         taper: (f64, f64),
-        keep: bool,
+        memory: Option<Arc<TableMemory>>,
     ) -> Self {
         let probe = &setup.probe;
         let runs = sampling.runs();
@@ -90,13 +98,7 @@ impl Tables {
         let lines: Vec<_> = numbers
             .iter()
             .zip(spectrum)
-            .map(|(&n, pulse)| {
-                let mut line = Line::new(setup, &sampling, n, pulse, taper);
-                if keep {
-                    line.keep(setup, &sampling);
-                }
-                line
-            })
+            .map(|(&n, pulse)| Line::new(setup, &sampling, n, pulse, taper))
             .collect();
         let blocks = lines.iter().map(|line| line.blocks).max().unwrap_or(0);
         let positions: Vec<f64> = distances(setup).collect();
@@ -119,19 +121,31 @@ impl Tables {
             cosines,
             receivers: positions.len(),
             blocks,
+            memory,
         }
     }
 
-    /// Returns block `b` of a line, from the tables or computed into `scratch`.
+    /// Returns the contents of a line, empty if they are not kept.
+    pub(crate) fn kept<'a>(&self, line: &'a Line) -> &'a KeptLine {
+        line.kept.get_or_init(|| match &self.memory {
+            Some(memory) if memory.reserve(line.bytes(&self.sampling)) => {
+                line.contents(&self.setup, &self.sampling)
+            }
+            _ => KeptLine::default(),
+        })
+    }
+
+    /// Returns block `b` of a line, from its contents or computed into `scratch`.
     #[inline(always)]
     pub(crate) fn block<'a>(
-        &'a self,
-        line: &'a Line,
+        &self,
+        line: &Line,
+        kept: &'a KeptLine,
         b: usize,
         scratch: &'a mut Option<(Block, ComplexLanes)>,
     ) -> (&'a Block, &'a ComplexLanes) {
-        if let Some(block) = line.kept.get(b) {
-            return (block, line.echoes.get(b).unwrap_or(&ComplexLanes::ZERO));
+        if let Some(block) = kept.blocks.get(b) {
+            return (block, kept.echoes.get(b).unwrap_or(&ComplexLanes::ZERO));
         }
         let (block, echo) = scratch.insert(line.block(&self.setup, &self.sampling, b));
         (block, echo)
@@ -192,26 +206,27 @@ impl Line {
         // Of the two signs of every frequency but zero, only one is summed: hence the sum's factor
         // 2.
         let share = if n == 0 { 0.5 } else { sampling.share(n) };
-        Self {
-            n,
-            s,
-            inertia,
-            pulse: pulse.scale(share),
-            blocks,
-            kept: Vec::new(),
-            echoes: Vec::new(),
-        }
+        Self { n, s, inertia, pulse: pulse.scale(share), blocks, kept: OnceLock::new() }
     }
 
-    /// Computes and keeps all blocks.
-    fn keep(&mut self, setup: &Setup, sampling: &WaveSampling) {
+    /// Returns the memory of the line's contents, bytes.
+    fn bytes(&self, sampling: &WaveSampling) -> u64 {
+        let echo = if sampling.upper_echoes { size_of::<ComplexLanes>() } else { 0 };
+        (self.blocks * (size_of::<Block>() + echo)) as u64
+    }
+
+    /// Computes all blocks.
+    fn contents(&self, setup: &Setup, sampling: &WaveSampling) -> KeptLine {
+        let mut kept = KeptLine::default();
+        kept.blocks.reserve_exact(self.blocks);
         for b in 0..self.blocks {
             let (block, echo) = self.block(setup, sampling, b);
-            self.kept.push(block);
+            kept.blocks.push(block);
             if sampling.upper_echoes {
-                self.echoes.push(echo);
+                kept.echoes.push(echo);
             }
         }
+        kept
     }
 
     /// Computes one block, and exp(-2 g h1) if echoes of the coupling's outer face matter,

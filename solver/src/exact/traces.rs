@@ -126,13 +126,13 @@ impl Solver {
         let fluids =
             self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
         let sampling = WaveSampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
-        let pairs = sampling.pairs(sampling.band);
+        let pairs = sampling.pairs(sampling.whole_band());
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Err(TraceError::TooLong { duration, pairs });
         }
         let amplitude = self.setup().probe.amplitude;
-        let cut = trace_taper(sampling.band);
-        let tables = Tables::new(self.setup(), sampling, amplitude, cut, false);
+        let cut = trace_taper(sampling.whole_band());
+        let tables = Tables::new(self.setup(), sampling, amplitude, cut, None);
         let taper = tables.taper(cut);
         spectra.clear(&tables);
         spectra.fill(self.isa(), &tables, &medium, &mut plate, 0..tables.lines.len());
