@@ -12,7 +12,7 @@ use crate::results::DataSummary;
 use crate::robust::outliers;
 
 pub use self::few::{FewIntervals, intervals_of_data};
-pub use self::intervals::moment_intervals;
+pub use self::intervals::{intervals_of_moments, moment_intervals};
 pub use self::kolmogorov::{FittedMoments, kolmogorov_test, predictive_test};
 pub use self::lattice::rounding;
 
@@ -28,7 +28,10 @@ impl DataSummary {
         Self {
             moments: data.moments(set),
             count: given.map(|given| given.velocities.len() as u64),
-            intervals: given.as_ref().and_then(moment_intervals),
+            intervals: match &given {
+                Some(given) => moment_intervals(given),
+                None => intervals_of_moments(data),
+            },
             rounding: given.and_then(|given| rounding(given.velocities)),
             outlier_count: outliers.len() as u64,
             outliers: outliers.into_iter().take(limits::OUTLIERS_LISTED_MAX).collect(),

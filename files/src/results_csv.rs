@@ -186,7 +186,9 @@ fn reason(group: &GroupResult) -> &str {
     let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
     let unknown = match (&group.best, &group.conclusions.inference) {
         (None, _) => "no point was feasible",
-        (Some(_), None) => "the derivatives are not known: no intervals",
+        (Some(_), None) if group.conclusions.posterior.is_none() => {
+            "the derivatives are not known: no intervals"
+        }
         (Some(_), Some(found)) if !found.matched => {
             "the model does not match the data within their noise: no intervals"
         }

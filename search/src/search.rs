@@ -347,8 +347,11 @@ impl Summary {
         let data = specification.data.as_ref();
         let given = data.and_then(|data| data.set(row.role.group as usize));
         let measured = given.map(|set| set.velocities);
-        // The test holds for independent velocities with no scatter but the model's.
-        let tested = given.filter(|set| set.subjects.is_none() && set.repeatability == 0.0);
+        // The test holds for independent velocities with no scatter but the model's, and for a
+        // model that was fitted to them; without a search, the best point is a mere draw.
+        let tested = given.filter(|set| {
+            specification.is_searched() && set.subjects.is_none() && set.repeatability == 0.0
+        });
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
         let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
         let set = row.role.group as usize;

@@ -276,15 +276,12 @@ fn what_the_data_say_is_shown_with_its_noise() {
 }
 
 #[test]
-fn intervals_without_the_datas_noise_are_called_too_narrow() {
-    let json =
-        identified(true).replace("\"data\":{\"coefficient", "\"data\":null,\"_\":{\"coefficient");
-    let mut value: serde_json::Value = serde_json::from_str(&json).unwrap();
-    value["identified"]["noise"]["data"] = serde_json::Value::Null;
+fn starts_that_end_at_one_point_are_said_to_do_so() {
+    let mut value: serde_json::Value = serde_json::from_str(&identified(true)).unwrap();
+    value["solutions"]["spread"]["parameters"]["density"]["largest"] = 1599.9.into();
     let text = unwrapped(&shown(JobKind::Identification, &THREE, &value.to_string()));
-    let expected = "only the data's moments were given, so their uncertainty is not included: these \
-                    intervals are too narrow";
-    assert!(text.contains(expected), "{text}");
+    let same = "The searches from 2 starts found the same parameter set, to a thousandth";
+    assert!(text.contains(same) && !text.contains("different"), "{text}");
 }
 
 /// A model that misses the data determines nothing, whether or not derivatives were measured.

@@ -4,7 +4,8 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::CONFIDENCE;
-use super::few::{FewIntervals, intervals_of_velocities};
+use super::few::{FewIntervals, intervals_of_data, intervals_of_velocities};
+use crate::data::{Data, Measurements};
 use crate::inference::PARTS_MIN;
 use crate::job::VelocitySet;
 use crate::moments::{ConfidenceInterval, MomentIntervals, Moments};
@@ -36,8 +37,7 @@ pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
         return None;
     }
     let Some(subjects) = set.subjects else {
-        let FewIntervals { mean, coefficient_of_variation } = intervals_of_velocities(set)?;
-        return Some(MomentIntervals { mean, coefficient_of_variation, level: CONFIDENCE });
+        return intervals_of_velocities(set).map(with_level);
     };
     let influences = Influences::new(set, measured, found);
     if parts > RESAMPLED_MAX {
@@ -55,6 +55,20 @@ pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
         )?,
         level: CONFIDENCE,
     })
+}
+
+/// Returns confidence intervals of moments whose number of velocities is given, those of a normal
+/// law; `None` for fewer than five.
+pub fn intervals_of_moments(data: &Data) -> Option<MomentIntervals> {
+    let Measurements::Moments { count: Some(PARTS_MIN..), .. } = data.measurements else {
+        return None;
+    };
+    intervals_of_data(data, 0).map(with_level)
+}
+
+fn with_level(found: FewIntervals) -> MomentIntervals {
+    let FewIntervals { mean, coefficient_of_variation } = found;
+    MomentIntervals { mean, coefficient_of_variation, level: CONFIDENCE }
 }
 
 /// Influence of each velocity, or of all velocities of each subject, on the moments, multiplied by

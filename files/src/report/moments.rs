@@ -90,7 +90,7 @@ pub struct Data {
     #[serde(flatten)]
     pub moments: Moments,
     /// Confidence intervals of the moments of the law that the velocities were drawn from; not there
-    /// where only moments are known, null where the velocities give none.
+    /// where only moments are known, and not `data.count`, null where the velocities give none.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
@@ -128,9 +128,10 @@ impl Data {
     /// The data of the one set that a job has.
     pub(super) fn of_job(data: &DataSummary, best: Option<&BestPoint>) -> Self {
         let measured = data.count.is_some();
+        let intervals = data.intervals.map(MomentIntervals::from);
         Self {
             moments: data.moments.into(),
-            interval: measured.then(|| data.intervals.map(MomentIntervals::from)),
+            interval: (measured || intervals.is_some()).then_some(intervals),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
             outliers: data.outliers.clone(),
             rounding: data.rounding,

@@ -17,8 +17,8 @@ pub(super) fn after_failures(row: &Evaluation, specification: &JobSpecification)
     let realizations = specification.monte_carlo.realizations as f64;
     let all_alike = row.failures.iter().find(|&(_, count)| count as f64 >= SAME_WAY * realizations);
     let Some((kind, _)) = all_alike else {
-        return "change the starts of [parameters], raise [solver] refinement, or allow a larger \
-                [monte_carlo] max_failed_fraction"
+        return "change the starts of [parameters], or allow a larger [monte_carlo] \
+                max_failed_fraction"
             .to_owned();
     };
     let cause = likely_cause(kind, specification.setup.solver.method);

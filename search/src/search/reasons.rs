@@ -119,8 +119,8 @@ fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status
     let advice = if advice.is_empty() { advice } else { format!("; {advice}") };
     let reason = match stopped_by_failures(&evidence.trials, specification) {
         Some(failures) => format!(
-            "{failures}; {misfit}; raise [monte_carlo] max_failed_fraction, or change what fails \
-             (bounds, [solver] refinement)"
+            "{failures}; {misfit}; raise [monte_carlo] max_failed_fraction, or narrow the bounds \
+             of [parameters]"
         ),
         None if on_bounds.is_empty() => format!("no nearby point fits better: {misfit}{advice}"),
         None => format!("no nearby point fits better: {misfit}; {on_bounds}{advice}"),

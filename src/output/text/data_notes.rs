@@ -26,7 +26,7 @@ pub(super) fn outliers(data: &Data) -> Option<String> {
     let listed: Vec<String> = listed.collect();
     let more = match count.saturating_sub(listed.len() as u64) {
         0 => String::new(),
-        more => format!(" and {more} more"),
+        more => format!(" and {more} more (`data.outliers` in result.json)"),
     };
     let (velocities, are) = if count == 1 { ("velocity", "is") } else { ("velocities", "are") };
     Some(format!(
@@ -79,7 +79,7 @@ mod tests {
         assert_eq!(of(1).as_deref(), Some(one));
         let many = of(200).unwrap();
         assert!(many.starts_with("200 velocities are far"), "{many}");
-        assert!(many.ends_with("(by 37) and 195 more."), "{many}");
+        assert!(many.ends_with("(by 37) and 195 more (`data.outliers` in result.json)."), "{many}");
     }
 
     #[test]

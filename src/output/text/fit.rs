@@ -55,22 +55,11 @@ fn posterior_fits(found: &Identification, posterior: &PosteriorReport) -> bool {
 /// Returns the relative standard error of a moment of the data; 0 if it is not known.
 fn of_data(found: &Identification, moment: Moment) -> f64 {
     let Some(data) = &found.data else { return 0.0 };
+    let Some(intervals) = data.intervals() else { return 0.0 };
     let value = data.moments.get(moment).unwrap_or(f64::NAN);
-    if let Some(intervals) = data.intervals() {
-        let [low, high] = intervals.get(moment);
-        // An interval of 95 % reaches two standard errors to each side.
-        return (high - low) / 4.0 / value;
-    }
-    let Some(count) = data.count.flatten().filter(|count| *count > 1) else { return 0.0 };
-    // Of moments with a count, those of a normal law.
-    let count = count as f64;
-    match moment {
-        Moment::Mean => {
-            let variation = data.moments.get(Moment::CoefficientOfVariation);
-            variation.unwrap_or(f64::NAN) / count.sqrt()
-        }
-        Moment::CoefficientOfVariation => 1.0 / (2.0 * count).sqrt(),
-    }
+    let [low, high] = intervals.get(moment);
+    // An interval of 95 % reaches two standard errors to each side.
+    (high - low) / 4.0 / value
 }
 
 /// Returns whether the search reached its target cost.

@@ -12,6 +12,8 @@ use super::result::{readable, scale};
 
 /// Name of √(c1111/ρ).
 const SPEED: &str = "√(c1111/ρ)";
+/// Relative difference up to which the parameters of several solutions are the same.
+const SAME: f64 = 1e-3;
 
 /// Returns whether the uncertainty of any quantity is known.
 pub(super) fn has_intervals(found: &Identification) -> bool {
@@ -33,7 +35,9 @@ pub(super) fn text(found: &Identification) -> String {
         text.push_str(&format!("\n{}{}", wrapped(&heading(known)), aligned(&rows(known))));
     }
     text.push_str(&solutions(found));
-    if let Some(from) = found.search.below_noise_from {
+    // Evaluations are counted from 0.
+    let later = |from: &u64| from + 1 < found.evaluations;
+    if let Some(from) = found.search.below_noise_from.filter(later) {
         text.push('\n');
         text.push_str(&wrapped(&format!(
             "After evaluation {from} all further improvement was below the sampling noise."
@@ -85,18 +89,12 @@ fn heading(known: &Identified) -> String {
     };
     let level = significant(100.0 * known.level, 3);
     let sampling = format!("sampling {}", of(&known.noise.sampling));
-    let counted = match &known.noise.data {
-        Some(data) => format!(
-            "(relative noise of mean and coefficient of variation: data {}, {sampling}):",
-            of(data)
-        ),
-        None => format!(
-            "(relative noise of mean and coefficient of variation: {sampling}; only the data's \
-             moments were given, so their uncertainty is not included: these intervals are too \
-             narrow):"
-        ),
-    };
-    format!("{level} % confidence intervals {counted}")
+    let data = known.noise.data.as_ref().map(|data| format!("data {}, ", of(data)));
+    format!(
+        "{level} % confidence intervals (relative noise of mean and coefficient of variation: \
+         {}{sampling}):",
+        data.unwrap_or_default()
+    )
 }
 
 /// Describes how far apart the solutions of several starts are.
@@ -114,10 +112,20 @@ fn solutions(found: &Identification) -> String {
     let speeds = speeds(found, &solutions.points);
     rows.extend(speeds.map(|ends| [SPEED.to_owned(), format!("{} m/s", range(ends))]));
     rows.extend(spreads.map(row));
+    let matching = solutions.matching;
+    let same = solutions.spread.as_ref().is_some_and(|spread| {
+        spread.parameters.values().all(|one| one.largest - one.smallest <= SAME * one.largest.abs())
+    });
+    if same {
+        let text = format!(
+            "The searches from {matching} starts found the same parameter set, to a thousandth of \
+             each value."
+        );
+        return format!("\n{}", wrapped(&text));
+    }
     let heading = format!(
-        "The searches from {} starts found different parameter sets that fit the data. Their \
-         ranges:",
-        solutions.matching
+        "The searches from {matching} starts found different parameter sets that fit the data. \
+         Their ranges:"
     );
     format!("\n{}{}", wrapped(&heading), aligned(&rows))
 }

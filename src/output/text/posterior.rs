@@ -9,6 +9,8 @@ use super::result::{readable, scale};
 
 /// Posterior probability below which the data would be surprising under the model.
 const SURPRISING: f64 = 0.01;
+/// Ratio of the posterior's standard deviation to the prior's from which it counts as wider.
+const WIDER: f64 = 1.1;
 /// Share of wrong velocities from which it is stated.
 const NOTABLE: f64 = 0.005;
 
@@ -28,10 +30,15 @@ pub(super) fn text_of_misfit(found: &PosteriorReport) -> String {
 
 fn introduced(introduction: &str, found: &PosteriorReport) -> String {
     let mut text = format!("\n{}{}", wrapped(introduction), aligned(&rows(found)));
-    text.push_str(&wrapped(
+    let mut quantities = found.parameters.values().chain([&found.bulk_velocity]);
+    let wider = match quantities.any(is_wider) {
+        true => "; \"wider\": than the prior alone",
+        false => "",
+    };
+    text.push_str(&wrapped(&format!(
         "`from data`: share of the prior variance that the data removed; near 0 %, the prior alone \
-         makes the interval.",
-    ));
+         makes the interval{wider}."
+    )));
     text.push_str(&outliers(found).unwrap_or_default());
     text.push_str(&wrapped(&effort(found)));
     text.push_str(&doubts(found));
@@ -76,10 +83,21 @@ fn row(name: &str, quantity: &QuantityPosterior, scale: f64, unit: &str) -> [Str
     ]
 }
 
-/// Returns the explained share in whole per cent; only what has no variance left is fully known.
+/// Returns the explained share in whole per cent; only what has no variance left is fully known, and
+/// what has more than before is wider.
 fn explained(quantity: &QuantityPosterior) -> String {
+    if is_wider(quantity) {
+        return "wider".to_owned();
+    }
     let percent = 100.0 * quantity.explained;
     if (99.5..100.0).contains(&percent) { "> 99 %".to_owned() } else { format!("{percent:.0} %") }
+}
+
+/// Returns whether the data have made a quantity less certain than its prior, for example because
+/// they contradict it.
+fn is_wider(quantity: &QuantityPosterior) -> bool {
+    let deviations = quantity.standard_deviation.zip(quantity.prior_standard_deviation);
+    deviations.is_some_and(|(after, before)| after > WIDER * before)
 }
 
 /// Returns the ends of the 95 % interval, with two digits of the standard deviation.

@@ -8,6 +8,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::Status;
 use osteon_common::visible;
 use osteon_files::report::{Data, Identification, Moment, Propagation, ResultFile, Velocity};
+use osteon_search::search_box::SearchBox;
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
@@ -260,6 +261,7 @@ fn effect_of_failures(
 fn parameters(found: &Identification, point: &Point, specification: &JobSpecification) -> String {
     let identified = found.identified();
     let matched = identified.is_some_and(|known| known.matched);
+    let on_bounds = SearchBox::new(specification.parameters).on_bounds(point);
     let row = |parameter: Parameter| {
         let (scale, unit) = scale(parameter);
         let number = point.get(parameter) * scale;
@@ -274,7 +276,9 @@ fn parameters(found: &Identification, point: &Point, specification: &JobSpecific
                 (measured(number, error), Some([lower, upper]), "")
             }
             (Range::Free { lower, upper, .. }, None) if matched => {
-                (digits(number, FREE_DIGITS), Some([lower, upper]), "not determined")
+                let on_bound = on_bounds.iter().any(|(bound, _)| *bound == parameter);
+                let note = if on_bound { "on a bound" } else { "not determined" };
+                (digits(number, FREE_DIGITS), Some([lower, upper]), note)
             }
             (Range::Free { lower, upper, .. }, None) => {
                 (digits(number, DIGITS), Some([lower, upper]), "")

@@ -44,6 +44,26 @@ fn intervals_hold_the_moments_of_the_law_as_often_as_they_say() {
     }
 }
 
+#[test]
+fn so_do_those_of_moments_whose_number_of_velocities_is_given() {
+    let of_count = |velocities: &[f64], count: Option<u64>| {
+        let Moments { mean, coefficient_of_variation } = moments(velocities).unwrap();
+        let measurements = Measurements::Moments { mean, coefficient_of_variation, count };
+        intervals_of_moments(&Data { measurements, repeatability: 0.0 })
+    };
+    let mut covered = [0; 2];
+    for seed in 0..2000 {
+        let found = of_count(&normal(1000 + seed, 20), Some(20)).unwrap();
+        covered[0] += u64::from(holds(found.mean, 3900.0));
+        covered[1] += u64::from(holds(found.coefficient_of_variation, 0.03));
+    }
+    let shares = covered.map(|count| count as f64 / 2000.0);
+    assert!(shares.iter().all(|share| (0.93..=0.97).contains(share)), "{shares:?}");
+    for count in [None, Some(4)] {
+        assert_eq!(of_count(&normal(1, 20), count), None);
+    }
+}
+
 /// Student's law with ten degrees of freedom has a kurtosis of 4.
 #[test]
 fn heavy_tails_cost_little_coverage() {

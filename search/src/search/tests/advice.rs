@@ -24,12 +24,12 @@ fn job() -> JobSpecification {
     job
 }
 
-/// More accuracy, or a larger failure limit, helps if only a few fail.
-const A_FEW: &str = "change the starts of [parameters], raise [solver] refinement, or allow a larger \
-                     [monte_carlo] max_failed_fraction";
+/// Another start, or a larger failure limit, helps if only a few fail.
+const A_FEW: &str = "change the starts of [parameters], or allow a larger [monte_carlo] \
+                     max_failed_fraction";
 
 #[test]
-fn more_accuracy_is_advised_where_a_few_fail() {
+fn another_start_is_advised_where_a_few_fail() {
     let mut outcomes = [Ok(3900.0); 10];
     outcomes[..3].fill(Err(NoArrival));
     assert!(reason(&job(), outcomes).ends_with(A_FEW), "{}", reason(&job(), outcomes));

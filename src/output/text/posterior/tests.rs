@@ -45,3 +45,15 @@ fn numbers_that_are_none_are_unknown() {
         "{text}"
     );
 }
+
+#[test]
+fn a_posterior_wider_than_its_prior_is_called_so() {
+    let mut found = posterior();
+    let plain = text(&found);
+    found.bulk_velocity.prior_standard_deviation =
+        found.bulk_velocity.standard_deviation.map(|deviation| 0.8 * deviation);
+    let wider = text(&found);
+    let row = wider.lines().find(|line| line.contains("√(c1111/ρ)")).unwrap();
+    assert!(row.ends_with("wider") && wider.contains("than the prior"), "{wider}");
+    assert!(!plain.contains("wider"), "{plain}");
+}
