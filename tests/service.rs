@@ -7,7 +7,8 @@
 mod support;
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -206,9 +207,9 @@ fn an_unreachable_coordinator_is_named_in_time() {
     let file = scratch.write("job.toml", &job(30, 4));
     let out = scratch.path("out");
     // A port that was free a moment ago, and one that accepts connections but never answers.
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = format!("http://{}", listener.local_addr().unwrap());
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let urls = [format!("http://{free}"), silent, "unix:/nonexistent/socket".to_owned()];
     let (file, out) = (file.to_str().unwrap(), out.to_str().unwrap());
     let commands = [&["jobs"] as &[&str], &["submit", file], &["identify", file, "--out", out]];
@@ -233,9 +234,62 @@ fn an_unreachable_coordinator_is_named_in_time() {
     assert!(!scratch.path("out").join("job.toml").exists());
 }
 
-/// Ends `command` by the signal once it handles signals, and checks the exit code.
-fn ended_by(name: &str, code: i32, command: &mut Command, expected: &str) {
+/// A coordinator that accepts connections, but never answers.
+struct SilentCoordinator {
+    listener: TcpListener,
+    url: String,
+}
+
+impl SilentCoordinator {
+    fn start() -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        Self { listener, url }
+    }
+
+    /// Waits until a client has sent a request; returns the connection, which has to be kept.
+    fn asked(&self) -> TcpStream {
+        let mut asked = None;
+        eventually("a client sends a request", || {
+            asked = self.listener.accept().ok().and_then(|(stream, _)| request_of(stream));
+            asked.is_some()
+        });
+        asked.unwrap()
+    }
+}
+
+/// Reads up to the first HEADERS frame of HTTP/2, which begins a request; `None` if the client closes
+/// the connection before.
+fn request_of(mut stream: TcpStream) -> Option<TcpStream> {
+    const PREFACE: usize = 24;
+    const HEADERS: u8 = 1;
+    stream.set_nonblocking(false).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    stream.read_exact(&mut [0; PREFACE]).ok()?;
+    loop {
+        let mut frame = [0; 9];
+        stream.read_exact(&mut frame).ok()?;
+        let [high, middle, low, kind, ..] = frame;
+        if kind == HEADERS {
+            return Some(stream);
+        }
+        let length = u32::from_be_bytes([0, high, middle, low]) as usize;
+        stream.read_exact(&mut vec![0; length]).ok()?;
+    }
+}
+
+/// Ends `command` by the signal once it handles signals and, if it has a coordinator, waits for its
+/// answer; checks the exit code.
+fn ended_by(
+    name: &str,
+    code: i32,
+    command: &mut Command,
+    silent: Option<&SilentCoordinator>,
+    expected: &str,
+) {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let _connection = silent.map(SilentCoordinator::asked);
     let status = format!("/proc/{}/status", child.id());
     eventually("it handles SIGINT and SIGTERM", || {
         let status = fs::read_to_string(&status).unwrap();
@@ -262,22 +316,28 @@ fn a_command_that_a_signal_ends_has_its_code() {
          [0.0, 0.0, 0.0, 0.0, 0.0, 1e10]]\n[solver]\nmethod = \"hybrid\"\nrefinement = 16.0\n",
     );
     let (job, case) = (text(&job), text(&case));
-    // Accepts connections, but never answers.
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let silent = format!("http://{}", listener.local_addr().unwrap());
+    let silent = SilentCoordinator::start();
     let out = scratch.path("out");
     let commands = [
         (&["identify", job] as &[&str], "no results were saved"),
         (&["propagate", job], "no results were saved"),
         (&["simulate", case], "no results were saved"),
-        (&["identify", job, "--coordinator", &silent], "a job that was accepted continues"),
-        (&["watch", "1", "--coordinator", &silent], "the job continues"),
-        (&["submit", job, "--coordinator", &silent], "the job may have been accepted"),
-        (&["fetch", "1", "--out", text(&out), "--coordinator", &silent], "to fetch the results"),
     ];
-    for (arguments, expected) in commands {
-        ended_by("INT", 130, osteon().args(arguments), expected);
-        ended_by("TERM", 143, osteon().args(arguments), expected);
+    let asking = [
+        (&["identify", job] as &[&str], "a job that was accepted continues"),
+        (&["watch", "1"], "the job continues"),
+        (&["submit", job], "the job may have been accepted"),
+        (&["fetch", "1", "--out", text(&out)], "to fetch the results"),
+    ];
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        for (arguments, expected) in commands {
+            ended_by(name, code, osteon().args(arguments), None, expected);
+        }
+        for (arguments, expected) in asking {
+            let mut command = osteon();
+            command.args(arguments).args(["--coordinator", &silent.url]);
+            ended_by(name, code, &mut command, Some(&silent), expected);
+        }
     }
 }
 
