@@ -19,6 +19,7 @@
 //! suffices, so frequencies are thinned out (`thinning.rs`). The wavenumbers of the first packet
 //! suffice there, too, so those of the later, slower waves are faded out smoothly.
 
+mod arrivals;
 mod thinning;
 
 use std::f64::consts::PI;
@@ -26,7 +27,11 @@ use std::f64::consts::PI;
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::settings::Method;
+use arrivals::{lower_echo, reflected_arrival, upper_echo};
 
+pub use arrivals::{
+    direct_arrival, distances, earliest_arrival, earliest_echo, echoes_are_audible, slowness,
+};
 pub use thinning::{FrequencyRun, RUN, smooth_step};
 
 /// Ratio of the upper edges of neighbouring speed bins.
@@ -54,21 +59,25 @@ const TRACE_BAND: f64 = 12.0;
 const TRACE_TAPER_START: f64 = 0.4;
 /// Where the taper of a velocity starts, as a fraction of the band.
 const TAPER_START: f64 = 0.5;
-/// α T: a wave that wraps round is weakened by exp(-this). A larger value amplifies rounding and
-/// truncation, which grow as e^(αt), by more than it gains.
+/// α T: a wave that wraps round is weakened by exp(-this). Truncation errors grow as e^(αt), so a
+/// larger value needs more wavenumbers.
 const WRAP_DAMPING: f64 = 12.0;
-/// Largest α t at which an extremum is picked: truncation and rounding errors of a spectrum grow as
-/// e^(αt).
-const GROWTH_MAX: f64 = 13.5;
+/// The same of the thorough grade, at refinement 1, where a weak arrival may precede large waves that
+/// last long.
+const THOROUGH_DAMPING: f64 = 16.0;
+/// Largest difference of α t, where an extremum is picked, from α T.
+const GROWTH_MARGIN: f64 = 1.5;
 /// Shortest period, in periods of the centre frequency.
 const SHORTEST_PERIOD: f64 = 6.0;
 /// Period, in periods of the centre frequency, from which the thinning of frequencies removes those
 /// that are not needed high in the band; a shorter period is thinned higher up.
 const THINNED_PERIOD: f64 = 8.0;
-/// Exponent at which the sum over wavenumbers ends, at refinement 1.
-const EVANESCENCE: f64 = 18.5;
+/// Difference, from α T, of the exponent at which the sum over wavenumbers ends, at refinement 1.
+const EVANESCENCE: f64 = 6.5;
 /// Frequencies whose weight is below this are left out.
 const TAPER_MIN: f64 = 1e-9;
+/// The period of the thorough grade grows as this power of the refinement.
+const PERIOD_POWER: f64 = 0.25;
 /// Ratio of the period to the time that it must include.
 const PERIOD_MARGIN: f64 = 1.03;
 /// The same ratio for traces.
@@ -96,6 +105,17 @@ pub enum Grade {
     /// For bones whose first arrival is weak or slow, or close to later ones: from the second band
     /// on, with a period and length that include the whole window before the direct wave.
     Thorough,
+    /// The same with nothing thinned out or left out.
+    Full,
+}
+
+/// The outer faces of the fluids that a sampling includes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OuterFaces {
+    /// None: the fluids have no end, which changes nothing before [`earliest_echo`].
+    None,
+    /// Those whose reflections can arrive inside a window.
+    Audible,
 }
 
 /// Sampling of one setup for waves up to one speed.
@@ -130,7 +150,7 @@ pub struct WaveSampling {
 pub fn nominal(setup: &Setup) -> WaveSampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
     let bin = speed_bin(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(SPEED_BINS - 1);
-    WaveSampling::for_speed_bin(setup, bin, first_grade(setup))
+    WaveSampling::for_speed_bin(setup, bin, first_grade(setup), OuterFaces::None)
 }
 
 /// The exact method's sampling for the waves of the usual bone.
@@ -199,41 +219,10 @@ pub fn speed_bin_edge(setup: &Setup, bin: usize) -> f64 {
     (0..bin).fold(first_bin_edge(setup), |speed, _| speed * SPEED_BIN_RATIO)
 }
 
-/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
-/// along the bone at `speed` (m/s) and through the coupling fluid at its ends.
-///
-/// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
-pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
-    let c1 = setup.layers.coupling.sound_speed;
-    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
-    if speed <= c1 {
-        return reflected_arrival(setup, x);
-    }
-    x / speed + heights * slowness(c1, speed)
-}
-
-/// Returns the arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
-pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
-    let across = setup.probe.receivers.x3 - setup.probe.source.x3;
-    x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
-}
-
-/// Returns the arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper
-/// face.
-fn reflected_arrival(setup: &Setup, x: f64) -> f64 {
-    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
-    x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
-}
-
-/// Returns the horizontal distances of the receivers from the source, m.
-pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
-    setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
-}
-
 impl WaveSampling {
     /// Returns the sampling for picking velocities of bones whose waves are no faster than the
     /// speed bin's speed.
-    pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade) -> Self {
+    pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade, faces: OuterFaces) -> Self {
         let speed = speed_bin_edge(setup, bin);
         let fc = setup.probe.center_frequency;
         // All in periods: length of the reflected wave; latest time of a picked extremum after the
@@ -241,8 +230,9 @@ impl WaveSampling {
         // kept out.
         let (reflected_length, latest_pick, latest_source) = match grade {
             Grade::Quick | Grade::Plain => (1.0, 1.4, 1.4),
-            Grade::Thorough => (4.0, 2.5, f64::INFINITY),
+            Grade::Thorough | Grade::Full => (4.0, 2.5, f64::INFINITY),
         };
+        let damping = wrap_damping(setup, grade);
         let mut longest = SHORTEST_PERIOD / fc;
         let mut last = 0.0_f64;
         for x in distances(setup) {
@@ -252,10 +242,22 @@ impl WaveSampling {
             let pick = direct.min(earliest + latest_pick / fc);
             longest = longest
                 .max(PERIOD_MARGIN * (reflected - earliest))
-                .max(pick * WRAP_DAMPING / GROWTH_MAX);
+                .max(pick * damping / (damping + GROWTH_MARGIN));
             last = last.max(direct.min(earliest + latest_source / fc));
         }
-        Self::new(setup, grade, speed, longest, last)
+        if matches!(grade, Grade::Thorough | Grade::Full) {
+            // Finer samplings also have room for waves that arrive later.
+            longest *= libm::pow(setup.solver.refinement.max(1.0), PERIOD_POWER);
+        }
+        let mut sampling = Self::new(setup, grade, damping, speed, longest, last);
+        if faces == OuterFaces::Audible {
+            let audible = |echo: fn(&Setup, f64, f64) -> f64| {
+                distances(setup).any(|x| echo(setup, x, speed) <= direct_arrival(setup, x))
+            };
+            sampling.upper_echoes = audible(upper_echo);
+            sampling.lower_echoes = audible(lower_echo);
+        }
+        sampling
     }
 
     /// Returns the sampling for traces from 0 to `duration` (s) of bones whose waves are no faster
@@ -263,7 +265,7 @@ impl WaveSampling {
     pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let period = TRACE_MARGIN * duration;
-        let mut sampling = Self::new(setup, Grade::Thorough, speed, period, duration);
+        let mut sampling = Self::new(setup, Grade::Thorough, WRAP_DAMPING, speed, period, duration);
         sampling.bands = [TRACE_BAND * setup.solver.refinement * thinness(setup) * fc; BANDS];
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
@@ -271,21 +273,25 @@ impl WaveSampling {
         sampling
     }
 
-    fn new(setup: &Setup, grade: Grade, speed: f64, period: f64, last: f64) -> Self {
+    fn new(setup: &Setup, grade: Grade, damping: f64, speed: f64, period: f64, last: f64) -> Self {
         let refinement = setup.solver.refinement;
         let coupling = &setup.layers.coupling;
         let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
         let farthest = distances(setup).fold(0.0, f64::max);
         let fc = setup.probe.center_frequency;
         let bands = relative_bands(grade, refinement, thinness(setup));
-        let (unit, evanescence) = match grade {
-            Grade::Quick => (thinness(setup).min(1.4), EVANESCENCE),
-            Grade::Plain => (3.0, EVANESCENCE),
+        let unit = match grade {
+            Grade::Quick => thinness(setup).min(1.4),
+            Grade::Plain => 3.0,
+            Grade::Thorough => 1.5 * refinement.max(2.0),
+            Grade::Full => f64::INFINITY,
+        };
+        let evanescence = match grade {
+            Grade::Quick | Grade::Plain => EVANESCENCE,
             // Finer sampling is also less truncated, slowly.
-            Grade::Thorough => (
-                1.5 * refinement.max(2.0),
-                EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0)),
-            ),
+            Grade::Thorough | Grade::Full => {
+                EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))
+            }
         };
         let unit = unit * crowding(setup, speed) * (THINNED_PERIOD / (period * fc)).max(1.0);
         let through_fluid = earliest_arrival(setup, 0.0, speed);
@@ -294,12 +300,12 @@ impl WaveSampling {
             speed,
             period,
             frequency_step: 2.0 * PI / period,
-            damping: WRAP_DAMPING / period,
+            damping: damping / period,
             bands: bands.map(|band| band * fc),
             wavenumber_step: 2.0 * PI / length,
-            evanescent_limit: evanescence / heights,
-            upper_echoes: echoes(setup, speed, upper_echo_path(setup), coupling.sound_speed),
-            lower_echoes: lower_echoes(setup, speed),
+            evanescent_limit: (damping + evanescence) / heights,
+            upper_echoes: false,
+            lower_echoes: false,
             sound_speed: coupling.sound_speed,
             unit: unit * fc,
         }
@@ -399,9 +405,9 @@ fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> [f64; BANDS] 
     let wide = (10.5 * thinness).min(24.0);
     match grade {
         Grade::Quick | Grade::Plain => [5.25 * thinness, wide, 2.0 * wide].map(|f| f * refinement),
-        // 23 for a thick plate at refinement 5.
-        Grade::Thorough if refinement > 1.0 => [wide * refinement.sqrt(); BANDS],
-        Grade::Thorough => [wide, wide, 2.0 * wide].map(|f| f * refinement.sqrt()),
+        Grade::Thorough => [wide, 2.0 * wide, 4.0 * wide].map(|f| f * refinement.sqrt()),
+        // Without thinning, a band of twice the width costs four times as much.
+        Grade::Full => [wide, 2.0 * wide, 2.0 * wide].map(|f| f * refinement.sqrt()),
     }
 }
 
@@ -435,7 +441,7 @@ fn crowding(setup: &Setup, speed: f64) -> f64 {
 }
 
 /// Returns how much wider the band must be than that of a thick plate.
-fn thinness(setup: &Setup) -> f64 {
+pub fn thinness(setup: &Setup) -> f64 {
     let product = setup.layers.bone_thickness * setup.probe.center_frequency;
     libm::pow((THIN_PLATE / product).max(1.0), THIN_PLATE_POWER).min(THIN_PLATE_MAX)
 }
@@ -445,29 +451,14 @@ fn first_bin_edge(setup: &Setup) -> f64 {
     setup.layers.coupling.sound_speed * SPEED_BIN_RATIO
 }
 
-/// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
-/// `v`.
-pub fn slowness(c: f64, v: f64) -> f64 {
-    (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
-}
-
-/// Returns the height in fluid 1, m, that the first head wave by way of the outer face crosses.
-fn upper_echo_path(setup: &Setup) -> f64 {
-    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
-    2.0 * setup.layers.coupling.thickness - (receivers - source).abs()
-}
-
-/// Returns whether a head wave that crosses `path` (m) of fluid of sound speed `c` arrives before
-/// the direct wave at some receiver.
-fn echoes(setup: &Setup, speed: f64, path: f64, c: f64) -> bool {
-    distances(setup).any(|x| x / speed + path * slowness(c, speed) <= direct_arrival(setup, x))
-}
-
-/// Returns whether a head wave by way of the marrow's outer face can arrive before the direct wave.
-fn lower_echoes(setup: &Setup, speed: f64) -> bool {
-    let marrow = &setup.layers.marrow;
-    let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
-    distances(setup).any(|x| earliest_arrival(setup, x, speed) + across <= direct_arrival(setup, x))
+/// Returns α T.
+fn wrap_damping(setup: &Setup, grade: Grade) -> f64 {
+    match grade {
+        Grade::Quick | Grade::Plain => WRAP_DAMPING,
+        Grade::Thorough | Grade::Full => {
+            THOROUGH_DAMPING + 2.0 * libm::log(setup.solver.refinement.max(1.0))
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! arrival is small compared to later waves, the same is done without thinning. If the pick is
 //! unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
 //! a thorough sampling, whose band is widened if it finds nothing or its estimated error is large.
-//! If the estimated error is still very large, a refined pass is made.
+//! If the estimated error is still large, the last passes are finer and leave nothing out.
 //! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
 //! (the second replaces it). The tables are made for a geometric grid of speeds, whose intervals
 //! are called speed bins; near the edge of a bin the results of both neighbours are blended, too.
@@ -32,9 +32,9 @@ use std::sync::Arc;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
-use osteon_common::sampling::{self, Grade};
+use osteon_common::sampling::{self, Grade, OuterFaces};
 
-use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace};
+use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace, thin_factor};
 use crate::exact::plate::Plate;
 use crate::exact::response::Spectra;
 use crate::exact::table_cache::{PAIRS_MAX, TableCache, TableMemory, TablesRef};
@@ -44,12 +44,12 @@ use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::Vector;
 
-/// Estimated errors, at refinement 1, between which the weight of the pass with the next wider band
-/// rises from 0 to 1.
-const LARGE_ERROR: (f64, f64) = (4.5e-5, 7.5e-5);
-/// The same for the refined pass, which is the last.
-const VERY_LARGE_ERROR: (f64, f64) = (7e-5, 1.2e-4);
-/// Factor of the refinement in the refined pass.
+/// Stated errors due to the band, or to the sampling, at refinement 1, between which the weight of the
+/// pass with the next wider band, or of the next sampling, rises from 0 to 1.
+const LARGE_ERROR: (f64, f64) = (1e-4, 1.6e-4);
+/// The same for the whole error and the last two samplings.
+const VERY_LARGE_ERROR: (f64, f64) = (1.3e-4, 2e-4);
+/// Factor of the refinement in the last passes, at refinement 1 and below.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
 /// between which the weight of the next pass rises: a quick period has little room for a late
@@ -60,6 +60,13 @@ const LATE: (f64, f64) = (0.62, 0.72);
 const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
 /// Ratios to the threshold between which the weight of the next pass falls.
 const WEAK: (f64, f64) = (1.2, 1.6);
+/// Ratios of a skipped extremum to the threshold between which the weight of the next pass rises.
+const NEARLY_PICKED: (f64, f64) = (0.6, 0.8);
+/// Times from a pick to the earliest possible echo, in periods, between which the weight of the
+/// result without outer faces rises.
+const BEFORE_ECHO: (f64, f64) = (0.0, 0.1);
+/// Ratio of a pick to the largest wave in its window below which an echo may hide it as noise.
+const FAINT: f64 = 10.0 * picking::FLOOR;
 /// Distances from the line, in periods, between which the weight of the next pass rises.
 const OFF_LINE: (f64, f64) = (0.02, 0.03);
 /// Ratios of a pick to the largest wave in its window between which the weight of the next pass
@@ -74,25 +81,28 @@ pub(crate) struct Exact {
     setup: Setup,
     distances: Vec<f64>,
     isa: Isa,
+    without_faces: GradeCaches,
+    with_faces: GradeCaches,
+}
+
+/// The tables of every grade.
+#[derive(Debug)]
+struct GradeCaches {
     quick: TableCache,
     plain: TableCache,
     thorough: TableCache,
-    refined: TableCache,
+    full: TableCache,
 }
 
 impl Exact {
     pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
-        let mut refined = *setup;
-        refined.solver.refinement *= LAST_REFINEMENT;
         let memory = Arc::new(TableMemory::default());
         Self {
             setup: *setup,
             distances: sampling::distances(setup).collect(),
             isa,
-            quick: TableCache::new(setup, Grade::Quick, &memory),
-            plain: TableCache::new(setup, Grade::Plain, &memory),
-            thorough: TableCache::new(setup, Grade::Thorough, &memory),
-            refined: TableCache::new(&refined, Grade::Thorough, &memory),
+            without_faces: GradeCaches::new(setup, OuterFaces::None, &memory),
+            with_faces: GradeCaches::new(setup, OuterFaces::Audible, &memory),
         }
     }
 
@@ -103,13 +113,21 @@ impl Exact {
     ) -> Result<Arrival, Failure> {
         let (medium, speed) = self.solid(bone)?;
         let bin = sampling::speed_bin(&self.setup, speed).ok_or_else(|| too_large(speed))?;
-        let mut passes =
-            BonePasses { exact: self, medium: &medium, speed, bin, workspace, count: 0, pairs: 0 };
-        let mut found = passes.run();
-        let next = sampling::next_bin_weight(&self.setup, bin, speed);
-        if next > 0.0 {
-            passes.bin += 1;
-            found = self.merged_if_possible(found, passes.run(), next);
+        let caches = &self.without_faces;
+        let mut passes = BonePasses {
+            exact: self,
+            caches,
+            medium: &medium,
+            speed,
+            bin,
+            workspace,
+            count: 0,
+            pairs: 0,
+        };
+        let mut found = passes.in_bins(bin);
+        if self.needs_faces(&found, speed) {
+            passes.caches = &self.with_faces;
+            found = self.with_echoes(found, passes.in_bins(bin), speed);
         }
         let BonePasses { count, pairs, .. } = passes;
         found.map(|found| found.arrival(count, pairs))
@@ -142,11 +160,44 @@ impl Exact {
         cache.tables(index).ok_or_else(|| too_large(speed))
     }
 
-    /// Returns an estimated error as it compares with the constants above, which are meant for
-    /// refinement 1: a user who sets a lower refinement accepts larger errors.
+    /// Returns a stated error as it compares with the constants above, which are meant for refinement
+    /// 1 and a thick plate: a user who sets a lower refinement accepts larger errors, and expects
+    /// smaller ones of a higher refinement.
     fn counted(&self, error: f64) -> f64 {
-        let refinement = self.setup.solver.refinement.min(1.0);
-        error * refinement * refinement * refinement
+        let refinement = self.setup.solver.refinement;
+        let power = if refinement < 1.0 { 3.0 } else { 1.5 };
+        error * libm::pow(refinement, power) / thin_factor(&self.setup)
+    }
+
+    /// Returns whether reflections of the outer faces may change the pick that was found without
+    /// them.
+    fn needs_faces(&self, found: &Result<Estimated, Failure>, speed: f64) -> bool {
+        let is_certain = |found: &Estimated| {
+            self.time_to_echo(found, speed) > picking::PACKET_PERIODS
+                && found.pick.prominence > FAINT
+        };
+        sampling::echoes_are_audible(&self.setup, speed) && !found.as_ref().is_ok_and(is_certain)
+    }
+
+    /// Chooses between the results without and with outer faces. The faces may change which extremum
+    /// is picked, but not its time before the earliest echo, which is more accurate without the
+    /// waves that they keep in the fluids.
+    fn with_echoes(
+        &self,
+        without: Result<Estimated, Failure>,
+        with: Result<Estimated, Failure>,
+        speed: f64,
+    ) -> Result<Estimated, Failure> {
+        let time = without.as_ref().map_or(0.0, |found| self.time_to_echo(found, speed));
+        let weight = 1.0 - rise(time, BEFORE_ECHO);
+        self.merged(without, with, weight)
+    }
+
+    /// Returns the least time from a pick to the earliest possible echo, in periods.
+    fn time_to_echo(&self, found: &Estimated, speed: f64) -> f64 {
+        let echoes = self.distances.iter().map(|&x| sampling::earliest_echo(&self.setup, x, speed));
+        let times = echoes.zip(&found.pick.times).map(|(echo, t)| echo - t);
+        times.fold(f64::INFINITY, f64::min) * self.setup.probe.center_frequency
     }
 
     /// Returns the weight of the thorough pass, a continuous function of how unreliable a pick is:
@@ -159,8 +210,10 @@ impl Exact {
             margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
         }
         let ratio = found.pick.ratio / self.setup.picking.threshold;
+        let skipped = found.pick.skipped / self.setup.picking.threshold;
         rise(delay * fc, LATE)
             .max(rise(found.pick.residual * fc, OFF_LINE))
+            .max(rise(skipped, NEARLY_PICKED))
             .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))
             .max(1.0 - rise(ratio, WEAK))
     }
@@ -211,11 +264,26 @@ impl Exact {
         let fc = self.setup.probe.center_frequency;
         let (velocity, residual) = picking::line(&self.distances, &times, fc)?;
         let ratio = blend(first.pick.ratio, second.pick.ratio);
+        let skipped = blend(first.pick.skipped, second.pick.skipped);
         let prominence = blend(first.pick.prominence, second.pick.prominence);
-        let error = blend(first.error, second.error);
-        let pick = Pick { velocity, times, ratio, residual, prominence };
-        Ok(Estimated { pick, error, sampled: second.sampled })
+        let band_error = blend(first.band_error, second.band_error);
+        let sampling_error = blend(first.sampling_error, second.sampling_error);
+        let pick = Pick { velocity, times, ratio, skipped, residual, prominence };
+        Ok(Estimated { pick, band_error, sampling_error, sampled: second.sampled })
     }
+}
+
+/// Returns the weight of the last passes, which decide whether there is an arrival.
+fn last_weight(found: &Result<Estimated, Failure>, of_error: impl Fn(&Estimated) -> f64) -> f64 {
+    match found {
+        Ok(found) => of_error(found),
+        Err(failure) => f64::from(may_be_noise(failure)),
+    }
+}
+
+/// Returns whether a finer sampling may find an arrival where this one failed.
+fn may_be_noise(failure: &Failure) -> bool {
+    matches!(failure.kind, FailureKind::NoArrival | FailureKind::InconsistentArrival)
 }
 
 fn too_large(speed: f64) -> Failure {
@@ -234,9 +302,25 @@ fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
+impl GradeCaches {
+    fn new(setup: &Setup, faces: OuterFaces, memory: &Arc<TableMemory>) -> Self {
+        let mut refined = *setup;
+        if sampling::first_grade(setup) != Grade::Thorough {
+            refined.solver.refinement *= LAST_REFINEMENT;
+        }
+        Self {
+            quick: TableCache::new(setup, Grade::Quick, faces, memory),
+            plain: TableCache::new(setup, Grade::Plain, faces, memory),
+            thorough: TableCache::new(setup, Grade::Thorough, faces, memory),
+            full: TableCache::new(&refined, Grade::Full, faces, memory),
+        }
+    }
+}
+
 /// State of the passes for one bone.
 struct BonePasses<'a> {
     exact: &'a Exact,
+    caches: &'a GradeCaches,
     medium: &'a Medium,
     /// Upper bound of every wave's speed, m/s.
     speed: f64,
@@ -250,51 +334,81 @@ struct BonePasses<'a> {
 }
 
 impl BonePasses<'_> {
-    /// Computes as many passes as the bone needs.
-    fn run(&mut self) -> Result<Estimated, Failure> {
-        let exact = self.exact;
-        if sampling::first_grade(&exact.setup) == Grade::Thorough {
-            return self.thorough(&exact.thorough);
+    /// Computes as many passes as the bone needs, in its speed bin and, near the edge, in the next.
+    fn in_bins(&mut self, bin: usize) -> Result<Estimated, Failure> {
+        self.bin = bin;
+        let found = self.run();
+        let next = sampling::next_bin_weight(&self.exact.setup, bin, self.speed);
+        if next == 0.0 {
+            return found;
         }
-        let mut found = self.quick(&exact.quick);
-        let weight = found.as_ref().map_or(0.0, |found| 1.0 - rise(found.pick.prominence, SMALL));
+        self.bin = bin + 1;
+        let other = self.run();
+        self.exact.merged_if_possible(found, other, next)
+    }
+
+    /// Computes as many passes as the bone needs in one speed bin.
+    fn run(&mut self) -> Result<Estimated, Failure> {
+        let Self { exact, caches, speed, .. } = *self;
+        let rough = |found: &Estimated| rise(exact.counted(found.sampling_error), LARGE_ERROR);
+        if sampling::first_grade(&exact.setup) == Grade::Thorough {
+            let found = self.thorough(&caches.thorough, LARGE_ERROR.1);
+            let weight = last_weight(&found, rough);
+            return self.completed(found, weight);
+        }
+        let small = |found: &Estimated| 1.0 - rise(found.pick.prominence, SMALL);
+        let mut found = self.quick(&caches.quick);
+        let weight = found.as_ref().map_or(0.0, |found| rough(found).max(small(found)));
         if weight > 0.0 {
-            let plain = self.quick(&exact.plain);
+            let plain = self.quick(&caches.plain);
             found = exact.merged(found, plain, weight);
         }
-        let weight = found.as_ref().map_or(1.0, |found| exact.fallback_weight(found, self.speed));
+        let large = |found: &Estimated| rise(exact.counted(found.error()), VERY_LARGE_ERROR);
+        let doubt = |found: &Estimated| large(found).max(exact.fallback_weight(found, speed));
+        let weight = found.as_ref().map_or(1.0, doubt);
         if weight > 0.0 {
-            let thorough = self.thorough(&exact.thorough);
+            let thorough = self.thorough(&caches.thorough, VERY_LARGE_ERROR.1);
             found = exact.merged(found, thorough, weight);
         }
-        let error = found.as_ref().map_or(0.0, |found| exact.counted(found.error));
-        let weight = rise(error, VERY_LARGE_ERROR);
-        if weight > 0.0 {
-            let refined = self.thorough(&exact.refined);
-            found = exact.merged_if_possible(found, refined, weight);
+        let weight = last_weight(&found, large);
+        self.completed(found, weight)
+    }
+
+    /// Makes the last passes if their weight is not 0.
+    fn completed(
+        &mut self,
+        found: Result<Estimated, Failure>,
+        weight: f64,
+    ) -> Result<Estimated, Failure> {
+        if weight == 0.0 {
+            return found;
         }
-        found
+        let full = self.thorough(&self.caches.full, f64::INFINITY);
+        self.exact.merged_if_possible(found, full, weight)
     }
 
     /// Makes the passes of a quick grade.
     fn quick(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
         let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
         self.exact.fill_plate(self.medium, &mut self.workspace.fast);
-        self.bands(bin, |workspace| (&mut workspace.fast, &mut workspace.spectra))
+        self.bands(bin, LARGE_ERROR.1, |workspace| (&mut workspace.fast, &mut workspace.spectra))
     }
 
-    /// Makes the passes of a thorough grade.
-    fn thorough(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+    /// Makes the passes of a thorough grade; a sampling error of at least `limit` is left to the next
+    /// grade.
+    fn thorough(&mut self, cache: &TableCache, limit: f64) -> Result<Estimated, Failure> {
         let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
         self.exact.fill_plate(self.medium, &mut self.workspace.accurate);
-        self.bands(bin, |workspace| (&mut workspace.accurate, &mut workspace.spectra))
+        self.bands(bin, limit, |workspace| (&mut workspace.accurate, &mut workspace.spectra))
     }
 
-    /// Makes a pass in the first band of a bin, and in the wider ones as far as they are needed;
-    /// `parts` returns the plate to be used, and the spectra.
+    /// Makes a pass in the first band of a bin, and in the wider ones as far as they are needed: a
+    /// sampling error of at least `limit` cannot be mended by the band. `parts` returns the plate to be
+    /// used, and the spectra.
     fn bands<const TERMS: usize>(
         &mut self,
         bin: &BinTables,
+        limit: f64,
         parts: fn(&mut ExactWorkspace) -> (&mut Plate<TERMS>, &mut Spectra),
     ) -> Result<Estimated, Failure> {
         let exact = self.exact;
@@ -309,19 +423,16 @@ impl BonePasses<'_> {
         let mut lines = bin.first.lines;
         for band in &bin.wider {
             let weight = match &found {
-                Ok(found) => rise(exact.counted(found.error), LARGE_ERROR),
-                // Whether there is an arrival is decided by the widest band.
-                Err(Failure { kind, .. }) => f64::from(matches!(
-                    kind,
-                    FailureKind::NoArrival | FailureKind::InconsistentArrival
-                )),
+                Ok(found) if exact.counted(found.sampling_error) >= limit => 0.0,
+                Ok(found) => rise(exact.counted(found.band_error), LARGE_ERROR),
+                Err(failure) => f64::from(may_be_noise(failure)),
             };
             if weight == 0.0 {
                 break;
             }
             fill(self, lines..band.lines);
             lines = band.lines;
-            let wider = self.pass(bin, band);
+            let wider = self.pass(bin, band).map(|wider| wider.after(&found));
             found = exact.merged(found, wider, weight);
         }
         found

@@ -9,7 +9,7 @@ use crate::Failure;
 /// An extremum below this fraction of the window's largest one is numerical noise.
 pub(crate) const FLOOR: f64 = 1e-3;
 /// A packet's peak is searched up to this many periods of the centre frequency after an extremum.
-const PACKET_PERIODS: f64 = 1.2;
+pub(crate) const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.
 const RESIDUAL_PERIODS_MAX: f64 = 0.05;
 
@@ -70,6 +70,8 @@ pub(crate) struct Pick {
     pub(crate) times: Vec<f64>,
     /// Ratio of the packet's first extremum to the packet's peak, in the median over the receivers.
     pub(crate) ratio: f64,
+    /// Largest such ratio of an earlier extremum, which is below the threshold; 0 if there is none.
+    pub(crate) skipped: f64,
     /// Largest distance of a time from the line, s.
     pub(crate) residual: f64,
     /// Ratio of |p| of the extremum to the largest in the window, at the receiver where it is
@@ -101,7 +103,8 @@ pub(crate) fn pick(
             ),
         });
     }
-    let (first, ratio) = first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
+    let FirstRank { rank: first, ratio, skipped } =
+        first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
     let rank = match picking.extremum {
         settings::Extremum::First => first,
         settings::Extremum::Second => first + 1,
@@ -123,7 +126,7 @@ pub(crate) fn pick(
     let (velocity, residual) = line(distances, &times, center_frequency)?;
     let shares = windows.iter().zip(&picks).map(|(window, p)| p.pressure.abs() / window.largest());
     let prominence = shares.fold(f64::INFINITY, f64::min);
-    Ok(Pick { velocity, times, ratio, residual, prominence })
+    Ok(Pick { velocity, times, ratio, skipped, residual, prominence })
 }
 
 /// Returns the velocity, m/s, of the line through picked times (s), and the largest distance of a
@@ -139,11 +142,18 @@ pub(crate) fn line(
     fit(distances, times, RESIDUAL_PERIODS_MAX / center_frequency)
 }
 
-/// Returns the lowest rank whose ratio, in the median over the receivers, exceeds the threshold,
-/// and that ratio.
-fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<(usize, f64), Failure> {
+/// The first rank whose ratio exceeds the threshold.
+struct FirstRank {
+    rank: usize,
+    ratio: f64,
+    /// Largest ratio of a lower rank.
+    skipped: f64,
+}
+
+/// Returns the lowest rank whose ratio, in the median over the receivers, exceeds the threshold.
+fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<FirstRank, Failure> {
     // The loop ends at the latest when a receiver has no further extrema.
-    let mut rank = 0;
+    let (mut rank, mut skipped) = (0, 0.0_f64);
     loop {
         let mut ratios = Vec::with_capacity(windows.len());
         for (r, window) in windows.iter().enumerate() {
@@ -151,8 +161,9 @@ fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<(usize,
         }
         let ratio = median(&mut ratios);
         if ratio > threshold {
-            return Ok((rank, ratio));
+            return Ok(FirstRank { rank, ratio, skipped });
         }
+        skipped = skipped.max(ratio);
         rank += 1;
     }
 }

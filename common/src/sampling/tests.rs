@@ -15,12 +15,28 @@ fn the_papers_outer_faces_are_not_heard_and_near_ones_are() {
             &setup,
             speed_bin(&setup, 3960.1).unwrap(),
             Grade::Thorough,
+            OuterFaces::Audible,
         );
         (sampling.upper_echoes, sampling.lower_echoes)
     };
     assert_eq!(echoes(|_| ()), (false, false));
     assert_eq!(echoes(|s| s.layers.coupling.thickness = 4e-3), (true, false));
     assert_eq!(echoes(|s| s.layers.marrow.thickness = 3e-3), (false, true));
+    // The earliest is that of the nearer face.
+    for (change, heard) in [
+        ((|_: &mut Setup| ()) as fn(&mut Setup), false),
+        (|s| s.layers.coupling.thickness = 4e-3, true),
+        (|s| s.layers.marrow.thickness = 3e-3, true),
+    ] {
+        assert_eq!(echoes_are_audible(&setup(change), 3960.1), heard);
+    }
+}
+
+#[test]
+fn fluids_without_end_have_no_echoes() {
+    let near = setup(|s| s.layers.coupling.thickness = 4e-3);
+    let sampling = WaveSampling::for_speed_bin(&near, 18, Grade::Thorough, OuterFaces::None);
+    assert!(!sampling.upper_echoes && !sampling.lower_echoes);
 }
 
 #[test]
@@ -38,8 +54,12 @@ fn arrivals_at_the_papers_probe() {
 fn a_speed_bin_is_fast_enough_and_not_much_faster() {
     let setup = Setup::default();
     for speed in [1000.0, 1687.5, 1687.6, 4000.0, 25_000.0] {
-        let sampling =
-            WaveSampling::for_speed_bin(&setup, speed_bin(&setup, speed).unwrap(), Grade::Quick);
+        let sampling = WaveSampling::for_speed_bin(
+            &setup,
+            speed_bin(&setup, speed).unwrap(),
+            Grade::Quick,
+            OuterFaces::Audible,
+        );
         assert!(sampling.speed >= speed);
         assert!(sampling.speed <= speed.max(1500.0) * SPEED_BIN_RATIO * (1.0 + 1e-12));
     }
@@ -50,8 +70,12 @@ fn a_speed_bin_is_fast_enough_and_not_much_faster() {
 #[test]
 fn the_repeated_source_is_heard_after_the_window() {
     let setup = Setup::default();
-    let sampling =
-        WaveSampling::for_speed_bin(&setup, speed_bin(&setup, 3960.1).unwrap(), Grade::Thorough);
+    let sampling = WaveSampling::for_speed_bin(
+        &setup,
+        speed_bin(&setup, 3960.1).unwrap(),
+        Grade::Thorough,
+        OuterFaces::Audible,
+    );
     let length = 2.0 * PI / sampling.wavenumber_step;
     let image = earliest_arrival(&setup, length - 21.4e-3, sampling.speed);
     assert!(image > direct_arrival(&setup, 21.4e-3));
@@ -59,7 +83,8 @@ fn the_repeated_source_is_heard_after_the_window() {
 
 #[test]
 fn the_taper_falls_from_one_to_nothing() {
-    let sampling = WaveSampling::for_speed_bin(&Setup::default(), 18, Grade::Quick);
+    let sampling =
+        WaveSampling::for_speed_bin(&Setup::default(), 18, Grade::Quick, OuterFaces::Audible);
     let weights: Vec<f64> = (0..sampling.frequencies())
         .map(|n| sampling.taper(n, velocity_taper(sampling.whole_band())))
         .collect();

@@ -32,8 +32,21 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.9, 1.0),
     (0.95, 1.0),
 ];
-/// Ratio of the estimated error to the root mean square change of the velocity by the other tapers.
-const ESTIMATE_FACTOR: f64 = 1.3;
+/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 99 of
+/// 100 errors are smaller.
+const BAND_FACTOR: f64 = 3.25;
+/// Largest further factor of thin plates.
+const THIN_FACTOR_MAX: f64 = 2.0;
+/// Ratio of the least stated error to the change of the velocity by doubling the band.
+const CHANGE_FACTOR: f64 = 0.3;
+/// Number of times before the earliest possible arrival, spread over one period, at which the signal
+/// is looked at.
+const BEFORE: usize = LANES - 1;
+/// Ratio of the stated error to the root mean square change of the velocity by the noise before the
+/// earliest possible arrival, as receivers have it at the same time.
+const NOISE_FACTOR: f64 = 3.0;
+/// The same for noise that shifts the times in the least favourable way.
+const WORST_NOISE_FACTOR: f64 = 0.5;
 
 /// Tables of one speed bin, shared by all bones.
 #[derive(Debug)]
@@ -74,18 +87,34 @@ pub(crate) struct ExactWorkspace {
 #[derive(Debug)]
 pub(crate) struct Estimated {
     pub(crate) pick: Pick,
-    pub(crate) error: f64,
+    /// The part that is due to the band's end.
+    pub(crate) band_error: f64,
+    /// The part that is due to the samples' distances, and to where their sums end.
+    pub(crate) sampling_error: f64,
     pub(crate) sampled: Sampled,
 }
 
 impl Estimated {
+    pub(crate) fn error(&self) -> f64 {
+        let Self { band_error, sampling_error, .. } = *self;
+        at_most_one(band_error.mul_add(band_error, sampling_error * sampling_error).sqrt())
+    }
+
+    /// States no less than a part of the change from the pass with the next narrower band.
+    pub(crate) fn after(self, narrower: &Result<Self, Failure>) -> Self {
+        let Ok(narrower) = narrower else { return self };
+        let change = (self.pick.velocity / narrower.pick.velocity - 1.0).abs();
+        Self { band_error: self.band_error.max(at_most_one(CHANGE_FACTOR * change)), ..self }
+    }
+
     /// Returns the arrival, found in `count` passes with this total number of pairs.
     pub(crate) fn arrival(self, count: u32, pairs_computed: u64) -> Arrival {
-        let Self { pick, error, sampled: last } = self;
+        let estimated_error = self.error();
+        let Self { pick, sampled: last, .. } = self;
         Arrival {
             velocity: pick.velocity,
             times: pick.times,
-            estimated_error: error,
+            estimated_error,
             passes: Some(PassSummary { count, pairs_computed, last }),
         }
     }
@@ -173,15 +202,67 @@ impl Exact {
         let moved = self.isa.run(Repick { bin, band, times: &pick.times, workspace });
         let mut square = 0.0;
         for taper in 0..LANES {
-            let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
-            let change = picking::slope(&self.distances, &times) / pick.velocity - 1.0;
+            let change = self.change(&pick, |r| moved[r].0[taper]);
             square = change.mul_add(change, square);
         }
-        let error = ESTIMATE_FACTOR * (square / LANES as f64).sqrt();
-        // A signal that changes beyond recognition gives the largest error, not a failure.
-        let error = if error <= 1.0 { error } else { 1.0 };
-        Ok(Estimated { pick, error, sampled: band.sampled })
+        let band_error = BAND_FACTOR * thin_factor(&self.setup) * (square / LANES as f64).sqrt();
+        let sampling_error = self.sampling_error(bin, band, &pick, workspace);
+        Ok(Estimated {
+            pick,
+            band_error: at_most_one(band_error),
+            sampling_error: at_most_one(sampling_error),
+            sampled: band.sampled,
+        })
     }
+
+    /// Returns the relative change of a pick's velocity if its times, s, were others.
+    fn change(&self, pick: &Pick, time: impl Fn(usize) -> f64) -> f64 {
+        let times: Vec<f64> = (0..pick.times.len()).map(time).collect();
+        picking::slope(&self.distances, &times) / pick.velocity - 1.0
+    }
+
+    /// Estimates the error that is due to the distances of samples and the ends of their sums.
+    ///
+    /// Before the earliest possible arrival the pressure is zero, except for waves that wrap round
+    /// and for what the sums leave out. That noise goes on: its slope, divided by the curvature of the
+    /// picked extremum, is the error of a time.
+    fn sampling_error(
+        &self,
+        bin: &BinTables,
+        band: &Band,
+        pick: &Pick,
+        workspace: &ExactWorkspace,
+    ) -> f64 {
+        let Self { setup, distances, isa, .. } = self;
+        let delays = isa.run(Listen { setup, distances, bin, band, times: &pick.times, workspace });
+        let mean = pick.times.iter().fold(0.0, |sum, t| sum + t) / pick.times.len() as f64;
+        let spread = pick.times.iter().fold(0.0, |sum, t| (t - mean).mul_add(t - mean, sum));
+        let (mut changes, mut worst) = ([0.0; BEFORE], 0.0);
+        for (t, delays) in pick.times.iter().zip(&delays) {
+            let weight = (t - mean) / spread;
+            let mut square = 0.0;
+            for (change, &delay) in changes.iter_mut().zip(delays) {
+                *change = delay.mul_add(weight, *change);
+                square = delay.mul_add(delay, square);
+            }
+            worst = (square / BEFORE as f64).sqrt().mul_add(weight.abs(), worst);
+        }
+        let square = changes.iter().fold(0.0, |sum, change| change.mul_add(*change, sum));
+        let usual = NOISE_FACTOR * (square / BEFORE as f64).sqrt();
+        let worst = WORST_NOISE_FACTOR * worst;
+        usual.mul_add(usual, worst * worst).sqrt()
+    }
+}
+
+/// Returns the ratio of a band's error to what it would be in a thick plate with the same change by the
+/// other tapers: in a thin plate the error falls slowly with the band, which tapers do not show.
+pub(crate) fn thin_factor(setup: &Setup) -> f64 {
+    sampling::thinness(setup).min(THIN_FACTOR_MAX)
+}
+
+/// Returns an error; a signal that changes beyond recognition has the largest, not a failure.
+fn at_most_one(error: f64) -> f64 {
+    if error <= 1.0 { error } else { 1.0 }
 }
 
 /// Kernel that lists the extrema of the pressure at every receiver.
@@ -240,5 +321,40 @@ impl Kernel for Repick<'_> {
             moved.push(signal.moved_extrema::<V>(time, &self.band.others));
         }
         moved
+    }
+}
+
+/// Kernel that looks at the signals before the earliest possible arrivals: the times, s, by which what
+/// is there delays the picked extrema.
+struct Listen<'a> {
+    setup: &'a Setup,
+    distances: &'a [f64],
+    bin: &'a BinTables,
+    band: &'a Band,
+    times: &'a [f64],
+    workspace: &'a ExactWorkspace,
+}
+
+impl Kernel for Listen<'_> {
+    type Output = Vec<[f64; BEFORE]>;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> Vec<[f64; BEFORE]> {
+        let Tables { sampling, runs, .. } = &self.bin.tables;
+        let step = 1.0 / (BEFORE as f64 * self.setup.probe.center_frequency);
+        let mut delays = Vec::with_capacity(self.times.len());
+        for (r, (&time, &x)) in self.times.iter().zip(self.distances).enumerate() {
+            let spectrum = &self.workspace.spectra.receiver(r)[..self.band.taper.len()];
+            let signal = Signal { sampling, runs, spectrum };
+            let earliest = sampling::earliest_arrival(self.setup, x, sampling.speed);
+            // The last time is that of the pick.
+            let mut times = Lanes([time; LANES]);
+            for (i, t) in times.0[..BEFORE].iter_mut().enumerate() {
+                *t = (i as f64 + 0.5).mul_add(-step, earliest);
+            }
+            let (slopes, curvatures) = signal.bends::<V>(&times, &self.band.taper);
+            delays.push(std::array::from_fn(|i| slopes.0[i] / curvatures.0[BEFORE]));
+        }
+        delays
     }
 }

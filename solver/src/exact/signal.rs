@@ -301,6 +301,19 @@ impl Signal<'_> {
         times
     }
 
+    /// Returns the first and second derivatives of the pressure, Pa/s and Pa/s², at eight times (s) if
+    /// the lines are weighted: `weights` contains one weight per line, by run.
+    #[inline(always)]
+    pub(crate) fn bends<V: Vector>(&self, times: &Lanes, weights: &[Lanes]) -> (Lanes, Lanes) {
+        let at = self.derivatives::<V, _>(&self.turns(times), weights);
+        let (mut slopes, mut curvatures) = (Lanes::ZERO, Lanes::ZERO);
+        for (lane, &t) in times.0.iter().enumerate() {
+            slopes.0[lane] = self.pressure(t, at.slope.0[lane]);
+            curvatures.0[lane] = self.pressure(t, at.curvature.0[lane]);
+        }
+        (slopes, curvatures)
+    }
+
     /// The factor e^{αt} does not affect the zero: this is Newton's step for the rest.
     #[inline(always)]
     fn newton_step(&self, slope: f64, curvature: f64) -> f64 {
@@ -382,6 +395,15 @@ impl Weights for Unweighted {
     #[inline(always)]
     fn apply<V: Vector>(&self, _: usize, _: usize, _: usize, (re, im): (f64, f64)) -> (V, V) {
         (V::splat(re), V::splat(im))
+    }
+}
+
+/// The same weights in all lanes.
+impl Weights for [Lanes] {
+    #[inline(always)]
+    fn apply<V: Vector>(&self, run: usize, line: usize, _: usize, (re, im): (f64, f64)) -> (V, V) {
+        let weight = self[run].0[line];
+        (V::splat(weight * re), V::splat(weight * im))
     }
 }
 

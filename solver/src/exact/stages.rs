@@ -78,7 +78,8 @@ impl Stages {
         } else {
             exact.fill_plate(&medium, &mut memory.exact.fast);
         }
-        let cache = if accurate { &exact.thorough } else { &exact.quick };
+        let caches = &exact.without_faces;
+        let cache = if accurate { &caches.thorough } else { &caches.quick };
         let index = sampling::speed_bin(&exact.setup, speed).unwrap_or(SPEED_BINS);
         let bin = exact.bin_tables(cache, index, speed)?;
         Ok(Filled { exact, bin, accurate, medium, speed, memory })

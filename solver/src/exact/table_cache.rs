@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{BANDS, Grade, SPEED_BINS, WaveSampling};
+use osteon_common::sampling::{BANDS, Grade, OuterFaces, SPEED_BINS, WaveSampling};
 
 use crate::exact::pass::BinTables;
 
@@ -18,13 +18,14 @@ const PAIRS_MARGIN: f64 = 8.0;
 pub(crate) const PAIRS_MAX: f64 = PAIRS_MARGIN * SAMPLING_PAIRS_MAX;
 /// Memory for tables that one solver keeps, bytes; further ones are recomputed when needed, which
 /// takes several times as long as what they are for.
-const TABLE_BYTES_MAX: u64 = 48_000_000;
+const TABLE_BYTES_MAX: u64 = 160_000_000;
 
-/// Samplings of one grade, by speed.
+/// Samplings of one grade, with or without outer faces, by speed.
 #[derive(Debug)]
 pub(crate) struct TableCache {
     setup: Setup,
     grade: Grade,
+    faces: OuterFaces,
     memory: Arc<TableMemory>,
     /// Each slot is filled when a bone first needs it.
     slots: [OnceLock<Slot>; SPEED_BINS],
@@ -53,9 +54,14 @@ enum Slot {
 
 impl TableCache {
     /// Creates the cache of one grade; `memory` is that of all caches of a solver.
-    pub(crate) fn new(setup: &Setup, grade: Grade, memory: &Arc<TableMemory>) -> Self {
+    pub(crate) fn new(
+        setup: &Setup,
+        grade: Grade,
+        faces: OuterFaces,
+        memory: &Arc<TableMemory>,
+    ) -> Self {
         let memory = Arc::clone(memory);
-        Self { setup: *setup, grade, memory, slots: [const { OnceLock::new() }; SPEED_BINS] }
+        Self { setup: *setup, grade, faces, memory, slots: [const { OnceLock::new() }; SPEED_BINS] }
     }
 
     /// Returns the tables of the speed bin at `index`, unless it is too large.
@@ -70,7 +76,7 @@ impl TableCache {
     }
 
     fn slot(&self, index: usize) -> Slot {
-        let mut sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade);
+        let mut sampling = WaveSampling::for_speed_bin(&self.setup, index, self.grade, self.faces);
         let mut pairs = sampling.pairs(sampling.whole_band());
         // The widest bands are left out where they are too large.
         for narrower in (0..BANDS - 1).rev() {
@@ -140,12 +146,12 @@ mod tests {
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
         let keeps = Exact::new(&setup, Isa::fastest());
         let expected = bits(&keeps, &bones);
-        let held = |exact: &Exact| exact.quick.memory.0.load(Ordering::Relaxed);
+        let held = |exact: &Exact| exact.without_faces.quick.memory.0.load(Ordering::Relaxed);
         assert!(held(&keeps) < TABLE_BYTES_MAX, "{}", held(&keeps));
         // No bin is kept; some bins and lines are.
         for free in [0, held(&keeps) / 4, held(&keeps) / 2] {
             let keeps_few = Exact::new(&setup, Isa::fastest());
-            assert!(keeps_few.quick.memory.reserve(TABLE_BYTES_MAX - free));
+            assert!(keeps_few.without_faces.quick.memory.reserve(TABLE_BYTES_MAX - free));
             assert_eq!(bits(&keeps_few, &bones), expected, "{free} bytes free");
             assert!(held(&keeps_few) <= TABLE_BYTES_MAX, "{}", held(&keeps_few));
         }

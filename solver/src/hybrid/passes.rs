@@ -321,6 +321,7 @@ mod tests {
         let pick = |velocity, times: [f64; 3]| Pick {
             velocity,
             times: times.to_vec(),
+            skipped: 0.0,
             ratio: 1.0,
             residual: 0.0,
             prominence: 1.0,

@@ -1,0 +1,67 @@
+//! Earliest possible arrivals: bounds from geometry and the fastest wave.
+
+use crate::case::Setup;
+
+/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
+/// along the bone at `speed` (m/s) and through the coupling fluid at its ends.
+///
+/// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
+pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
+    let c1 = setup.layers.coupling.sound_speed;
+    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    if speed <= c1 {
+        return reflected_arrival(setup, x);
+    }
+    x / speed + heights * slowness(c1, speed)
+}
+
+/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a reflection of an outer
+/// face, for waves along the bone up to `speed` (m/s): a lower bound.
+pub fn earliest_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
+    upper_echo(setup, x, speed).min(lower_echo(setup, x, speed))
+}
+
+/// Returns whether a reflection of an outer face can arrive before the direct wave at some receiver,
+/// for waves along the bone up to `speed` (m/s).
+pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
+    distances(setup).any(|x| earliest_echo(setup, x, speed) <= direct_arrival(setup, x))
+}
+
+/// Returns the arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
+pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
+    let across = setup.probe.receivers.x3 - setup.probe.source.x3;
+    x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
+}
+
+/// Returns the horizontal distances of the receivers from the source, m.
+pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
+    setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
+}
+
+/// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
+/// `v`.
+pub fn slowness(c: f64, v: f64) -> f64 {
+    (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
+}
+
+/// Returns the arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper
+/// face.
+pub(super) fn reflected_arrival(setup: &Setup, x: f64) -> f64 {
+    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
+}
+
+/// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
+pub(super) fn upper_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
+    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+    let coupling = &setup.layers.coupling;
+    let path = 2.0 * coupling.thickness - (receivers - source).abs();
+    x / speed + path * slowness(coupling.sound_speed, speed)
+}
+
+/// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.
+pub(super) fn lower_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
+    let marrow = &setup.layers.marrow;
+    let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
+    earliest_arrival(setup, x, speed) + across
+}
