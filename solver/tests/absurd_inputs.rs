@@ -186,7 +186,7 @@ fn traces_next_to_the_source_end() {
 }
 
 properties! {
-    #![cases(100)]
+    #![cases(40)]
 
     fn a_velocity_or_a_typed_failure(setup in setup(), bone in bone()) {
         prop_assume!(is_admissible(&setup));
