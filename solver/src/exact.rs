@@ -34,7 +34,7 @@ use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{self, Grade, OuterFaces};
 
-use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace, thin_factor};
+use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace, slow_decay};
 use crate::exact::plate::Plate;
 use crate::exact::response::Spectra;
 use crate::exact::table_cache::{PAIRS_MAX, TableCache, TableMemory, TablesRef};
@@ -46,9 +46,9 @@ use crate::vector::Vector;
 
 /// Stated errors due to the band, or to the sampling, at refinement 1, between which the weight of the
 /// pass with the next wider band, or of the next sampling, rises from 0 to 1.
-const LARGE_ERROR: (f64, f64) = (1e-4, 1.6e-4);
+const LARGE_ERROR: (f64, f64) = (1.3e-4, 2e-4);
 /// The same for the whole error and the last two samplings.
-const VERY_LARGE_ERROR: (f64, f64) = (1.3e-4, 2e-4);
+const VERY_LARGE_ERROR: (f64, f64) = (1.6e-4, 2.4e-4);
 /// Factor of the refinement in the last passes, at refinement 1 and below.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
@@ -161,12 +161,12 @@ impl Exact {
     }
 
     /// Returns a stated error as it compares with the constants above, which are meant for refinement
-    /// 1 and a thick plate: a user who sets a lower refinement accepts larger errors, and expects
+    /// 1 and a thick plate on light marrow: a user who sets a lower refinement accepts larger errors, and expects
     /// smaller ones of a higher refinement.
     fn counted(&self, error: f64) -> f64 {
         let refinement = self.setup.solver.refinement;
         let power = if refinement < 1.0 { 3.0 } else { 1.5 };
-        error * libm::pow(refinement, power) / thin_factor(&self.setup)
+        error * libm::pow(refinement, power) / slow_decay(&self.setup).sqrt()
     }
 
     /// Returns whether reflections of the outer faces may change the pick that was found without

@@ -35,8 +35,10 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
 /// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 99 of
 /// 100 errors are smaller.
 const BAND_FACTOR: f64 = 3.25;
-/// Largest further factor of thin plates.
-const THIN_FACTOR_MAX: f64 = 2.0;
+/// Largest further factor of thin plates and heavy marrows.
+const SLOW_DECAY_MAX: f64 = 2.0;
+/// Density of the marrow, kg/m³, above which the further factor grows.
+const HEAVY_MARROW: f64 = 2000.0;
 /// Ratio of the least stated error to the change of the velocity by doubling the band.
 const CHANGE_FACTOR: f64 = 0.3;
 /// Number of times before the earliest possible arrival, spread over one period, at which the signal
@@ -205,7 +207,7 @@ impl Exact {
             let change = self.change(&pick, |r| moved[r].0[taper]);
             square = change.mul_add(change, square);
         }
-        let band_error = BAND_FACTOR * thin_factor(&self.setup) * (square / LANES as f64).sqrt();
+        let band_error = BAND_FACTOR * slow_decay(&self.setup) * (square / LANES as f64).sqrt();
         let sampling_error = self.sampling_error(bin, band, &pick, workspace);
         Ok(Estimated {
             pick,
@@ -254,10 +256,12 @@ impl Exact {
     }
 }
 
-/// Returns the ratio of a band's error to what it would be in a thick plate with the same change by the
-/// other tapers: in a thin plate the error falls slowly with the band, which tapers do not show.
-pub(crate) fn thin_factor(setup: &Setup) -> f64 {
-    sampling::thinness(setup).min(THIN_FACTOR_MAX)
+/// Returns the ratio of a band's error to what it would usually be with the same change by the other
+/// tapers: in a thin plate, or on a heavy marrow, the error falls slowly with the band, which tapers do
+/// not show.
+pub(crate) fn slow_decay(setup: &Setup) -> f64 {
+    let heaviness = (setup.layers.marrow.density / HEAVY_MARROW).max(1.0);
+    (sampling::thinness(setup) * heaviness).min(SLOW_DECAY_MAX)
 }
 
 /// Returns an error; a signal that changes beyond recognition has the largest, not a failure.
