@@ -35,6 +35,28 @@ const PAIRS_MAX: (f64, f64) = (1e5, 2e6);
 /// Maximum number of attempts to draw a case that is admissible and not too large.
 const TRIES_MAX: usize = 1000;
 
+/// Ranges of the quantities of a set-up, in SI units.
+#[derive(Debug, Clone, Copy)]
+struct Ranges {
+    center_frequency: (f64, f64),
+    /// Of source and receivers above the bone.
+    height: (f64, f64),
+    first_x1: (f64, f64),
+    span: (f64, f64),
+    fluid_thickness: (f64, f64),
+    fluid_density: (f64, f64),
+}
+
+/// The ranges of the study.
+const RANGES: Ranges = Ranges {
+    center_frequency: (0.25e6, 4e6),
+    height: (0.3e-3, 6e-3),
+    first_x1: (3e-3, 40e-3),
+    span: (0.3e-3, 40e-3),
+    fluid_thickness: (1e-3, 30e-3),
+    fluid_density: (500.0, 6000.0),
+};
+
 /// One case: a bone with its own setup, and the quantities from which it was drawn.
 #[derive(Debug, Clone)]
 struct Drawn {
@@ -94,7 +116,7 @@ fn measured(draws: &Draws) -> Result<Vec<MeasuredSetup>, PointError> {
     (0..draws.realizations)
         .into_par_iter()
         .map_init(Workspace::default, |workspace, index| {
-            let drawn = drawn(draws.seed, index)?;
+            let drawn = drawn(draws.seed, index, &RANGES)?;
             Ok(drawn.map(|drawn| MeasuredSetup::new(index, drawn, draws.isa, workspace)))
         })
         .filter_map(Result::transpose)
@@ -198,14 +220,14 @@ impl MeasuredSetup {
 /// # Errors
 /// If its mean model or dispersion has no ensemble.
 pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
-    Ok(drawn(seed, index)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
+    Ok(drawn(seed, index, &RANGES)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
 }
 
 /// Returns the first case of `index` that passes validation and is within the limit of time.
-fn drawn(seed: u64, index: u64) -> Result<Option<Drawn>, PointError> {
+fn drawn(seed: u64, index: u64, ranges: &Ranges) -> Result<Option<Drawn>, PointError> {
     let mut generator = Generator::for_index(seed, index);
     for _ in 0..TRIES_MAX {
-        let (setup, point) = (setup(&mut generator), point(&mut generator));
+        let (setup, point) = (setup(&mut generator, ranges), point(&mut generator));
         if !is_suitable(&setup) {
             continue;
         }
@@ -225,15 +247,14 @@ fn is_suitable(setup: &Setup) -> bool {
     violations.is_empty() && pair_count(setup) <= PAIRS_MAX.0 && pair_count(&refined) <= PAIRS_MAX.1
 }
 
-fn setup(generator: &mut Generator) -> Setup {
-    let center_frequency = generator.decades(0.25e6, 4e6);
-    let coupling = fluid(generator);
-    let marrow = fluid(generator);
-    let bone_thickness = generator.decades(0.5e-3, 8e-3);
-    let mut height = || generator.decades(0.3e-3, 6e-3);
-    let (source, receivers) = (height(), height());
-    let first_x1 = generator.decades(3e-3, 40e-3);
-    let span = generator.decades(0.3e-3, 40e-3);
+fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
+    let center_frequency = generator.decades(ranges.center_frequency.0, ranges.center_frequency.1);
+    let coupling = fluid(generator, ranges);
+    let marrow = fluid(generator, ranges);
+    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
+    let bone_thickness = within((0.5e-3, 8e-3));
+    let (source, receivers) = (within(ranges.height), within(ranges.height));
+    let (first_x1, span) = (within(ranges.first_x1), within(ranges.span));
     let count = generator.between(3.0, 25.0) as u32;
     Setup {
         layers: Layers { coupling, bone_thickness, marrow },
@@ -252,10 +273,11 @@ fn setup(generator: &mut Generator) -> Setup {
     }
 }
 
-fn fluid(generator: &mut Generator) -> Fluid {
+fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
+    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
     Fluid {
-        thickness: generator.decades(1e-3, 30e-3),
-        density: generator.decades(500.0, 6000.0),
+        thickness: within(ranges.fluid_thickness),
+        density: within(ranges.fluid_density),
         sound_speed: generator.between(1000.0, 2000.0),
     }
 }
@@ -288,8 +310,18 @@ fn point(generator: &mut Generator) -> Point {
 mod tests {
     use super::*;
 
+    /// Ranges without short arrays.
+    const LONG_ARRAYS: Ranges = Ranges {
+        center_frequency: (0.25e6, 2e6),
+        height: (0.5e-3, 6e-3),
+        first_x1: (3e-3, 30e-3),
+        span: (8e-3, 40e-3),
+        fluid_thickness: (2e-3, 30e-3),
+        fluid_density: (500.0, 2200.0),
+    };
+
     fn outcome(index: u64, difference: Difference) -> MeasuredSetup {
-        let drawn = drawn(1, index).unwrap().unwrap();
+        let drawn = drawn(1, index, &LONG_ARRAYS).unwrap().unwrap();
         let failure = osteon_common::outcome::FailureKind::NoArrival;
         let arrival = Err(Failure { kind: failure, detail: String::new() });
         MeasuredSetup { index, drawn, found: arrival.clone(), reference: arrival, difference }
@@ -318,12 +350,26 @@ mod tests {
         );
     }
 
+    /// Cases whose first packet overlaps with slower waves at the nearest receiver, or whose thin
+    /// plate needs the refined pass. Without these measures each had an error of 3e-4 to 2e-3.
+    #[test]
+    fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
+        for index in [53, 101, 111, 149, 173, 177, 381] {
+            let drawn = drawn(1, index, &LONG_ARRAYS).unwrap().unwrap();
+            let one = MeasuredSetup::new(index, drawn, Isa::fastest(), &mut Workspace::default());
+            let error = one.difference.velocity();
+            // The error cannot be smaller than that of the reference itself.
+            let bound = one.reference.as_ref().map_or(0.0, |found| found.estimated_error).max(2e-4);
+            assert!(error.is_some_and(|error| error < bound), "{error:?}: {}", one.described());
+        }
+    }
+
     #[test]
     fn no_error_is_far_above_what_is_stated() {
         let mut workspace = Workspace::default();
         let mut counts = [0; 2];
         for index in 0..30 {
-            let drawn = drawn(2, index).unwrap().unwrap();
+            let drawn = drawn(2, index, &RANGES).unwrap().unwrap();
             let one = MeasuredSetup::new(index, drawn, Isa::fastest(), &mut workspace);
             let Some(error) = one.difference.velocity() else { continue };
             let stated = one.stated(&one.found).unwrap() + one.stated(&one.reference).unwrap();
