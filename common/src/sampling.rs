@@ -27,7 +27,7 @@ use std::f64::consts::PI;
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::settings::Method;
-use arrivals::{lower_echo, reflected_arrival, upper_echo};
+use arrivals::{is_audible, lower_echo, reflected_arrival, upper_echo};
 
 pub use arrivals::{
     direct_arrival, distances, earliest_arrival, earliest_echo, echoes_are_audible, slowness,
@@ -251,11 +251,8 @@ impl WaveSampling {
         }
         let mut sampling = Self::new(setup, grade, damping, speed, longest, last);
         if faces == OuterFaces::Audible {
-            let audible = |echo: fn(&Setup, f64, f64) -> f64| {
-                distances(setup).any(|x| echo(setup, x, speed) <= direct_arrival(setup, x))
-            };
-            sampling.upper_echoes = audible(upper_echo);
-            sampling.lower_echoes = audible(lower_echo);
+            sampling.upper_echoes = is_audible(setup, speed, upper_echo);
+            sampling.lower_echoes = is_audible(setup, speed, lower_echo);
         }
         sampling
     }

@@ -124,10 +124,10 @@ impl Exact {
             count: 0,
             pairs: 0,
         };
-        let mut found = passes.in_bins(bin);
+        let mut found = passes.in_bins();
         if self.needs_faces(&found, speed) {
             passes.caches = &self.with_faces;
-            found = self.with_echoes(found, passes.in_bins(bin), speed);
+            found = self.with_echoes(found, passes.in_bins(), speed);
         }
         let BonePasses { count, pairs, .. } = passes;
         found.map(|found| found.arrival(count, pairs))
@@ -161,8 +161,8 @@ impl Exact {
     }
 
     /// Returns a stated error as it compares with the constants above, which are meant for refinement
-    /// 1 and a thick plate on light marrow: a user who sets a lower refinement accepts larger errors, and expects
-    /// smaller ones of a higher refinement.
+    /// 1 and a thick plate on light marrow: a user who sets a lower refinement accepts larger
+    /// errors, and expects smaller ones of a higher refinement.
     fn counted(&self, error: f64) -> f64 {
         let refinement = self.setup.solver.refinement;
         let power = if refinement < 1.0 { 3.0 } else { 1.5 };
@@ -273,17 +273,15 @@ impl Exact {
     }
 }
 
-/// Returns the weight of the last passes, which decide whether there is an arrival.
-fn last_weight(found: &Result<Estimated, Failure>, of_error: impl Fn(&Estimated) -> f64) -> f64 {
+/// Returns the weight of further passes: that of the error, or 1 where they decide whether there is an
+/// arrival.
+fn next_weight(found: &Result<Estimated, Failure>, of_error: impl Fn(&Estimated) -> f64) -> f64 {
     match found {
         Ok(found) => of_error(found),
-        Err(failure) => f64::from(may_be_noise(failure)),
+        Err(Failure { kind, .. }) => {
+            f64::from(matches!(kind, FailureKind::NoArrival | FailureKind::InconsistentArrival))
+        }
     }
-}
-
-/// Returns whether a finer sampling may find an arrival where this one failed.
-fn may_be_noise(failure: &Failure) -> bool {
-    matches!(failure.kind, FailureKind::NoArrival | FailureKind::InconsistentArrival)
 }
 
 fn too_large(speed: f64) -> Failure {
@@ -335,15 +333,15 @@ struct BonePasses<'a> {
 
 impl BonePasses<'_> {
     /// Computes as many passes as the bone needs, in its speed bin and, near the edge, in the next.
-    fn in_bins(&mut self, bin: usize) -> Result<Estimated, Failure> {
-        self.bin = bin;
+    fn in_bins(&mut self) -> Result<Estimated, Failure> {
         let found = self.run();
-        let next = sampling::next_bin_weight(&self.exact.setup, bin, self.speed);
+        let next = sampling::next_bin_weight(&self.exact.setup, self.bin, self.speed);
         if next == 0.0 {
             return found;
         }
-        self.bin = bin + 1;
+        self.bin += 1;
         let other = self.run();
+        self.bin -= 1;
         self.exact.merged_if_possible(found, other, next)
     }
 
@@ -353,8 +351,7 @@ impl BonePasses<'_> {
         let rough = |found: &Estimated| rise(exact.counted(found.sampling_error), LARGE_ERROR);
         if sampling::first_grade(&exact.setup) == Grade::Thorough {
             let found = self.thorough(&caches.thorough, LARGE_ERROR.1);
-            let weight = last_weight(&found, rough);
-            return self.completed(found, weight);
+            return self.completed(found, rough);
         }
         let small = |found: &Estimated| 1.0 - rise(found.pick.prominence, SMALL);
         let mut found = self.quick(&caches.quick);
@@ -370,16 +367,16 @@ impl BonePasses<'_> {
             let thorough = self.thorough(&caches.thorough, VERY_LARGE_ERROR.1);
             found = exact.merged(found, thorough, weight);
         }
-        let weight = last_weight(&found, large);
-        self.completed(found, weight)
+        self.completed(found, large)
     }
 
-    /// Makes the last passes if their weight is not 0.
+    /// Makes the last passes if the weight of the error is not 0, or if there is no arrival yet.
     fn completed(
         &mut self,
         found: Result<Estimated, Failure>,
-        weight: f64,
+        of_error: impl Fn(&Estimated) -> f64,
     ) -> Result<Estimated, Failure> {
+        let weight = next_weight(&found, of_error);
         if weight == 0.0 {
             return found;
         }
@@ -422,11 +419,10 @@ impl BonePasses<'_> {
         let mut found = self.pass(bin, &bin.first);
         let mut lines = bin.first.lines;
         for band in &bin.wider {
-            let weight = match &found {
-                Ok(found) if exact.counted(found.sampling_error) >= limit => 0.0,
-                Ok(found) => rise(exact.counted(found.band_error), LARGE_ERROR),
-                Err(failure) => f64::from(may_be_noise(failure)),
-            };
+            let weight = next_weight(&found, |found| {
+                let is_vain = exact.counted(found.sampling_error) >= limit;
+                if is_vain { 0.0 } else { rise(exact.counted(found.band_error), LARGE_ERROR) }
+            });
             if weight == 0.0 {
                 break;
             }

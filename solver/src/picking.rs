@@ -198,7 +198,8 @@ pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
     cross / square
 }
 
-fn mean(values: &[f64]) -> f64 {
+/// Returns the arithmetic mean.
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }
 

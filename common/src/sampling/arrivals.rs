@@ -24,7 +24,7 @@ pub fn earliest_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
 /// Returns whether a reflection of an outer face can arrive before the direct wave at some receiver,
 /// for waves along the bone up to `speed` (m/s).
 pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
-    distances(setup).any(|x| earliest_echo(setup, x, speed) <= direct_arrival(setup, x))
+    is_audible(setup, speed, earliest_echo)
 }
 
 /// Returns the arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
@@ -42,6 +42,11 @@ pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
 /// `v`.
 pub fn slowness(c: f64, v: f64) -> f64 {
     (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
+}
+
+/// Returns whether what arrives at the time that `echo` gives is before the direct wave at some receiver.
+pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, f64, f64) -> f64) -> bool {
+    distances(setup).any(|x| echo(setup, x, speed) <= direct_arrival(setup, x))
 }
 
 /// Returns the arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper

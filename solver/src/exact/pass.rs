@@ -32,7 +32,7 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.9, 1.0),
     (0.95, 1.0),
 ];
-/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 99 of
+/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 98 of
 /// 100 errors are smaller.
 const BAND_FACTOR: f64 = 3.25;
 /// Largest further factor of thin plates and heavy marrows.
@@ -98,8 +98,7 @@ pub(crate) struct Estimated {
 
 impl Estimated {
     pub(crate) fn error(&self) -> f64 {
-        let Self { band_error, sampling_error, .. } = *self;
-        at_most_one(band_error.mul_add(band_error, sampling_error * sampling_error).sqrt())
+        at_most_one(together(self.band_error, self.sampling_error))
     }
 
     /// States no less than a part of the change from the pass with the next narrower band.
@@ -202,12 +201,11 @@ impl Exact {
         let fc = self.setup.probe.center_frequency;
         let pick = pick(&self.setup.picking, fc, &self.distances, &workspace.windows)?;
         let moved = self.isa.run(Repick { bin, band, times: &pick.times, workspace });
-        let mut square = 0.0;
-        for taper in 0..LANES {
-            let change = self.change(&pick, |r| moved[r].0[taper]);
-            square = change.mul_add(change, square);
-        }
-        let band_error = BAND_FACTOR * slow_decay(&self.setup) * (square / LANES as f64).sqrt();
+        let changes: [f64; LANES] = std::array::from_fn(|taper| {
+            let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
+            picking::slope(&self.distances, &times) / pick.velocity - 1.0
+        });
+        let band_error = BAND_FACTOR * slow_decay(&self.setup) * root_mean_square(&changes);
         let sampling_error = self.sampling_error(bin, band, &pick, workspace);
         Ok(Estimated {
             pick,
@@ -215,12 +213,6 @@ impl Exact {
             sampling_error: at_most_one(sampling_error),
             sampled: band.sampled,
         })
-    }
-
-    /// Returns the relative change of a pick's velocity if its times, s, were others.
-    fn change(&self, pick: &Pick, time: impl Fn(usize) -> f64) -> f64 {
-        let times: Vec<f64> = (0..pick.times.len()).map(time).collect();
-        picking::slope(&self.distances, &times) / pick.velocity - 1.0
     }
 
     /// Estimates the error that is due to the distances of samples and the ends of their sums.
@@ -237,22 +229,17 @@ impl Exact {
     ) -> f64 {
         let Self { setup, distances, isa, .. } = self;
         let delays = isa.run(Listen { setup, distances, bin, band, times: &pick.times, workspace });
-        let mean = pick.times.iter().fold(0.0, |sum, t| sum + t) / pick.times.len() as f64;
+        let mean = picking::mean(&pick.times);
         let spread = pick.times.iter().fold(0.0, |sum, t| (t - mean).mul_add(t - mean, sum));
         let (mut changes, mut worst) = ([0.0; BEFORE], 0.0);
         for (t, delays) in pick.times.iter().zip(&delays) {
             let weight = (t - mean) / spread;
-            let mut square = 0.0;
             for (change, &delay) in changes.iter_mut().zip(delays) {
                 *change = delay.mul_add(weight, *change);
-                square = delay.mul_add(delay, square);
             }
-            worst = (square / BEFORE as f64).sqrt().mul_add(weight.abs(), worst);
+            worst = root_mean_square(delays).mul_add(weight.abs(), worst);
         }
-        let square = changes.iter().fold(0.0, |sum, change| change.mul_add(*change, sum));
-        let usual = NOISE_FACTOR * (square / BEFORE as f64).sqrt();
-        let worst = WORST_NOISE_FACTOR * worst;
-        usual.mul_add(usual, worst * worst).sqrt()
+        together(NOISE_FACTOR * root_mean_square(&changes), WORST_NOISE_FACTOR * worst)
     }
 }
 
@@ -262,6 +249,16 @@ impl Exact {
 pub(crate) fn slow_decay(setup: &Setup) -> f64 {
     let heaviness = (setup.layers.marrow.density / HEAVY_MARROW).max(1.0);
     (sampling::thinness(setup) * heaviness).min(SLOW_DECAY_MAX)
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    let square = values.iter().fold(0.0, |sum, value| value.mul_add(*value, sum));
+    (square / values.len() as f64).sqrt()
+}
+
+/// Returns the root of the sum of the squares of two errors.
+fn together(one: f64, other: f64) -> f64 {
+    one.mul_add(one, other * other).sqrt()
 }
 
 /// Returns an error; a signal that changes beyond recognition has the largest, not a failure.
