@@ -36,7 +36,7 @@ pub(super) fn outliers(data: &Data) -> Option<String> {
 }
 
 /// Names the step to which the velocities are rounded, if it is large enough to matter.
-fn rounding(data: &Data) -> Option<String> {
+pub(super) fn rounding(data: &Data) -> Option<String> {
     let deviation = data.moments.mean? * data.moments.coefficient_of_variation?;
     let step = data.rounding.filter(|step| *step >= COARSE * deviation)?;
     Some(format!(

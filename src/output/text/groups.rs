@@ -7,8 +7,8 @@ use osteon_common::visible;
 use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
 
 use super::layout::wrapped;
-use super::result::scale;
-use super::{aligned, data_notes, significant};
+use super::result::{scale, uncontrolled};
+use super::{aligned, data_notes, posterior, significant};
 
 /// A column of numbers: its heading, and for each group a value with its interval.
 struct Column {
@@ -35,8 +35,8 @@ impl From<&QuantityPosterior> for GroupCell {
     }
 }
 
-/// Returns the tables, each line preceded by the given beginning.
-pub(super) fn table(groups: &[Group]) -> String {
+/// Returns the tables of groups, whose job asked for the control variate or did not.
+pub(super) fn table(groups: &[Group], control_variate: bool) -> String {
     let mut text = "\n".to_owned();
     let measured = [
         data(groups, Moment::Mean, "DATA: MEAN VELOCITY (m/s)"),
@@ -71,7 +71,7 @@ pub(super) fn table(groups: &[Group]) -> String {
     };
     let brackets = wrapped(&format!("In brackets: 95 % {intervals}, each group by itself."));
     text.push_str(&format!("\n{brackets}"));
-    text.push_str(&notes(groups));
+    text.push_str(&notes(groups, control_variate));
     text.push_str(&caveat(groups));
     text
 }
@@ -202,17 +202,29 @@ fn note(group: &Group) -> Option<String> {
     }
 }
 
-fn notes(groups: &[Group]) -> String {
-    let note = |group: &Group| {
-        let note = format!("* {}: {}", group.name, note(group)?);
-        Some(format!("{}\n", visible::line(&note)))
-    };
-    let outlying = groups.iter().filter_map(|group| {
-        let outliers = data_notes::outliers(&group.data)?;
-        Some(format!("{}\n", visible::line(&format!("{}: {outliers}", group.name))))
+/// Returns the reasons, followed by the remarks on each group.
+fn notes(groups: &[Group], control_variate: bool) -> String {
+    let reasons = groups.iter().filter_map(|group| {
+        let reason = format!("* {}: {}", group.name, note(group)?);
+        Some(format!("{}\n", visible::line(&reason)))
     });
-    let notes: String = groups.iter().filter_map(note).chain(outlying).collect();
+    let remarks = groups.iter().flat_map(|group| {
+        let remarks = remarks(group, control_variate);
+        remarks.map(|remark| wrapped(&visible::line(&format!("{}: {remark}", group.name))))
+    });
+    let notes: String = reasons.chain(remarks).collect();
     if notes.is_empty() { notes } else { format!("\n{notes}") }
+}
+
+/// Returns what is to be known of a group's data and its best point besides the table.
+fn remarks(group: &Group, control_variate: bool) -> impl Iterator<Item = String> {
+    let uncontrolled = match group.status {
+        Status::Failed => None,
+        _ => uncontrolled(control_variate, &group.velocity, &group.failures),
+    };
+    let of_data = [data_notes::outliers(&group.data), data_notes::rounding(&group.data)];
+    let of_posterior = group.posterior.as_ref().and_then(posterior::outliers);
+    of_data.into_iter().chain([of_posterior, uncontrolled]).flatten()
 }
 
 /// Returns a caveat if several parameters of the mean model are searched, which so few data cannot

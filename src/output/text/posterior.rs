@@ -39,7 +39,7 @@ fn introduced(introduction: &str, found: &PosteriorReport) -> String {
         "`from data`: share of the prior variance that the data removed; near 0 %, the prior alone \
          makes the interval{wider}."
     )));
-    text.push_str(&outliers(found).unwrap_or_default());
+    text.push_str(&outliers(found).map_or_else(String::new, |remark| wrapped(&remark)));
     text.push_str(&wrapped(&effort(found)));
     text.push_str(&doubts(found));
     text
@@ -121,12 +121,12 @@ fn effort(found: &PosteriorReport) -> String {
 }
 
 /// Says how many of the velocities the posterior takes to be wrong, if some may be.
-fn outliers(found: &PosteriorReport) -> Option<String> {
+pub(super) fn outliers(found: &PosteriorReport) -> Option<String> {
     let share = found.outlier_share.filter(|share| *share >= NOTABLE)?;
     let percent = glued(&format!("{} %", digits(100.0 * share, 2)));
-    Some(wrapped(&format!(
+    Some(format!(
         "An estimated {percent} of the velocities are not from the model's law; they count little."
-    )))
+    ))
 }
 
 /// Returns the warnings: an accuracy that was not reached, and data that the model hardly explains.

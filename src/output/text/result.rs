@@ -54,7 +54,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
             of_posteriors => count.push_str(&format!(" and {of_posteriors} for the posteriors")),
         }
         text.push_str(&count);
-        text.push_str(&groups::table(groups));
+        text.push_str(&groups::table(groups, found.control_variate));
         return;
     }
     // A point without a finite cost allows no statement about the data.
@@ -218,7 +218,7 @@ fn notes(
 }
 
 /// Returns a remark if the requested control variate could not be used.
-fn uncontrolled(
+pub(super) fn uncontrolled(
     asked: bool,
     velocity: &Velocity,
     failures: &BTreeMap<FailureKind, u64>,

@@ -16,7 +16,7 @@ fn table(groups: &[Value]) -> String {
         put(&mut value, partial);
         serde_json::from_value(value).unwrap()
     };
-    super::table(&groups.iter().map(group).collect::<Vec<_>>())
+    super::table(&groups.iter().map(group).collect::<Vec<_>>(), true)
 }
 
 fn quantity(value: f64, interval: [f64; 2]) -> Value {
@@ -99,6 +99,25 @@ fn a_posterior_takes_the_place_of_the_intervals_of_a_group() {
     });
     let unmatched = with("P03", &|group| group["identified"]["matched"] = json!(false));
     insta::assert_snapshot!(table(&[with("P01", &|_| {}), vague, unmatched]));
+}
+
+#[test]
+fn what_limits_a_group_is_told_below_the_table() {
+    let mut group = known("P01", 2e10);
+    group["data"]["rounding"] = json!(25.0);
+    group["posterior"] = serde_json::to_value(posterior()).unwrap();
+    group["posterior"]["outlier_share"] = json!(0.021);
+    group["velocity"] = json!({ "controlled": false });
+    group["failures"] = json!({ "direct_wave_first": 2 });
+    let text = table(&[group, known("P02", 2e10)]).replace("\n  ", " ");
+    for expected in [
+        "P01: The velocities are rounded to 25 m/s; test and posterior allow for that.",
+        "P01: An estimated 2.1 % of the velocities are not from the model's law; they count",
+        "P01: Control variate not used: it requires at least three realizations and no failures",
+    ] {
+        assert!(text.contains(expected), "{expected}\n{text}");
+    }
+    assert!(!text.contains("P02: "), "{text}");
 }
 
 #[test]
