@@ -5,6 +5,7 @@
 mod support;
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
 
 use osteon_solver::Isa;
@@ -85,6 +86,21 @@ fn a_check_compares_both_methods_with_a_refined_solution() {
     assert_eq!(velocities.len(), 3, "three solutions: {velocities:?}");
     let shown = run(&["simulate", &case("A.toml"), "--check"]);
     assert!(shown.succeeded().contains("the methods agree\n"), "{}", shown.stdout);
+}
+
+#[test]
+fn a_check_of_a_case_with_attenuation_refines_only() {
+    let scratch = Scratch::new();
+    let attenuation = "[layers]\nbone = { attenuation = { quality_factor = 15 } }\n";
+    let text_of_case = format!("{attenuation}{}", fs::read_to_string(case("A.toml")).unwrap());
+    let file = scratch.write("A.toml", &text_of_case);
+    let json = run(&["simulate", text(&file), "--check", "--json"]).json();
+    let check = json["check"].as_array().unwrap();
+    let methods: Vec<_> = check.iter().map(|one| one["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["exact", "exact"]);
+    assert!(check[0]["relative_difference"].as_f64().unwrap() < 1e-4, "{check:?}");
+    let shown = run(&["simulate", text(&file), "--check"]);
+    assert!(shown.succeeded().contains("hybrid computes no attenuation\n"), "{}", shown.stdout);
 }
 
 #[test]

@@ -91,6 +91,11 @@ impl Number {
         Self { interval, plausible: Some(plausible) }
     }
 
+    /// Accepts numbers of at least `lower`, with the unit and the prior knowledge of `plausible`.
+    pub(crate) const fn at_least(lower: f64, plausible: &'static PlausibleRange) -> Self {
+        Self::plausible(Interval::from(lower, plausible.unit), plausible)
+    }
+
     /// Accepts numbers above 0, with the unit and the prior knowledge of `plausible`.
     pub(crate) const fn above_zero(plausible: &'static PlausibleRange) -> Self {
         Self::plausible(Interval::above(0.0, plausible.unit), plausible)

@@ -1,5 +1,6 @@
 //! The three layers: coupling fluid, cortical bone, marrow.
 
+use crate::attenuation::Attenuation;
 use crate::fields::{Fields, Key, Number, Section};
 use crate::plausible::{BONE_THICKNESS, FLUID_DENSITY, FLUID_THICKNESS, SOUND_SPEED};
 
@@ -12,6 +13,8 @@ pub struct Fluid {
     pub density: f64,
     /// Speed of sound, m/s.
     pub sound_speed: f64,
+    /// Attenuation of sound.
+    pub attenuation: Attenuation,
 }
 
 /// The stack of layers along x3, from top to bottom.
@@ -23,6 +26,8 @@ pub struct Layers {
     pub coupling: Fluid,
     /// Thickness h of the cortical bone, m.
     pub bone_thickness: f64,
+    /// Attenuation of all waves in the bone.
+    pub bone_attenuation: Attenuation,
     /// The marrow: the fluid below the bone (fluid 2 in docs/physics.md).
     pub marrow: Fluid,
 }
@@ -31,8 +36,31 @@ impl Default for Layers {
     /// The geometry of the paper: 10 mm of fluid, 4 mm of bone, 10 mm of fluid, both fluids
     /// water-like.
     fn default() -> Self {
-        let water = Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0 };
-        Self { coupling: water, bone_thickness: 4e-3, marrow: water }
+        let water = Fluid {
+            thickness: 10e-3,
+            density: 1000.0,
+            sound_speed: 1500.0,
+            attenuation: Attenuation::default(),
+        };
+        Self {
+            coupling: water,
+            bone_thickness: 4e-3,
+            bone_attenuation: Attenuation::default(),
+            marrow: water,
+        }
+    }
+}
+
+impl Layers {
+    /// Returns the path, in a file, of the first attenuation that is not off.
+    pub fn attenuated(&self) -> Option<&'static str> {
+        let layers = [
+            ("layers.coupling.attenuation", &self.coupling.attenuation),
+            ("layers.bone.attenuation", &self.bone_attenuation),
+            ("layers.marrow.attenuation", &self.marrow.attenuation),
+        ];
+        let on = layers.into_iter().find(|(_, found)| found.quality_factor.is_some());
+        on.map(|(path, _)| path)
     }
 }
 
@@ -45,6 +73,8 @@ impl Section for Layers {
         fields.table(Key { name: "bone", meaning: "the cortical bone" }, &mut |fields| {
             let key = Key { name: "thickness", meaning: "thickness of the bone" };
             fields.number(key, &mut self.bone_thickness, Number::above_zero(&BONE_THICKNESS));
+            let key = Key { name: "attenuation", meaning: "attenuation of waves in the bone" };
+            fields.table(key, &mut |fields| self.bone_attenuation.declare(fields));
         });
         fields.table(Key { name: "marrow", meaning: "the fluid below the bone" }, &mut |fields| {
             self.marrow.declare(fields);
@@ -69,5 +99,7 @@ impl Section for Fluid {
             &mut self.sound_speed,
             Number::above_zero(&SOUND_SPEED),
         );
+        let key = Key { name: "attenuation", meaning: "attenuation of sound in the fluid" };
+        fields.table(key, &mut |fields| self.attenuation.declare(fields));
     }
 }

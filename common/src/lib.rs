@@ -12,6 +12,7 @@
 
 mod accepted;
 pub mod attainable_moments;
+pub mod attenuation;
 pub mod bulk_velocity;
 pub mod case;
 pub mod check;

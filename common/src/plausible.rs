@@ -102,6 +102,14 @@ pub(crate) const FREQUENCY: PlausibleRange = PlausibleRange {
     possible: (2e3, f64::INFINITY),
     units: &[other("MHz", 6), other("kHz", 3)],
 };
+/// Quality factor of bone, soft tissue, gel or water.
+pub(crate) const QUALITY_FACTOR: PlausibleRange = PlausibleRange {
+    unit: "",
+    typical: 20.0,
+    usual: (4.0, 1e5),
+    possible: (0.0, f64::INFINITY),
+    units: &[],
+};
 /// Height of source or receivers above the bone.
 pub(crate) const HEIGHT: PlausibleRange = PlausibleRange {
     unit: "m",

@@ -30,7 +30,8 @@ use crate::settings::Method;
 use arrivals::{is_audible, lower_echo, reflected_arrival, upper_echo};
 
 pub use arrivals::{
-    direct_arrival, distances, earliest_arrival, earliest_echo, echoes_are_audible, slowness,
+    direct_arrival, distances, earliest_arrival, earliest_echo, echoes_are_audible, fastest,
+    fastest_in, slowness,
 };
 pub use thinning::{FrequencyRun, RUN, smooth_step};
 
@@ -149,7 +150,8 @@ pub struct WaveSampling {
 /// Returns the quick sampling of a setup at the usual speeds of bone.
 pub fn nominal(setup: &Setup) -> WaveSampling {
     let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
-    let bin = speed_bin(setup, NOMINAL_SPEED.max(1.2 * fluids)).unwrap_or(SPEED_BINS - 1);
+    let speed = fastest(setup, NOMINAL_SPEED).max(1.2 * fluids);
+    let bin = speed_bin(setup, speed).unwrap_or(SPEED_BINS - 1);
     WaveSampling::for_speed_bin(setup, bin, first_grade(setup), OuterFaces::None)
 }
 

@@ -81,30 +81,31 @@ pub(crate) fn value(value: &DeclaredValue) -> Option<String> {
         DeclaredValue::Whole(whole, _) => whole.to_string(),
         DeclaredValue::Boolean(truth) => truth.to_string(),
         DeclaredValue::Choice { chosen, .. } => format!("\"{chosen}\""),
-        DeclaredValue::Table(entries) => inline_table(entries),
+        DeclaredValue::Table(entries) => return inline_table(entries),
         DeclaredValue::CustomTable => return None,
     })
 }
 
-/// Returns a table on one line.
-fn inline_table(entries: &[DeclaredKey]) -> String {
+/// Returns a table on one line; `None` if all its keys are absent.
+fn inline_table(entries: &[DeclaredKey]) -> Option<String> {
     let keys = entries.iter().filter(|entry| entry.applies());
     let keys = keys.filter_map(|entry| Some((entry.key.name, value(&entry.value)?)));
     let keys: Vec<_> = keys.map(|(name, value)| format!("{name} = {value}")).collect();
-    format!("{{ {} }}", keys.join(", "))
+    (!keys.is_empty()).then(|| format!("{{ {} }}", keys.join(", ")))
 }
 
 /// Adds the units of a value, each once.
 fn units_of(value: &DeclaredValue, units: &mut Vec<&'static str>) {
     match value {
-        DeclaredValue::Number(_, accepted) => {
+        DeclaredValue::Number(Some(_), accepted) => {
             let unit = accepted.interval.unit();
             if !unit.is_empty() && !units.contains(&unit) {
                 units.push(unit);
             }
         }
         DeclaredValue::Table(entries) => {
-            entries.iter().for_each(|entry| units_of(&entry.value, units))
+            let entries = entries.iter().filter(|entry| entry.applies());
+            entries.for_each(|entry| units_of(&entry.value, units));
         }
         _ => {}
     }

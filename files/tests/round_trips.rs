@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use osteon_common::attenuation::Attenuation;
 use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::data::numbered;
 use osteon_common::elasticity::Elasticity;
@@ -36,6 +37,16 @@ fn fluid() -> impl Strategy<Value = Fluid> {
         thickness,
         density,
         sound_speed,
+        attenuation: Attenuation::default(),
+    })
+}
+
+fn attenuation() -> impl Strategy<Value = Attenuation> {
+    prop::option::of((2.0..1e3, 0.2e6..5e6)).prop_map(|given| match given {
+        None => Attenuation::default(),
+        Some((quality, reference_frequency)) => {
+            Attenuation { quality_factor: Some(quality), reference_frequency }
+        }
     })
 }
 
@@ -55,20 +66,26 @@ fn solver() -> impl Strategy<Value = SolverSettings> {
 }
 
 fn setup() -> impl Strategy<Value = Setup> {
-    let layers = (fluid(), 0.5e-3..8e-3, fluid());
+    let layers = (fluid(), 0.5e-3..8e-3, fluid(), prop::array::uniform3(attenuation()));
     let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
     let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
     let pulse = (0.5e6..1.5e6, positive());
     let settings = (any::<bool>(), 1e-300..1.0, solver());
     (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
-        |((coupling, bone_thickness, marrow), x1, (x3, receivers_x3), row, pulse, settings)| {
+        |(layers, x1, (x3, receivers_x3), row, pulse, settings)| {
+            let (mut coupling, bone_thickness, mut marrow, mut attenuations) = layers;
             let (distance, pitch, count, left) = row;
             let span = f64::from(count) * pitch;
             let first_x1 = if left { x1 - distance - span } else { x1 + distance };
             let (second, threshold, solver) = settings;
             let extremum = if second { Extremum::Second } else { Extremum::First };
+            if solver.method == Method::Hybrid {
+                attenuations = [Attenuation::default(); 3];
+            }
+            let bone_attenuation = attenuations[1];
+            (coupling.attenuation, marrow.attenuation) = (attenuations[0], attenuations[2]);
             Setup {
-                layers: Layers { coupling, bone_thickness, marrow },
+                layers: Layers { coupling, bone_thickness, bone_attenuation, marrow },
                 probe: Probe {
                     center_frequency: pulse.0,
                     amplitude: pulse.1,

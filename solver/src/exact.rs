@@ -12,6 +12,7 @@
 //! So the velocity remains a continuous function of the bone. All of this depends on the bone
 //! alone.
 
+pub(crate) mod attenuation;
 pub(crate) mod direct;
 pub(crate) mod growth;
 pub(crate) mod pass;
@@ -136,7 +137,7 @@ impl Exact {
     /// Returns the solid of a bone, and the upper bound of every wave's speed, m/s.
     fn solid(&self, bone: &Bone) -> Result<(Medium, f64), Failure> {
         let medium = self.isa.run(Solid(bone));
-        let speed = medium.fastest.max(self.setup.layers.marrow.sound_speed);
+        let speed = sampling::fastest(&self.setup, medium.fastest);
         if !speed.is_finite() {
             return Err(speed_not_finite());
         }

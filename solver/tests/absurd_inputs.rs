@@ -27,8 +27,14 @@ fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
 
 /// Up to fluids as heavy as bone.
 fn fluid() -> impl Strategy<Value = Fluid> {
-    (decades(-3.5, -1.5), 1.0..3000.0, 300.0..2500.0)
-        .prop_map(|(thickness, density, sound_speed)| Fluid { thickness, density, sound_speed })
+    (decades(-3.5, -1.5), 1.0..3000.0, 300.0..2500.0).prop_map(
+        |(thickness, density, sound_speed)| Fluid {
+            thickness,
+            density,
+            sound_speed,
+            ..Layers::default().coupling
+        },
+    )
 }
 
 /// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.
@@ -45,7 +51,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
         |(coupling, bone_thickness, marrow, (center_frequency, heights, row))| Setup {
-            layers: Layers { coupling, bone_thickness, marrow },
+            layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
             probe: Probe {
                 center_frequency,
                 amplitude: 100.0,

@@ -156,7 +156,12 @@ fn thickness_of_marrow_may_be_called_plate() {
     let setup = |plate: f64, marrow: f64| {
         let mut setup = Setup::default();
         setup.layers.bone_thickness = plate;
-        setup.layers.marrow = Fluid { thickness: marrow, density: 1300.0, sound_speed: 1700.0 };
+        setup.layers.marrow = Fluid {
+            thickness: marrow,
+            density: 1300.0,
+            sound_speed: 1700.0,
+            ..setup.layers.marrow
+        };
         setup
     };
     for k in [0.0, 900.0, 4000.0] {

@@ -109,7 +109,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
         receivers: receivers.collect(),
         picking: setup.picking,
         solver: solver_of(setup, found),
-        check: check.map(|check| check.solutions().into_iter().map(checked).collect()),
+        check: check.map(|check| check.solutions().map(checked).collect()),
         version,
         numerics,
         commit,

@@ -1,5 +1,6 @@
 //! The exact method far from the paper's geometry: random layers, probes and bones.
 
+use osteon_common::attenuation::Attenuation;
 use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::check;
 use osteon_common::elasticity::EngineeringConstants;
@@ -257,7 +258,7 @@ fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
     let (first_x1, span) = (within(ranges.first_x1), within(ranges.span));
     let count = generator.between(3.0, 25.0) as u32;
     Setup {
-        layers: Layers { coupling, bone_thickness, marrow },
+        layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
         probe: Probe {
             center_frequency,
             source: Source { x1: 0.0, x3: source },
@@ -279,6 +280,7 @@ fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
         thickness: within(ranges.fluid_thickness),
         density: within(ranges.fluid_density),
         sound_speed: generator.between(1000.0, 2000.0),
+        attenuation: Attenuation::default(),
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::accepted::WholeRange;
 use crate::field_path::entry_path;
-use crate::fields::{Choice, Condition, Fields, Key, Number, Section, Whole, entries};
+use crate::fields::{
+    Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, Number, Section, Whole, entries,
+};
 use crate::violations::Violations;
 
 use super::value::{known_wrong, number, quantity, whole};
@@ -17,13 +19,27 @@ pub(crate) fn section(
     violations: &mut Violations,
 ) {
     section.declare(&mut Checker { path: name.to_owned(), violations });
-    for (entry, default) in entries(section).iter().zip(entries(default)) {
-        let field = entry_path(name, entry.key.name);
+    meaningless(name, &entries(section), &entries(default), violations);
+}
+
+/// Records the keys of a table, and of those in it, that are not meaningful and yet have a value.
+fn meaningless(
+    table: &str,
+    entries: &[DeclaredKey],
+    defaults: &[DeclaredKey],
+    violations: &mut Violations,
+) {
+    for (entry, default) in entries.iter().zip(defaults) {
+        let field = entry_path(table, entry.key.name);
         if let Some(condition) = entry.condition.as_ref().filter(|condition| !condition.holds)
             && entry.value != default.value
             && !known_wrong(&field, violations)
         {
             violations.add(field, condition.refusal.as_str());
+        } else if let (DeclaredValue::Table(entries), DeclaredValue::Table(defaults)) =
+            (&entry.value, &default.value)
+        {
+            meaningless(&field, entries, defaults, violations);
         }
     }
 }

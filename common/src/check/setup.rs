@@ -24,6 +24,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     }
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
+    method(setup, violations);
     sampling(setup, violations);
 }
 
@@ -87,6 +88,19 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
             "probe.receivers.first_x1",
             format!("{span}, the source at {source:?} m; all receivers must lie on one side of it"),
         );
+    }
+}
+
+/// Checks that the method computes what is asked for.
+fn method(setup: &Setup, violations: &mut Violations) {
+    let Some(field) = setup.layers.attenuated() else { return };
+    match setup.solver.method {
+        Method::Exact => {}
+        Method::Hybrid => violations.add(
+            field,
+            "the method \"hybrid\" computes no attenuation; leave it out, or set solver.method = \
+             \"exact\"",
+        ),
     }
 }
 

@@ -1,6 +1,20 @@
 //! Earliest possible arrivals: bounds from geometry and the fastest wave.
 
 use crate::case::Setup;
+use crate::layers::Fluid;
+
+/// Returns the highest speed, m/s, of waves along the bone, in which none is faster than `in_bone` (m/s)
+/// at the reference frequency of its attenuation.
+pub fn fastest(setup: &Setup, in_bone: f64) -> f64 {
+    let attenuation = &setup.layers.bone_attenuation;
+    let in_bone = in_bone * attenuation.fastest(setup.probe.center_frequency);
+    in_bone.max(fastest_in(&setup.layers.marrow, setup))
+}
+
+/// Returns the highest speed, m/s, of waves in a fluid of the setup.
+pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
+    fluid.sound_speed * fluid.attenuation.fastest(setup.probe.center_frequency)
+}
 
 /// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
 /// along the bone at `speed` (m/s) and through the coupling fluid at its ends.

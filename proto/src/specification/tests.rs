@@ -97,9 +97,13 @@ fn counted(mut data: Data) -> Data {
     data
 }
 
-fn solver() -> impl Strategy<Value = SolverSettings> {
-    let exact = (0.5..1.5)
-        .prop_map(|refinement| SolverSettings { refinement, ..SolverSettings::default() });
+fn setup() -> impl Strategy<Value = Setup> {
+    let exact = (0.5..1.5, proptest::option::of(2.0..99.0)).prop_map(|(refinement, quality)| {
+        let mut setup = Setup::default();
+        setup.solver.refinement = refinement;
+        setup.layers.bone_attenuation.quality_factor = quality;
+        setup
+    });
     let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(
         |(element_size, element_order, time_step)| SolverSettings {
             method: Method::Hybrid,
@@ -109,6 +113,7 @@ fn solver() -> impl Strategy<Value = SolverSettings> {
             time_step,
         },
     );
+    let hybrid = hybrid.prop_map(|solver| Setup { solver, ..Setup::default() });
     prop_oneof![exact, hybrid]
 }
 
@@ -141,7 +146,7 @@ prop_compose! {
         first_start in 0_u64..=1000,
         sensitivities: bool,
         weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
-        solver in solver(),
+        setup in setup(),
         posterior in proptest::option::of(posterior()),
     ) -> JobSpecification {
         let needs_noise = posterior.is_some() || method == SearchMethod::Posterior;
@@ -161,7 +166,7 @@ prop_compose! {
         }
         let specification = JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
-            setup: Setup { solver, ..Setup::default() },
+            setup,
             data,
             parameters,
             monte_carlo: MonteCarlo {
@@ -353,7 +358,7 @@ fn other_units_are_asked_about() {
              mean 12 and 25 GPa (12e9 and 25e9)?",
         ]
     );
-    let bone = Some(v1::BoneLayer { thickness: Some(4.0) });
+    let bone = Some(v1::BoneLayer { thickness: Some(4.0), ..v1::BoneLayer::default() });
     assert_eq!(
         refusal(|m| m.layers = Some(v1::Layers { bone, ..v1::Layers::default() })),
         ["layers.bone.thickness: is 4.0; values are in m: did you mean 4 mm (4e-3)?"]

@@ -83,7 +83,7 @@ pub(crate) fn respond<const TERMS: usize>(
     let mut scratch = None;
     for b in 0..line.blocks {
         let k = tables.wavenumbers(b);
-        isa.run(Prepare { plate, medium, s: line.s, k: (k.0[0], k.0[LANES - 1]) });
+        isa.run(Prepare { plate, medium, s: line.in_bone, k: (k.0[0], k.0[LANES - 1]) });
         let (block, echo) = tables.block(line, kept, b, &mut scratch);
         let inertia = line.inertia;
         responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
@@ -127,7 +127,8 @@ impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
         for part in 0..V::PARTS {
             let load = ComplexVector::load(&block.load, part);
             let impedance = plate.impedance::<V>(V::load(k, part), load);
-            // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division.
+            // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division. Where
+            // the bone attenuates, both d and q are divided by m(s).
             let gd = ComplexVector::load(&block.g, part).mul(impedance);
             let numerator = gd.sub(inertia);
             let echo = ComplexVector::load(echo, part);

@@ -6,9 +6,11 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
+use osteon_common::layers::Fluid;
 use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling, distances};
 
 use crate::complex::Complex;
+use crate::exact::attenuation::{compliance, lossless};
 use crate::exact::table_cache::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
@@ -39,7 +41,9 @@ pub(crate) struct Line {
     pub(crate) n: usize,
     /// α + i ω, 1/s.
     pub(crate) s: Complex,
-    /// ρ1 s², kg/m³/s².
+    /// The same for the bone, whose attenuation it includes: see [`lossless`].
+    pub(crate) in_bone: Complex,
+    /// ρ1 s² of `in_bone`, kg/m³/s².
     pub(crate) inertia: Complex,
     /// F(s) times the line's weight in the sum over frequencies; not yet tapered.
     pub(crate) pulse: Complex,
@@ -62,7 +66,7 @@ pub(crate) struct KeptLine {
 pub(crate) struct Block {
     /// g = √(k² + s²/c1²), rad/m.
     pub(crate) g: ComplexLanes,
-    /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m: the load on the lower face.
+    /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m, divided by m(s) of the bone: the load on the lower face.
     pub(crate) load: ComplexLanes,
     /// All factors of the reflection coefficient, including the measure of the sum over k.
     pub(crate) weight: ComplexLanes,
@@ -200,13 +204,14 @@ impl Line {
         taper: (f64, f64),
     ) -> Self {
         let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
-        let inertia = (s * s).scale(setup.layers.coupling.density);
+        let in_bone = lossless(&setup.layers.bone_attenuation, s);
+        let inertia = (in_bone * in_bone).scale(setup.layers.coupling.density);
         let within = sampling.is_within(n, taper);
         let blocks = if within { sampling.wavenumbers(n) / LANES } else { 0 };
         // Of the two signs of every frequency but zero, only one is summed: hence the sum's factor
         // 2.
         let share = if n == 0 { 0.5 } else { sampling.share(n) };
-        Self { n, s, inertia, pulse: pulse.scale(share), blocks, kept: OnceLock::new() }
+        Self { n, s, in_bone, inertia, pulse: pulse.scale(share), blocks, kept: OnceLock::new() }
     }
 
     /// Returns the memory of the line's contents, bytes.
@@ -273,7 +278,7 @@ fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) ->
     let coupling = &setup.layers.coupling;
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
     let one = Complex::new(1.0, 0.0);
-    let g = vertical_wavenumber(k, s, coupling.sound_speed);
+    let g = vertical_wavenumber(k, s, coupling);
     let damp = |length: f64| (-g.scale(length)).exp();
     let mut factor = damp(source + receivers).scale(0.5 * coupling.density) / g;
     let mut echo = Complex::default();
@@ -283,7 +288,10 @@ fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) ->
             * (one - damp(2.0 * (coupling.thickness - source)));
         echo = damp(2.0 * coupling.thickness);
     }
-    let load = marrow_load(setup, s, k, sampling.lower_echoes);
+    let mut load = marrow_load(setup, s, k, sampling.lower_echoes);
+    if setup.layers.bone_attenuation.quality_factor.is_some() {
+        load = load * compliance(&setup.layers.bone_attenuation, s);
+    }
     SpectralPoint { g, load, factor, echo }
 }
 
@@ -291,7 +299,7 @@ fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) ->
 /// reflection of the marrow's outer face can arrive in a window.
 pub(crate) fn marrow_load(setup: &Setup, s: Complex, k: f64, echoes: bool) -> Complex {
     let marrow = &setup.layers.marrow;
-    let g = vertical_wavenumber(k, s, marrow.sound_speed);
+    let g = vertical_wavenumber(k, s, marrow);
     let load = (s * s).scale(marrow.density) / g;
     if !echoes {
         return load;
@@ -301,9 +309,9 @@ pub(crate) fn marrow_load(setup: &Setup, s: Complex, k: f64, echoes: bool) -> Co
     load * ((one - decay) / (one + decay))
 }
 
-/// Returns √(k² + s²/c²), real part > 0.
-fn vertical_wavenumber(k: f64, s: Complex, c: f64) -> Complex {
-    let over_c = s.scale(1.0 / c);
+/// Returns √(k² + s²/(c² m(s))), real part > 0.
+fn vertical_wavenumber(k: f64, s: Complex, fluid: &Fluid) -> Complex {
+    let over_c = lossless(&fluid.attenuation, s).scale(1.0 / fluid.sound_speed);
     (over_c * over_c + Complex::new(k * k, 0.0)).sqrt()
 }
 

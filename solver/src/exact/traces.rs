@@ -2,9 +2,10 @@
 
 use osteon_common::case::Bone;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
-use osteon_common::sampling::{WaveSampling, trace_taper};
+use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
+use crate::exact::attenuation::lossless;
 use crate::exact::plate::AccuratePlate;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
@@ -123,9 +124,9 @@ impl Solver {
         let thickness = self.setup().layers.bone_thickness;
         let medium = self.isa().run(Solid(bone));
         self.isa().run(FillPlate { medium: &medium, thickness, plate: &mut plate });
-        let fluids =
-            self.setup().layers.coupling.sound_speed.max(self.setup().layers.marrow.sound_speed);
-        let sampling = WaveSampling::for_traces(self.setup(), medium.fastest.max(fluids), duration);
+        let coupling = sampling::fastest_in(&self.setup().layers.coupling, self.setup());
+        let speed = sampling::fastest(self.setup(), medium.fastest).max(coupling);
+        let sampling = WaveSampling::for_traces(self.setup(), speed, duration);
         let pairs = sampling.pairs(sampling.whole_band());
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
             return Err(TraceError::TooLong { duration, pairs });
@@ -167,8 +168,9 @@ impl Solver {
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
         for (i, line) in tables.lines.iter().enumerate() {
-            let wave = direct::pressure(coupling.density, direct, line.s)
-                - direct::pressure(coupling.density, image, line.s);
+            let s = lossless(&coupling.attenuation, line.s);
+            let wave = direct::pressure(coupling.density, direct, s)
+                - direct::pressure(coupling.density, image, s);
             let pressure = wave * line.pulse;
             let run = &mut spectrum[i / LANES];
             run.re.0[i % LANES] += pressure.re;

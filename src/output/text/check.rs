@@ -11,7 +11,11 @@ pub(super) fn table(check: &Check) -> String {
     let mut rows = vec![header.map(str::to_owned)];
     rows.extend(check.solutions().map(row));
     let verdict = if check.passed() {
-        "the methods agree".to_owned()
+        let agreed = match check.hybrid {
+            Some(_) => "the methods agree",
+            None => "the solutions agree; the method hybrid computes no attenuation",
+        };
+        agreed.to_owned()
     } else if !check.same_picks() {
         "THE PICKS DIFFER".to_owned()
     } else {

@@ -18,7 +18,8 @@ fn bone() -> Bone {
 /// Two unlike fluids, and layers of unlike elements.
 fn setup() -> Setup {
     let mut setup = Setup::default();
-    setup.layers.marrow = Fluid { thickness: 3e-3, density: 930.0, sound_speed: 1440.0 };
+    setup.layers.marrow =
+        Fluid { thickness: 3e-3, density: 930.0, sound_speed: 1440.0, ..setup.layers.marrow };
     setup.layers.coupling.thickness = 5e-3;
     setup
 }
