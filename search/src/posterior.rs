@@ -49,7 +49,7 @@ const SCOUTS: u64 = 2048;
 /// Draws of each batch that check the interpolation.
 const BATCH: usize = 32;
 /// Further points of each batch, where draws matter that the interpolation knows least.
-const LEARNT: usize = 8;
+const LEARNT: usize = 16;
 /// Largest number of batches of the prior.
 const EXPLORED_MAX: u64 = 2;
 /// Limit of the expected square error of a draw, in units of the data's noise: beyond, one draw is as

@@ -308,7 +308,7 @@ fn too_few_evaluations_are_said() {
 fn a_result_that_does_not_pass_is_not_called_converged() {
     let one = &[Parameter::Density][..];
     let three = &[Parameter::Density, Parameter::TransversePoissonRatio, Parameter::Dispersion];
-    for (free, most, expected) in [(&three[..], 48, "checked at 8 draws"), (one, 32, "differs")] {
+    for (free, most, expected) in [(&three[..], 56, "checked at 8 draws"), (one, 32, "differs")] {
         let settings = PosteriorSettings { max_evaluations: most, ..PosteriorSettings::default() };
         let found = posterior(&specification(free, 2747, settings));
         assert_eq!(found.evaluations, most);
