@@ -46,6 +46,8 @@ struct Ranges {
     span: (f64, f64),
     fluid_thickness: (f64, f64),
     fluid_density: (f64, f64),
+    /// Quality factors of the bone and of the fluids in half of the cases; without, none attenuates.
+    quality_factors: Option<[(f64, f64); 2]>,
 }
 
 /// The ranges of the study.
@@ -56,6 +58,7 @@ const RANGES: Ranges = Ranges {
     span: (0.3e-3, 40e-3),
     fluid_thickness: (1e-3, 30e-3),
     fluid_density: (500.0, 6000.0),
+    quality_factors: Some([(8.0, 100.0), (50.0, 2000.0)]),
 };
 
 /// One case: a bone with its own setup, and the quantities from which it was drawn.
@@ -195,8 +198,10 @@ impl MeasuredSetup {
             )
         };
         let receivers = &probe.receivers;
+        let bone = &layers.bone_attenuation;
+        let quality = bone.quality_factor.map_or(String::new(), |found| format!(" (Q {found:.0})"));
         format!(
-            "case {}: {} against {} at refinement {REFERENCE}{}; plate {:.2} mm, {:.2} MHz, coupling {}, \
+            "case {}: {} against {} at refinement {REFERENCE}{}; plate {:.2} mm{quality}, {:.2} MHz, coupling {}, \
              marrow {}, source {:.2} mm, {} receivers at {:.2} mm from {:.1} every {:.2} mm, {:?}",
             self.index,
             outcome(&self.found),
@@ -228,7 +233,10 @@ pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
 fn drawn(seed: u64, index: u64, ranges: &Ranges) -> Result<Option<Drawn>, PointError> {
     let mut generator = Generator::for_index(seed, index);
     for _ in 0..TRIES_MAX {
-        let (setup, point) = (setup(&mut generator, ranges), point(&mut generator));
+        let (mut setup, point) = (setup(&mut generator, ranges), point(&mut generator));
+        if let Some(factors) = ranges.quality_factors.filter(|_| generator.uniform() < 0.5) {
+            attenuate(&mut setup.layers, &mut generator, factors);
+        }
         if !is_suitable(&setup) {
             continue;
         }
@@ -284,6 +292,14 @@ fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
     }
 }
 
+fn attenuate(layers: &mut Layers, generator: &mut Generator, factors: [(f64, f64); 2]) {
+    let [bone, fluids] = factors;
+    let mut drawn = |(from, to)| Some(generator.decades(from, to));
+    layers.bone_attenuation.quality_factor = drawn(bone);
+    layers.coupling.attenuation.quality_factor = drawn(fluids);
+    layers.marrow.attenuation.quality_factor = drawn(fluids);
+}
+
 /// Half of the means are the optimum's, made stiffer or softer; half are isotropic.
 fn point(generator: &mut Generator) -> Point {
     let [_, e_l, nu_l, g_l, e_t, nu_t, _] = OPTIMUM.0;
@@ -320,6 +336,7 @@ mod tests {
         span: (8e-3, 40e-3),
         fluid_thickness: (2e-3, 30e-3),
         fluid_density: (500.0, 2200.0),
+        quality_factors: None,
     };
 
     fn outcome(index: u64, difference: Difference) -> MeasuredSetup {
