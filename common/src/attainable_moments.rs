@@ -55,10 +55,12 @@ impl AttainableMoments {
         };
         let dispersion = ends(ranges, Parameter::Dispersion);
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
+        // An attenuated arrival consists of the pulse's frequencies and somewhat higher ones.
+        let (attenuation, center) = (&setup.layers.bone_attenuation, setup.probe.center_frequency);
         Self {
             velocity: (
-                VELOCITY_FACTORS.0 * bar_velocity_min,
-                VELOCITY_FACTORS.1 * bulk_velocity_max,
+                VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min,
+                VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max,
             ),
             variation: (
                 variation(dispersion.0, VARIATION_FACTORS.0),

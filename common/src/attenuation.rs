@@ -71,12 +71,18 @@ impl Attenuation {
     /// Returns the ratio of the highest speed of a wave from a pulse of this centre frequency (Hz) to
     /// the speed at the reference frequency; 1 without attenuation.
     pub fn fastest(&self, center_frequency: f64) -> f64 {
+        self.speed(FASTEST * center_frequency)
+    }
+
+    /// Returns the ratio of the speed of a wave of this frequency (Hz) to √(modulus/density) at the
+    /// reference frequency; 1 without attenuation.
+    pub fn speed(&self, frequency: f64) -> f64 {
         let exponent = self.exponent();
         if exponent == 0.0 {
             return 1.0;
         }
-        let ratio = FASTEST * center_frequency / self.reference_frequency;
         // The phase velocity is 1/Re(1/√M).
+        let ratio = frequency / self.reference_frequency;
         libm::pow(ratio, exponent) / libm::cos(0.5 * PI * exponent)
     }
 }
@@ -96,5 +102,7 @@ mod tests {
         // 4^γ and 1^γ, divided by cos(πγ/2), with γ = atan(1/15)/π.
         check(Some(15.0), 1e6, 1.03038099395401);
         check(Some(15.0), 0.25e6, 1.00055417085371);
+        let slower = Attenuation { quality_factor: Some(15.0), reference_frequency: 4e6 };
+        assert!((slower.speed(1e6) - 1.00055417085371 / 1.029810303099).abs() < 1e-8);
     }
 }

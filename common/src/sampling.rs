@@ -73,8 +73,11 @@ const SHORTEST_PERIOD: f64 = 6.0;
 /// Period, in periods of the centre frequency, from which the thinning of frequencies removes those
 /// that are not needed high in the band; a shorter period is thinned higher up.
 const THINNED_PERIOD: f64 = 8.0;
-/// Difference, from α T, of the exponent at which the sum over wavenumbers ends, at refinement 1.
+/// Difference, from α T, of the exponent at which the sum over wavenumbers ends.
 const EVANESCENCE: f64 = 6.5;
+/// The same of the thorough grade, at refinement 1: what is cut off there grows as e^(αt), and may be
+/// large compared with an attenuated arrival.
+const THOROUGH_EVANESCENCE: f64 = 12.0;
 /// Frequencies whose weight is below this are left out.
 const TAPER_MIN: f64 = 1e-9;
 /// The period of the thorough grade grows as this power of the refinement.
@@ -289,7 +292,7 @@ impl WaveSampling {
             Grade::Quick | Grade::Plain => EVANESCENCE,
             // Finer sampling is also less truncated, slowly.
             Grade::Thorough | Grade::Full => {
-                EVANESCENCE + 1.5 + 2.0 * libm::log(refinement.max(1.0))
+                THOROUGH_EVANESCENCE + 2.0 * libm::log(refinement.max(1.0))
             }
         };
         let unit = unit * crowding(setup, speed) * (THINNED_PERIOD / (period * fc)).max(1.0);
