@@ -15,9 +15,9 @@ use std::f64::consts::PI;
 use crate::fields::{Condition, Fields, Key, Number, Section};
 use crate::plausible::{FREQUENCY, QUALITY_FACTOR};
 
-/// Frequency, as a multiple of the pulse's centre frequency, at which a wave's speed counts as the
-/// highest. What arrives earlier is so weak that it changes no velocity by 1e-5, and it is part of the
-/// estimated error.
+/// Ratio, to the pulse's centre frequency, of the frequency whose waves count as the fastest. Waves of
+/// higher frequencies arrive earlier, but are weak; what they do to a velocity is part of its estimated
+/// error.
 const FASTEST: f64 = 4.0;
 
 /// Attenuation of one material.

@@ -52,7 +52,7 @@ impl Default for Layers {
 }
 
 impl Layers {
-    /// Returns the path, in a file, of the first attenuation that is not off.
+    /// Returns the path, in a file, of the attenuation of the first layer that has one.
     pub fn attenuated(&self) -> Option<&'static str> {
         let layers = [
             ("layers.coupling.attenuation", &self.coupling.attenuation),

@@ -40,13 +40,18 @@ const TRIES_MAX: usize = 1000;
 #[derive(Debug, Clone, Copy)]
 struct Ranges {
     center_frequency: (f64, f64),
-    /// Of source and receivers above the bone.
+    /// Height of the source above the bone, and that of the receivers.
     height: (f64, f64),
+    /// Distance of the first receiver from the source along the bone.
     first_x1: (f64, f64),
+    /// Distance from the first to the last receiver.
     span: (f64, f64),
+    /// Thickness of the coupling, and that of the marrow.
     fluid_thickness: (f64, f64),
+    /// Density of the coupling, and that of the marrow.
     fluid_density: (f64, f64),
-    /// Quality factors of the bone and of the fluids in half of the cases; without, none attenuates.
+    /// Quality factor of the bone, and that of the fluids. Half of the cases have them; no case has
+    /// them if this is `None`.
     quality_factors: Option<[(f64, f64); 2]>,
 }
 

@@ -3,7 +3,7 @@
 use osteon_common::case::{Bone, Setup};
 
 use crate::complex::Complex;
-use crate::exact::attenuation::{compliance, lossless};
+use crate::exact::attenuation::LosslessFrequencies;
 use crate::exact::plate::AccuratePlate;
 use crate::exact::tables;
 use crate::lanes::ComplexLanes;
@@ -23,12 +23,11 @@ pub fn admittance(setup: &Setup, bone: &Bone, k: f64, s: Complex) -> Complex {
     let medium = Medium::new(bone);
     let mut plate = AccuratePlate::default();
     plate.fill::<Scalar>(&medium, setup.layers.bone_thickness);
-    let attenuation = &setup.layers.bone_attenuation;
-    let compliance = compliance(attenuation, s);
-    plate.prepare::<Scalar>(&medium, lossless(attenuation, s), (k.abs(), k.abs()));
-    let load = tables::marrow_load(setup, s, k, true) * compliance;
+    let lossless = LosslessFrequencies::at(&setup.layers, s);
+    plate.prepare::<Scalar>(&medium, lossless.bone, (k.abs(), k.abs()));
+    let load = tables::marrow_load(setup, s, &lossless, k, true);
     let splat = |z: Complex| ComplexVector { re: Scalar::splat(z.re), im: Scalar::splat(z.im) };
     let mut impedance = ComplexLanes::ZERO;
     plate.impedance(Scalar::splat(k), splat(load)).store(&mut impedance, 0);
-    -(compliance / Complex::new(impedance.re.0[0], impedance.im.0[0]))
+    -(lossless.bone_compliance / Complex::new(impedance.re.0[0], impedance.im.0[0]))
 }

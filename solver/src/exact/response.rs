@@ -83,7 +83,7 @@ pub(crate) fn respond<const TERMS: usize>(
     let mut scratch = None;
     for b in 0..line.blocks {
         let k = tables.wavenumbers(b);
-        isa.run(Prepare { plate, medium, s: line.in_bone, k: (k.0[0], k.0[LANES - 1]) });
+        isa.run(Prepare { plate, medium, s: line.lossless.bone, k: (k.0[0], k.0[LANES - 1]) });
         let (block, echo) = tables.block(line, kept, b, &mut scratch);
         let inertia = line.inertia;
         responses.push(isa.run(Respond { plate, k, block, echo, inertia }));

@@ -6,11 +6,10 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
-use osteon_common::layers::Fluid;
 use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling, distances};
 
 use crate::complex::Complex;
-use crate::exact::attenuation::{compliance, lossless};
+use crate::exact::attenuation::LosslessFrequencies;
 use crate::exact::table_cache::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
@@ -41,9 +40,9 @@ pub(crate) struct Line {
     pub(crate) n: usize,
     /// α + i ω, 1/s.
     pub(crate) s: Complex,
-    /// The same for the bone, whose attenuation it includes: see [`lossless`].
-    pub(crate) in_bone: Complex,
-    /// ρ1 s² of `in_bone`, kg/m³/s².
+    /// The frequencies that include the attenuation of the layers.
+    pub(crate) lossless: LosslessFrequencies,
+    /// ρ1 s² of the bone's lossless frequency, kg/m³/s².
     pub(crate) inertia: Complex,
     /// F(s) times the line's weight in the sum over frequencies; not yet tapered.
     pub(crate) pulse: Complex,
@@ -204,14 +203,14 @@ impl Line {
         taper: (f64, f64),
     ) -> Self {
         let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
-        let in_bone = lossless(&setup.layers.bone_attenuation, s);
-        let inertia = (in_bone * in_bone).scale(setup.layers.coupling.density);
+        let lossless = LosslessFrequencies::at(&setup.layers, s);
+        let inertia = (lossless.bone * lossless.bone).scale(setup.layers.coupling.density);
         let within = sampling.is_within(n, taper);
         let blocks = if within { sampling.wavenumbers(n) / LANES } else { 0 };
         // Of the two signs of every frequency but zero, only one is summed: hence the sum's factor
         // 2.
         let share = if n == 0 { 0.5 } else { sampling.share(n) };
-        Self { n, s, in_bone, inertia, pulse: pulse.scale(share), blocks, kept: OnceLock::new() }
+        Self { n, s, lossless, inertia, pulse: pulse.scale(share), blocks, kept: OnceLock::new() }
     }
 
     /// Returns the memory of the line's contents, bytes.
@@ -242,7 +241,7 @@ impl Line {
         for lane in 0..LANES {
             let m = b * LANES + lane;
             let k = m as f64 * sampling.wavenumber_step;
-            let point = spectral_point(setup, sampling, self.s, k);
+            let point = spectral_point(setup, sampling, self, k);
             // The trapezoidal rule from k = 0 on, for (1/π) ∫ … cos(kx) dk.
             let end = if m == 0 { 0.5 } else { 1.0 };
             let measure = end * sampling.wavenumber_step / PI;
@@ -274,11 +273,11 @@ struct SpectralPoint {
 /// ```
 ///
 /// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window.
-fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) -> SpectralPoint {
+fn spectral_point(setup: &Setup, sampling: &WaveSampling, line: &Line, k: f64) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
     let one = Complex::new(1.0, 0.0);
-    let g = vertical_wavenumber(k, s, coupling);
+    let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
     let damp = |length: f64| (-g.scale(length)).exp();
     let mut factor = damp(source + receivers).scale(0.5 * coupling.density) / g;
     let mut echo = Complex::default();
@@ -288,30 +287,33 @@ fn spectral_point(setup: &Setup, sampling: &WaveSampling, s: Complex, k: f64) ->
             * (one - damp(2.0 * (coupling.thickness - source)));
         echo = damp(2.0 * coupling.thickness);
     }
-    let mut load = marrow_load(setup, s, k, sampling.lower_echoes);
-    if setup.layers.bone_attenuation.quality_factor.is_some() {
-        load = load * compliance(&setup.layers.bone_attenuation, s);
-    }
+    let load = marrow_load(setup, line.s, &line.lossless, k, sampling.lower_echoes);
     SpectralPoint { g, load, factor, echo }
 }
 
-/// Returns Z with τ3 = Z u3 at the bone's lower face, Pa/m: ρ2 s² tanh(g2 h2)/g2, or ρ2 s²/g2 if no
-/// reflection of the marrow's outer face can arrive in a window.
-pub(crate) fn marrow_load(setup: &Setup, s: Complex, k: f64, echoes: bool) -> Complex {
+/// Returns Z with τ3 = Z u3 at the bone's lower face, divided by m(s) of the bone, Pa/m: Z is
+/// ρ2 s² tanh(g2 h2)/g2, or ρ2 s²/g2 if no reflection of the marrow's outer face can arrive in a window.
+pub(crate) fn marrow_load(
+    setup: &Setup,
+    s: Complex,
+    lossless: &LosslessFrequencies,
+    k: f64,
+    echoes: bool,
+) -> Complex {
     let marrow = &setup.layers.marrow;
-    let g = vertical_wavenumber(k, s, marrow);
-    let load = (s * s).scale(marrow.density) / g;
-    if !echoes {
-        return load;
+    let g = vertical_wavenumber(k, lossless.marrow, marrow.sound_speed);
+    let mut load = (s * s).scale(marrow.density) / g;
+    if echoes {
+        let one = Complex::new(1.0, 0.0);
+        let decay = (-g.scale(2.0 * marrow.thickness)).exp();
+        load = load * ((one - decay) / (one + decay));
     }
-    let one = Complex::new(1.0, 0.0);
-    let decay = (-g.scale(2.0 * marrow.thickness)).exp();
-    load * ((one - decay) / (one + decay))
+    load * lossless.bone_compliance
 }
 
-/// Returns √(k² + s²/(c² m(s))), real part > 0.
-fn vertical_wavenumber(k: f64, s: Complex, fluid: &Fluid) -> Complex {
-    let over_c = lossless(&fluid.attenuation, s).scale(1.0 / fluid.sound_speed);
+/// Returns √(k² + s²/c²), real part > 0; `s` is the fluid's lossless frequency.
+fn vertical_wavenumber(k: f64, s: Complex, c: f64) -> Complex {
+    let over_c = s.scale(1.0 / c);
     (over_c * over_c + Complex::new(k * k, 0.0)).sqrt()
 }
 

@@ -5,7 +5,6 @@ use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
-use crate::exact::attenuation::lossless;
 use crate::exact::plate::AccuratePlate;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
@@ -168,7 +167,7 @@ impl Solver {
         let direct = travel(receivers.x3 - source.x3);
         let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
         for (i, line) in tables.lines.iter().enumerate() {
-            let s = lossless(&coupling.attenuation, line.s);
+            let s = line.lossless.coupling;
             let wave = direct::pressure(coupling.density, direct, s)
                 - direct::pressure(coupling.density, image, s);
             let pressure = wave * line.pulse;
