@@ -19,6 +19,15 @@ const PRIOR_POINTS: u64 = 4096;
 /// Smallest number of effective draws of a result that counts as converged.
 const EFFECTIVE_MIN: f64 = 400.0;
 
+/// The draws that a result summarises.
+struct FinalDraws {
+    /// The problem, its likelihood with the sampling errors of the model's moments.
+    problem: PosteriorProblem,
+    population: Population,
+    /// Effective number of independent draws.
+    effective: f64,
+}
+
 impl PosteriorSearch {
     /// Returns the posterior, once all evaluations are made. `errors` are the relative standard
     /// errors of the model's moments due to sampling.
@@ -27,21 +36,13 @@ impl PosteriorSearch {
         specification: &JobSpecification,
         errors: [f64; 2],
     ) -> Option<Posterior> {
-        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
-        let problem = &problem.with_model_errors(errors);
-        let points = POINTS[usize::from(!problem.is_of_few())];
-        let population = problem.population(&self.surrogate, points, self.populations);
-        if population.members.is_empty() {
-            return None;
-        }
+        let drawn = self.final_draws(errors)?;
+        let reason = self.reason(&drawn, errors);
+        let FinalDraws { problem, population, effective } = drawn;
+        let [of_mean, of_variation] = in_units_of_the_data(&problem, errors);
         let prior = problem.prior_points(PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
-        let efficiency = self.check.efficiency();
-        let effective = population.effective() * efficiency;
-        let noise = problem.likelihood.errors();
-        let of_model = [0, 1].map(|k| errors[k] / noise[k]);
-        let reason = self.reason(effective, of_model);
         let (mean, variation) =
             (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
         let at = [mean.mean, variation.mean].map(libm::log);
@@ -54,9 +55,9 @@ impl PosteriorSearch {
             effective_draws: effective,
             checked_draws: self.check.draws() as u64,
             model_error: self.check.error(),
-            check_efficiency: efficiency,
+            check_efficiency: self.check.efficiency(),
             pareto_k: self.check.pareto_shape(),
-            sampling_error: libm::hypot(of_model[0], of_model[1]),
+            sampling_error: libm::hypot(of_mean, of_variation),
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
@@ -68,8 +69,34 @@ impl PosteriorSearch {
             entries: entries(&population, &prior),
             predictive_p_value: None,
             outlier_share: problem.likelihood.outlier_share(at).map(|share| share.mean),
-            draws: draws(&population, problem, count),
+            draws: draws(&population, &problem, count),
         })
+    }
+
+    /// Returns how a job ends that asks for nothing but the posterior; `errors` as in `result`.
+    pub(crate) fn ending(&self, errors: Option<[f64; 2]>) -> SearchOutcome {
+        let outcome = self.outcome();
+        let Some(errors) = errors.filter(|_| outcome == SearchOutcome::Converged) else {
+            return outcome;
+        };
+        // Draws with large errors of the model take long, and are not needed to say so.
+        let noisy = self.problem.as_ref().and_then(|problem| too_noisy(problem, errors));
+        let reason = noisy.or_else(|| self.reason(&self.final_draws(errors)?, errors));
+        reason.map_or(outcome, SearchOutcome::Doubtful)
+    }
+
+    /// Returns the draws that the result summarises, once all evaluations are made; `None` if there
+    /// are none.
+    fn final_draws(&self, errors: [f64; 2]) -> Option<FinalDraws> {
+        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
+        let problem = problem.with_model_errors(errors);
+        let points = POINTS[usize::from(!problem.is_of_few())];
+        let population = problem.population(&self.surrogate, points, self.populations);
+        if population.members.is_empty() {
+            return None;
+        }
+        let effective = population.effective() * self.check.efficiency();
+        Some(FinalDraws { problem, population, effective })
     }
 
     /// Returns mean or coefficient of variation of the interpolated model.
@@ -77,27 +104,40 @@ impl PosteriorSearch {
         moments_of(&self.surrogate, point).map_or(f64::NAN, |found| libm::exp(found[axis]))
     }
 
-    /// Returns why the result is not accurate; `None` if it is. `of_model` are the errors of the
-    /// model's moments in units of the data's.
-    fn reason(&self, effective: f64, of_model: [f64; 2]) -> Option<String> {
+    /// Returns why the result is not accurate; `None` if it is.
+    fn reason(&self, drawn: &FinalDraws, errors: [f64; 2]) -> Option<String> {
         if let SearchOutcome::Doubtful(reason) = self.outcome() {
             return Some(reason);
         }
-        let largest = of_model[0].max(of_model[1]);
-        if largest > MODEL_ERROR_MAX {
-            return Some(format!(
-                "the sampling errors of the model's moments are {largest:.0} times those of the \
-                 data, {MODEL_ERROR_MAX} are allowed; raise [monte_carlo] realizations, or use \
-                 its sampling = \"sobol\" with control_variate = true"
-            ));
-        }
-        (effective < EFFECTIVE_MIN).then(|| {
+        let FinalDraws { problem, effective, .. } = drawn;
+        let few = (*effective < EFFECTIVE_MIN).then(|| {
             format!(
                 "the draws count as {effective:.0} independent ones only, {EFFECTIVE_MIN} are \
                  needed: few points within the bounds match the data; widen the bounds or the priors"
             )
-        })
+        });
+        too_noisy(problem, errors).or(few)
     }
+}
+
+/// Returns the relative errors of the model's moments in units of the data's.
+fn in_units_of_the_data(problem: &PosteriorProblem, errors: [f64; 2]) -> [f64; 2] {
+    let noise = problem.likelihood.errors();
+    [0, 1].map(|k| errors[k] / noise[k])
+}
+
+/// Returns why a model with these relative errors of its moments has no accurate posterior; `None` if
+/// it may have one.
+fn too_noisy(problem: &PosteriorProblem, errors: [f64; 2]) -> Option<String> {
+    let [mean, variation] = in_units_of_the_data(problem, errors);
+    let largest = mean.max(variation);
+    (largest > MODEL_ERROR_MAX).then(|| {
+        format!(
+            "the sampling errors of the model's moments are {largest:.0} times those of the data, \
+             {MODEL_ERROR_MAX} are allowed; raise [monte_carlo] realizations, or use its \
+             sampling = \"sobol\" with control_variate = true"
+        )
+    })
 }
 
 /// Returns the p-value of the data under the law of the best point's velocities, moved to the

@@ -15,7 +15,7 @@ use osteon_common::special::standard_normal_quantile;
 
 use super::features::features;
 use super::population::closed_form;
-use super::{PosteriorSearch, likelihood};
+use super::{PosteriorSearch, SearchOutcome, likelihood};
 
 const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const BOUNDS: [[f64; 2]; 7] = [
@@ -330,4 +330,23 @@ fn a_wrong_velocity_hardly_moves_the_posterior() {
     let off = found.parameters[0].mean - OPTIMUM.dispersion();
     assert!(off.abs() < 0.3 * found.parameters[0].standard_deviation, "{:?}", found.parameters);
     assert!((0.008..0.03).contains(&found.outlier_share.unwrap()), "{:?}", found.outlier_share);
+}
+
+/// A job that asks for nothing but the posterior ends as the result says.
+#[test]
+fn a_posterior_of_too_noisy_a_model_has_not_converged() {
+    let free = [Parameter::Density, Parameter::TransversePoissonRatio, Parameter::Dispersion];
+    let job = specification(&free, 100, PosteriorSettings::default());
+    let mut search = PosteriorSearch::new(&job, likelihood(&job, 0), std::iter::empty());
+    while let Some(point) = search.point() {
+        search.tell(model(&point));
+    }
+    let noise = search.problem.as_ref().unwrap().likelihood.errors();
+    for (ratio, converged) in [(1.0, true), (9.0, false)] {
+        let errors = noise.map(|noise| ratio * noise);
+        let found = search.result(&job, errors).unwrap();
+        assert_eq!(found.converged, converged, "{ratio}: {:?}", found.reason);
+        let expected = found.reason.map_or(SearchOutcome::Converged, SearchOutcome::Doubtful);
+        assert_eq!(search.ending(Some(errors)), expected);
+    }
 }

@@ -296,17 +296,24 @@ impl DatasetSearch {
     }
 
     fn end(&mut self, specification: &JobSpecification) {
-        let agreement = self.best.as_ref().and_then(|Best { row, outcomes }| {
-            let estimate = estimate(&specification.monte_carlo, &row.point, outcomes)?;
-            agreement(specification, self.set as usize, &row.point, &estimate)
+        let estimated = self.best.as_ref().and_then(|Best { row, outcomes }| {
+            Some((row, estimate(&specification.monte_carlo, &row.point, outcomes)?))
         });
+        let agreement = estimated.as_ref().and_then(|(row, estimate)| {
+            agreement(specification, self.set as usize, &row.point, estimate)
+        });
+        let errors = estimated.as_ref().map(|(_, estimate)| estimate.relative_errors());
         let evidence = reasons::Evidence {
             best: self.best(),
             agreement,
             trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,
-            posterior: self.posterior.as_ref().map(|posterior| posterior.outcome()),
+            posterior: self.posterior.as_ref().map(|posterior| {
+                // The search has a status of its own, which the posterior does not change.
+                let is_all = !specification.is_searched();
+                if is_all { posterior.ending(errors) } else { posterior.outcome() }
+            }),
         };
         // Always set before the end.
         let stop = self.stop.unwrap_or(StopReason::Converged);

@@ -3,7 +3,7 @@
 use super::*;
 
 /// Returns the speeds of the bones at a point, used as velocities.
-fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
+pub(super) fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
     let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
     let speed = |index| {
         let bone = ensemble.bone(index).unwrap();
@@ -13,7 +13,7 @@ fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
 }
 
 /// An identification by the likelihood of `count` speeds at `truth`, drawn with this seed.
-fn by_likelihood(truth: &Point, seed: u64, count: u64) -> JobSpecification {
+pub(super) fn by_likelihood(truth: &Point, seed: u64, count: u64) -> JobSpecification {
     let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
     let measured = speeds(&drawn, truth).iter().filter_map(|outcome| outcome.ok()).collect();
     JobSpecification {

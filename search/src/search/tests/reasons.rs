@@ -3,6 +3,7 @@
 use osteon_common::job::{Measurements, PosteriorSettings, SearchMethod};
 use osteon_common::outcome::FailureKind;
 
+use super::likelihood::{by_likelihood, speeds};
 use super::*;
 
 /// Returns the jobs of both methods.
@@ -178,4 +179,21 @@ fn a_posterior_that_is_none_or_not_exact_has_not_converged() {
     assert_eq!(status, Status::NotMatched, "{reason}");
     check(&reason, &["there is no posterior", "widen them"]);
     assert!(result.conclusions.posterior.is_none());
+}
+
+/// The interpolation is right, but eight realizations are too few beside four thousand velocities.
+#[test]
+fn a_posterior_of_too_noisy_a_model_has_not_converged() {
+    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let mut job = by_likelihood(&truth, 1, 4000);
+    job.search.method = SearchMethod::Posterior;
+    job.posterior = Some(PosteriorSettings::default());
+    job.objective = Objective::default();
+    job.monte_carlo.realizations = 8;
+    job.parameters[0] = Range::Free { start: 1600.0, lower: 1500.0, upper: 1700.0 };
+    let (status, reason, result) = ended(&job, |point| speeds(&job.monte_carlo, point));
+    let Some(found) = result.conclusions.posterior else { panic!("{status:?}: {reason}") };
+    assert_eq!((status, found.converged), (Status::MaxEvaluations, false), "{reason}");
+    check(&reason, &["sampling errors of the model's moments", "[monte_carlo] realizations"]);
+    assert_eq!(found.reason, Some(reason));
 }
