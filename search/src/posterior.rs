@@ -40,7 +40,8 @@ use osteon_common::results::{BestPoint, Evaluation, Moments};
 
 use self::check::{BatchCheck, Doubt};
 use self::features::features;
-use self::population::{Member, Population, PosteriorProblem, closed_form};
+pub(crate) use self::population::closed_form;
+use self::population::{Member, Population, PosteriorProblem};
 use self::surrogate::Surrogate;
 use crate::newton::logarithms;
 

@@ -317,7 +317,7 @@ pub(super) fn moments(model: &Surrogate, point: &Point) -> Option<[f64; 2]> {
 }
 
 /// Returns ln √(c1111/ρ) and ln δ at a point.
-pub(super) fn closed_form(point: &Point) -> Option<[f64; 2]> {
+pub(crate) fn closed_form(point: &Point) -> Option<[f64; 2]> {
     Some([bulk_velocity(point).ok()?.logarithm, libm::log(point.dispersion())])
 }
 

@@ -2,12 +2,12 @@
 
 use osteon_common::inference::Agreement;
 use osteon_common::job::{JobSpecification, Objective, Range, Search};
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, Status};
 
 use super::Ending;
 use super::advice as failure_advice;
-use crate::posterior::SearchOutcome;
+use crate::posterior::{SearchOutcome, closed_form};
 use crate::proposal::StopReason;
 use crate::search_box::{SearchBox, Side};
 use crate::simplex::RESTARTS_MAX;
@@ -54,6 +54,9 @@ const NO_POSTERIOR: &str = "no parameter set within the bounds and the priors co
 /// A search was stopped by failed realizations if at least one point in this many had too many of
 /// them. Points that measure slopes lie beside the best one and are rarely refused.
 const REFUSED_IN: u64 = 4;
+
+/// Distance beyond a bound, in edges of the box, at which the moments are compared with those on it.
+const BEYOND: f64 = 0.01;
 
 /// Returns status and explanation of a search that stopped for this reason.
 pub(super) fn ending(
@@ -106,35 +109,35 @@ fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status
     let Some((best, agreement)) = evidence.best.zip(evidence.agreement.as_ref()) else {
         return (Status::Converged, None);
     };
-    let on_bounds = on_bounds(best, specification);
+    let bounds = holding_bounds(best, agreement, specification);
     // How far off a compromise may be is unknown without the noise of the data, unless a bound holds
     // it back.
-    let is_free = agreement.errors.is_none() && on_bounds.is_empty();
+    let is_free = agreement.errors.is_none() && bounds.is_empty();
     if is_compromise(specification) && (agreement.matched || is_free) {
         return (Status::Converged, None);
     }
     let misfit = misfit(best, agreement, specification);
     let status = if agreement.matched { Status::Converged } else { Status::NotMatched };
-    let advice = advice(specification, !on_bounds.is_empty());
+    let advice = advice(specification, !bounds.is_empty());
     let advice = if advice.is_empty() { advice } else { format!("; {advice}") };
     let reason = match stopped_by_failures(&evidence.trials, specification) {
         Some(failures) => format!(
             "{failures}; {misfit}; raise [monte_carlo] max_failed_fraction, or narrow the bounds \
              of [parameters]"
         ),
-        None if on_bounds.is_empty() => format!("no nearby point fits better: {misfit}{advice}"),
-        None => format!("no nearby point fits better: {misfit}; {on_bounds}{advice}"),
+        None if bounds.is_empty() => format!("no nearby point fits better: {misfit}{advice}"),
+        None => format!("no nearby point fits better: {misfit}; {bounds}{advice}"),
     };
     (status, Some(reason))
 }
 
 /// Returns what may bring a search closer to the data.
-fn advice(specification: &JobSpecification, on_bounds: bool) -> String {
+fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
     let is_fixed =
         |parameter: &Parameter| matches!(specification.range(*parameter), Range::Fixed(_));
     let choices = [
         (specification.has_priors(), "lower the weights of [search.priors]"),
-        (on_bounds, "widen the bounds"),
+        (held_by_bounds, "widen the bounds"),
         (Parameter::ALL.iter().any(is_fixed), "free more parameters"),
     ];
     let choices: Vec<&str> =
@@ -212,14 +215,43 @@ fn rounded(value: f64) -> String {
     }
 }
 
-/// Names the parameters that are on a bound; empty if there are none.
-fn on_bounds(best: &Evaluation, specification: &JobSpecification) -> String {
+/// Names the bounds that hold the best point back from the data; empty if there are none.
+fn holding_bounds(
+    best: &Evaluation,
+    agreement: &Agreement,
+    specification: &JobSpecification,
+) -> String {
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(&best.point);
-    let named = on_bounds.iter().map(|(parameter, side)| match side {
+    let holding =
+        on_bounds.iter().filter(|one| holds_back(**one, &best.point, agreement, specification));
+    let named = holding.map(|(parameter, side)| match side {
         Side::Lower => format!("{} is on its lower bound", parameter.name()),
         Side::Upper => format!("{} is on its upper bound", parameter.name()),
     });
     named.collect::<Vec<String>>().join(", ")
+}
+
+/// Returns whether the moments would come nearer to the data's beyond a bound, by the closed form:
+/// v ∝ √(c1111/ρ), Δ ∝ δ. A search also leaves parameters on bounds that hardly matter.
+fn holds_back(
+    (parameter, side): (Parameter, Side),
+    point: &Point,
+    agreement: &Agreement,
+    specification: &JobSpecification,
+) -> bool {
+    let step = match side {
+        Side::Lower => -BEYOND,
+        Side::Upper => BEYOND,
+    };
+    let mut beyond = *point;
+    beyond.0[parameter as usize] += step * specification.range(parameter).edge();
+    let Some((before, after)) = closed_form(point).zip(closed_form(&beyond)) else { return true };
+    let errors = agreement.errors.unwrap_or([1.0; 2]);
+    let nearer = [0, 1].map(|axis| {
+        let change = after[axis] - before[axis];
+        -agreement.differences[axis] * change / (errors[axis] * errors[axis])
+    });
+    nearer[0] + nearer[1] > 0.0
 }
 
 /// Says that failed realizations stopped the search, if so many points were refused for them.

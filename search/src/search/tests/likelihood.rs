@@ -3,7 +3,7 @@
 use super::*;
 
 /// Returns the speeds of the bones at a point, used as velocities.
-pub(super) fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
+fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
     let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
     let speed = |index| {
         let bone = ensemble.bone(index).unwrap();
@@ -29,7 +29,7 @@ pub(super) fn by_likelihood(truth: &Point, seed: u64, count: u64) -> JobSpecific
 }
 
 /// Runs the search to its end with speeds as outcomes.
-fn run_on_speeds(specification: &JobSpecification) -> Search {
+pub(super) fn run_on_speeds(specification: &JobSpecification) -> Search {
     let mut search = Search::new(Arc::new(specification.clone()));
     while let Step::Evaluate(point) = search.ask() {
         search.tell(speeds(&specification.monte_carlo, &point), ERRORS);

@@ -3,7 +3,7 @@
 use osteon_common::job::{Measurements, PosteriorSettings, SearchMethod};
 use osteon_common::outcome::FailureKind;
 
-use super::likelihood::{by_likelihood, speeds};
+use super::likelihood::{by_likelihood, run_on_speeds};
 use super::*;
 
 /// Returns the jobs of both methods.
@@ -191,9 +191,29 @@ fn a_posterior_of_too_noisy_a_model_has_not_converged() {
     job.objective = Objective::default();
     job.monte_carlo.realizations = 8;
     job.parameters[0] = Range::Free { start: 1600.0, lower: 1500.0, upper: 1700.0 };
-    let (status, reason, result) = ended(&job, |point| speeds(&job.monte_carlo, point));
-    let Some(found) = result.conclusions.posterior else { panic!("{status:?}: {reason}") };
-    assert_eq!((status, found.converged), (Status::MaxEvaluations, false), "{reason}");
+    let Ending { status, reason, .. } = ending(&run_on_speeds(&job));
+    let reason = reason.unwrap_or_default();
+    assert_eq!(status, Status::MaxEvaluations, "{reason}");
     check(&reason, &["sampling errors of the model's moments", "[monte_carlo] realizations"]);
-    assert_eq!(found.reason, Some(reason));
+}
+
+/// The shear modulus starts on a bound, and no other value of it would bring the model nearer to the
+/// data.
+#[test]
+fn only_bounds_that_hold_the_search_back_are_named() {
+    let mut job = specification(400);
+    job.parameters[0] = Range::Free { start: 1600.0, lower: 1500.0, upper: 1700.0 };
+    job.parameters[3] = Range::Free { start: 3e9, lower: 3e9, upper: 6e9 };
+    job.search.method = SearchMethod::Newton;
+    job.data = Some(Data::from_moments(8000.0, 0.03));
+    let corner = |point: &Point| -> Arc<[Outcome]> {
+        let slower = (point.density() / 1600.0).sqrt() + point.0[3] / 1e12;
+        outcomes(point).iter().map(|outcome| outcome.map(|velocity| velocity / slower)).collect()
+    };
+    let (status, reason, result) = ended(&job, corner);
+    let best = result.best.unwrap().point;
+    assert!(best.density() < 1501.0 && best.0[3] < 3.001e9, "{best:?}");
+    assert_eq!(status, Status::NotMatched, "{reason}");
+    check(&reason, &["density is on its lower bound, longitudinal_young_modulus is on its upper"]);
+    assert!(!reason.contains("shear"), "{reason}");
 }
