@@ -2,6 +2,7 @@
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::inference::Spread;
+use osteon_common::job::Objective;
 use osteon_common::parameters::Parameter;
 use osteon_files::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
 
@@ -32,7 +33,11 @@ pub(super) fn text(found: &Identification) -> String {
     if let Some(known) = found.posterior() {
         text.push_str(&posterior::text(known));
     } else if let Some(known) = found.identified().filter(|_| has_confidence_intervals(found)) {
-        text.push_str(&format!("\n{}{}", wrapped(&heading(known)), aligned(&rows(known))));
+        text.push_str(&format!(
+            "\n{}{}",
+            wrapped(&heading(known, found.objective)),
+            aligned(&rows(known))
+        ));
     }
     text.push_str(&solutions(found));
     // Evaluations are counted from 0.
@@ -79,7 +84,7 @@ fn row(name: &str, quantity: &QuantityEstimate, scale: f64, unit: &str) -> Optio
 }
 
 /// Returns a heading that says what the intervals are, and which noise they include.
-fn heading(known: &Identified) -> String {
+fn heading(known: &Identified, objective: Objective) -> String {
     let percent = |error: Option<f64>| {
         let error = error.map_or("?".to_owned(), |error| digits(100.0 * error, 2));
         glued(&format!("{error} %"))
@@ -90,8 +95,13 @@ fn heading(known: &Identified) -> String {
     let level = significant(100.0 * known.level, 3);
     let sampling = format!("sampling {}", of(&known.noise.sampling));
     let data = known.noise.data.as_ref().map(|data| format!("data {}, ", of(data)));
+    let of_what = match objective {
+        Objective::Moments | Objective::ChiSquare => "relative noise",
+        // An outlier hardly moves these, unlike the data's own moments.
+        Objective::Likelihood => "relative errors of the likelihood's estimates",
+    };
     format!(
-        "{level} % confidence intervals (relative noise of mean and coefficient of variation: \
+        "{level} % confidence intervals ({of_what} of mean and coefficient of variation: \
          {}{sampling}):",
         data.unwrap_or_default()
     )
